@@ -1,0 +1,27 @@
+"""Optional dependencies."""
+
+from importlib import import_module
+from types import ModuleType
+
+
+def import_optional(module: str, *, extra: str) -> ModuleType:
+    """Import ``module``, or say which extra of skthermo brings it.
+
+    Raises
+    ------
+    ImportError
+        If the module is not installed.
+
+    Examples
+    --------
+    >>> import_optional("no_such_plotter", extra="plot")
+    Traceback (most recent call last):
+    ...
+    ImportError: 'no_such_plotter' is not installed; get it with: pip install "skthermo[plot]"
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise ImportError(
+            f"{module!r} is not installed; get it with: pip install \"skthermo[{extra}]\""
+        ) from error

@@ -1,0 +1,58 @@
+"""Small matrices and small networks run on one BLAS thread each."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from threading import Lock
+from typing import TypeVar
+
+from threadpoolctl import ThreadpoolController  # installed with scikit-learn, which requires it
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_lock = Lock()
+_depth = 0
+_limits = None
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController().select(user_api="blas")
+
+
+@contextmanager
+def single_blas_thread() -> Iterator[None]:
+    """Hold every BLAS of this process to one thread.
+
+    The limit is global to the process, so that contexts which overlap in several Python
+    threads are counted: the first one in sets the limit, the last one out lifts it.
+    """
+    global _depth, _limits
+    with _lock:
+        if _depth == 0:
+            _limits = _controller().limit(limits=1)
+        _depth += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _depth -= 1
+            if _depth == 0:
+                _limits.restore_original_limits()
+                _limits = None
+
+
+def map_on_blas_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Map with as many Python threads as BLAS has, one BLAS thread in each.
+
+    Whoever limits BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limits this too.
+    """
+    items = list(items)
+    n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
+    with single_blas_thread():
+        if min(n_threads, len(items)) < 2:
+            return [function(item) for item in items]
+        with ThreadPoolExecutor(n_threads) as pool:
+            return list(pool.map(function, items))

@@ -1,0 +1,1 @@
+from skthermo.datasets._truss import make_truss

@@ -1,0 +1,24 @@
+"""Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
+
+from skthermo.fem._affine import AffineModel
+from skthermo.fem._callable import CallableModel
+from skthermo.fem._elements import Bar, PointMass, Spring
+from skthermo.fem._noise import add_noise
+from skthermo.fem._protocol import DamageableModel, FEModel
+from skthermo.fem._sampling import sample
+from skthermo.fem._structure import Structure
+from skthermo.fem._tracking import mac
+
+__all__ = [
+    "AffineModel",
+    "Bar",
+    "CallableModel",
+    "DamageableModel",
+    "FEModel",
+    "PointMass",
+    "Spring",
+    "Structure",
+    "add_noise",
+    "mac",
+    "sample",
+]

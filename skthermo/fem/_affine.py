@@ -1,0 +1,278 @@
+"""FE models whose matrices are affine in products of the parameters."""
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._threads import map_on_blas_threads
+from skthermo.fem._affine_input import (
+    check_groups,
+    check_names,
+    check_severities,
+    count_modes,
+    exponents_of,
+    read_terms,
+)
+from skthermo.fem._eigen import dense_form, hertz
+from skthermo.fem._stability import check_supported
+from skthermo.fem._terms import AffineTerms, rows_per_chunk
+from skthermo.fem._theta import check_theta, nominal_theta
+from skthermo.fem._tracking import pair_modes
+
+Array = NDArray[np.float64]
+Terms = Mapping[tuple[str, ...], ArrayLike] | Sequence[tuple[tuple[str, ...], ArrayLike]]
+
+
+class AffineModel:
+    """FE model K(theta) phi = (2 pi f)^2 M(theta) phi with affine stiffness and mass.
+
+    K(theta) = sum over the terms of (product of the named theta) * matrix, and M likewise.
+    Models are immutable; clones share their matrices.
+
+    Parameters
+    ----------
+    stiffness : mapping of tuple of str to matrix, or sequence of such pairs
+        Parameter names -> symmetric matrix (n_dof, n_dof), dense or SciPy sparse, in N/m. The
+        key ``()`` is the constant part; a name may stand in a key more than once. Pairs,
+        unlike a mapping, may repeat a key, so that groups can cut through a parameter.
+    mass : matrix, mapping or sequence of pairs
+        Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless
+        degrees of freedom).
+    n_modes : int, default=6
+        How many of the lowest modes the model gives.
+    parameter_names : sequence of str, optional
+        Columns of theta. By default the names in the order in which the terms mention them.
+    groups : mapping of str to list of (tuple of str or int), optional
+        Damage group -> the stiffness terms that it scales, by key or by position. By default
+        each parameter's name is a group of all stiffness terms that carry it.
+    track : bool, default=False
+        True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
+        swap. False: column j is the j-th lowest mode.
+
+    Attributes
+    ----------
+    n_dof : int
+        Number of degrees of freedom.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, a matrix is not symmetric or not finite, a name is unknown, the
+        nominal stiffness leaves a motion free, or there are fewer modes than ``n_modes``.
+
+    Notes
+    -----
+    Eigenproblems are dense and solved in batches: with a constant mass that is factored once,
+    else (mass that depends on theta or is singular, or a wide spectrum) through the flexibility
+    L^-1 M L^-T with K = L L'. Batches run on as many threads as BLAS may use.
+
+    Examples
+    --------
+    Two equal masses in a row on two springs, the second spring a parameter:
+
+    >>> import numpy as np
+    >>> from skthermo.fem import AffineModel
+    >>> model = AffineModel(
+    ...     {(): [[400.0, 0.0], [0.0, 0.0]], ("k",): [[400.0, -400.0], [-400.0, 400.0]]},
+    ...     mass=np.eye(2), n_modes=2)
+    >>> model
+    AffineModel(1 parameter, 2 degrees of freedom, 2 modes)
+    >>> model.frequencies([[1.0], [0.5]]).round(3)
+    array([[1.967, 5.15 ],
+           [1.723, 4.158]])
+    >>> model.damaged({"k": 0.5}).frequencies([[1.0]]).round(3)
+    array([[1.723, 4.158]])
+    """
+
+    _joblib_prefer = "threads"  # LAPACK works outside Python's lock; nothing need be copied
+
+    def __init__(
+        self,
+        stiffness: Terms,
+        mass: ArrayLike | Terms,
+        *,
+        n_modes: int = 6,
+        parameter_names: Sequence[str] | None = None,
+        groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
+        track: bool = False,
+    ):
+        stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
+        mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=len(stiffness_matrices[0]))
+        self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
+        self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
+        self._stiffness = AffineTerms(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
+        self._mass = AffineTerms(mass_matrices, exponents_of(mass_keys, self._parameter_names))
+        self._track = bool(track)
+        self._n_modes = n_modes
+
+        nominal = nominal_theta(len(self._parameter_names))
+        dofs = [f"degree of freedom {i}" for i in range(self.n_dof)]
+        check_supported(self._stiffness.assemble(nominal)[0], dofs)
+        nominal_mass = self._mass.assemble(nominal)[0]
+        self._n_candidates = min(2 * n_modes, count_modes(nominal_mass, at_least=n_modes))
+        self._form = dense_form(self._stiffness, self._mass)
+        _, shapes = self._form.solve(nominal, n_modes, vectors=True)
+        self._reference = nominal_mass @ shapes[0]
+        self._reference.flags.writeable = False
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Columns of theta."""
+        return self._parameter_names
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes given."""
+        return self._n_modes
+
+    @property
+    def n_dof(self) -> int:
+        """Number of degrees of freedom."""
+        return self._stiffness.n_dof
+
+    @property
+    def track(self) -> bool:
+        """Whether a column follows its mode rather than its rank."""
+        return self._track
+
+    @property
+    def groups(self) -> dict[str, tuple[int, ...]]:
+        """Damage groups and the positions of the stiffness terms that each scales."""
+        return dict(self._groups)
+
+    def frequencies(self, theta: ArrayLike) -> Array:
+        """Natural frequencies.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            In Hz.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width, or a value that is not finite and positive.
+        """
+        return self._in_chunks(self._frequencies, theta)[0]
+
+    def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
+        """Natural frequencies and mode shapes.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz.
+        shapes : ndarray of shape (n_samples, n_dof, n_modes)
+            With unit modal mass; signs are arbitrary.
+        """
+        return self._in_chunks(self._modes, theta)
+
+    def jacobian(self, theta: ArrayLike) -> Array:
+        """Exact derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of
+            single modes do not exist and the values are those of an arbitrary basis.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_parameters)
+            d f / d theta in Hz.
+        """
+        return self._in_chunks(self._jacobian, theta)[0]
+
+    def matrices(self, theta: ArrayLike) -> tuple[Array, Array]:
+        """Stiffness and mass.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        stiffness, mass : ndarray of shape (n_samples, n_dof, n_dof)
+        """
+        theta = check_theta(theta, self.parameter_names)
+        return self._stiffness.assemble(theta), self._mass.assemble(theta)
+
+    def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
+        """A new model with less stiffness (or more) in some groups; mass stays.
+
+        Parameters
+        ----------
+        damage : mapping of str to float
+            Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half,
+            -0.15 a strengthening by 15 %. Terms of several damaged groups take every factor.
+
+        Returns
+        -------
+        AffineModel
+            Its columns are the modes of this model's undamaged nominal state.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or a severity is 1 or more or not finite.
+        """
+        factors = np.ones(len(self._stiffness.factors))
+        for group, severity in check_severities(damage, self._groups).items():
+            factors[list(self._groups[group])] *= 1 - severity
+        twin = copy.copy(self)
+        twin._stiffness = self._stiffness.scaled(factors)
+        twin._form = self._form.scaled(factors)
+        return twin
+
+    def __sklearn_clone__(self) -> "AffineModel":
+        return self
+
+    def __repr__(self) -> str:
+        counts = ((len(self.parameter_names), "parameter"), (self.n_dof, "degree"), (self.n_modes, "mode"))
+        parameters, degrees, modes = (f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts)
+        track = ", track=True" if self.track else ""
+        return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
+
+    def _frequencies(self, theta: Array) -> tuple[Array]:
+        if self.track:
+            return (self._modes(theta)[0],)
+        eigenvalues, _ = self._form.solve(theta, self.n_modes, vectors=False)
+        return (hertz(eigenvalues),)
+
+    def _modes(self, theta: Array) -> tuple[Array, Array]:
+        if not self.track:
+            eigenvalues, shapes = self._form.solve(theta, self.n_modes, vectors=True)
+            return hertz(eigenvalues), shapes
+        eigenvalues, shapes = self._form.solve(theta, self._n_candidates, vectors=True)
+        order = pair_modes((self._reference.T @ shapes) ** 2)
+        return (
+            np.take_along_axis(hertz(eigenvalues), order, axis=1),
+            np.take_along_axis(shapes, order[:, np.newaxis], axis=2),
+        )
+
+    def _jacobian(self, theta: Array) -> tuple[Array]:
+        frequencies, shapes = self._modes(theta)
+        gradient = self._stiffness.gradients(theta, shapes)
+        if not self._mass.is_constant:
+            eigenvalues = (2 * np.pi * frequencies) ** 2
+            gradient -= eigenvalues[:, :, np.newaxis] * self._mass.gradients(theta, shapes)
+        return (gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis]),)
+
+    def _in_chunks(self, solve, theta: ArrayLike) -> tuple[Array, ...]:
+        rows = check_theta(theta, self.parameter_names)
+        size = rows_per_chunk(self.n_dof)
+        parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
+        return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))

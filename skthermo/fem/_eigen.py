@@ -1,0 +1,100 @@
+"""Batches of dense generalised eigenproblems K phi = lambda M phi.
+
+Two forms of the same problem. Both scale mode shapes to unit modal mass.
+"""
+
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from skthermo.fem._terms import AffineTerms
+from skthermo.fem._theta import nominal_theta
+
+Array = NDArray[np.float64]
+
+WIDEST_SPECTRUM = 1e6
+"""Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9."""
+
+
+class EigenForm(Protocol):
+    """What solves the eigenproblem for many theta at once."""
+
+    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
+        """Lowest eigenvalues (n_samples, n_modes), and shapes (n_samples, n_dof, n_modes)."""
+
+    def scaled(self, factors: Array) -> "EigenForm":
+        """The form of the same structure with its stiffness terms multiplied."""
+
+
+class StandardForm:
+    """A y = lambda y with A = L^-1 K L^-T and phi = L^-T y, for a constant mass M = L L'.
+
+    The mass is factored once and every stiffness term transformed once.
+    """
+
+    def __init__(self, stiffness: AffineTerms, basis: Array):
+        self._basis = basis
+        self._stiffness = stiffness
+
+    @classmethod
+    def from_mass(cls, stiffness: AffineTerms, mass: Array) -> "StandardForm":
+        lower = np.linalg.cholesky(mass)
+        basis = scipy.linalg.solve_triangular(lower, np.eye(len(mass)), lower=True).T
+        return cls(stiffness.congruent(basis), basis)
+
+    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
+        matrices = self._stiffness.assemble(theta)
+        if not vectors:
+            return np.linalg.eigvalsh(matrices)[:, :n_modes], None
+        eigenvalues, shapes = np.linalg.eigh(matrices)
+        return eigenvalues[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
+
+    def scaled(self, factors: Array) -> "StandardForm":
+        return StandardForm(self._stiffness.scaled(factors), self._basis)
+
+
+class FlexibilityForm:
+    """B y = y / lambda with B = L^-1 M L^-T and phi = L^-T y sqrt(lambda), for K = L L'.
+
+    Serves a mass that varies with theta or leaves degrees of freedom massless, and keeps the
+    digits of the lowest modes where the spectrum of stiffness is wide.
+    """
+
+    def __init__(self, stiffness: AffineTerms, mass: AffineTerms):
+        self._stiffness = stiffness
+        self._mass = mass
+
+    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
+        inverse = np.linalg.inv(np.linalg.cholesky(self._stiffness.assemble(theta)))
+        transposed = inverse.swapaxes(1, 2)
+        flexibility = inverse @ self._mass.assemble(theta) @ transposed
+        if not vectors:
+            return 1 / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes], None
+        inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
+        eigenvalues = 1 / inverse_eigenvalues[:, ::-1][:, :n_modes]
+        shapes = transposed @ shapes[:, :, ::-1][:, :, :n_modes]
+        return eigenvalues, shapes * np.sqrt(eigenvalues)[:, np.newaxis]
+
+    def scaled(self, factors: Array) -> "FlexibilityForm":
+        return FlexibilityForm(self._stiffness.scaled(factors), self._mass)
+
+
+def dense_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
+    """The standard form where it is accurate (and fastest), else the flexibility form."""
+    if mass.is_constant:
+        nominal = nominal_theta(stiffness.exponents.shape[1])
+        matrix = mass.assemble(nominal)[0]
+        lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]]
+        if lowest > len(matrix) * np.finfo(float).eps * highest:
+            form = StandardForm.from_mass(stiffness, matrix)
+            eigenvalues, _ = form.solve(nominal, len(matrix), vectors=False)
+            if eigenvalues[0, -1] < WIDEST_SPECTRUM * eigenvalues[0, 0]:
+                return form
+    return FlexibilityForm(stiffness, mass)
+
+
+def hertz(eigenvalues: Array) -> Array:
+    """Natural frequencies in Hz of the eigenvalues (2 pi f)^2."""
+    return np.sqrt(eigenvalues) / (2 * np.pi)

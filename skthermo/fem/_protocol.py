@@ -1,0 +1,45 @@
+"""What an FE model must offer."""
+
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@runtime_checkable
+class FEModel(Protocol):
+    """The duck type of every FE model: anything with these three members will do.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+
+    Notes
+    -----
+    A model that can do more is used for more, and each stage says which of these it needs:
+
+    - ``modes(theta) -> (frequencies, shapes)``, shapes (n_samples, n_dof, n_modes) with unit modal mass;
+    - ``jacobian(theta)``, d f / d theta in Hz, (n_samples, n_modes, n_parameters);
+    - ``damaged({group: severity})``, a new model with the groups' stiffness times (1 - severity);
+    - ``groups``, the names that ``damaged`` knows;
+    - ``track``, whether a column follows its mode (True) or its rank (False).
+
+    scikit-learn's ``clone`` never copies a model in skthermo's estimators.
+    """
+
+    parameter_names: tuple[str, ...]
+    n_modes: int
+
+    def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:
+        """Natural frequencies in Hz, (n_samples, n_modes), of theta (n_samples, n_parameters)."""
+
+
+class DamageableModel(FEModel, Protocol):
+    """An FE model that damage can be put into."""
+
+    def damaged(self, damage: Mapping[str, float]) -> "FEModel":
+        """The model with each group's stiffness times (1 - severity)."""

@@ -1,0 +1,220 @@
+"""Structures of nodes and members."""
+
+from collections.abc import Collection, Hashable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo.fem._affine import AffineModel
+from skthermo.fem._assembly import STIFFNESS, TermAssembler
+from skthermo.fem._elements import TRANSLATIONS, Dof, Element, check_element
+from skthermo.fem._stability import check_supported
+
+Array = NDArray[np.float64]
+Binding = tuple[str, str]
+
+
+class Structure:
+    """Nodes, members, supports and named groups, from which FE models are assembled.
+
+    Parameters
+    ----------
+    nodes : mapping of node to coordinates
+        (x, y) or (x, y, z) in m.
+    members : mapping of member to element
+        `Bar`, `Spring` and `PointMass` objects.
+    supports : mapping of node to directions
+        Fixed directions of a node, such as "xy" or ("x", "y").
+    groups : mapping of group to members, optional
+        Named groups; a member may be in several, or in none.
+
+    Attributes
+    ----------
+    dofs : list of (node, direction)
+        Free degrees of freedom in the order of the matrices' rows.
+
+    Raises
+    ------
+    ValueError
+        Names the node, member, group or direction that is unknown, duplicated, disconnected,
+        of zero length or of a property that is not positive.
+
+    Examples
+    --------
+    A king-post truss, whose post and rafters are parameters:
+
+    >>> from skthermo.fem import Bar, Structure
+    >>> steel = dict(E=210e9, A=0.01, density=7850.0)
+    >>> structure = Structure(
+    ...     nodes={"left": (0, 0), "foot": (3, 0), "right": (6, 0), "apex": (3, 2)},
+    ...     members={
+    ...         "tie 1": Bar("left", "foot", **steel), "tie 2": Bar("foot", "right", **steel),
+    ...         "rafter 1": Bar("left", "apex", **steel), "rafter 2": Bar("apex", "right", **steel),
+    ...         "post": Bar("foot", "apex", **steel)},
+    ...     supports={"left": "xy", "right": "y"},
+    ...     groups={"rafters": ["rafter 1", "rafter 2"], "post": ["post"]})
+    >>> model = structure.assemble(["rafters", "post"], n_modes=2)
+    >>> model.frequencies([[1.0, 1.0]]).round(2)
+    array([[127.57, 142.43]])
+    """
+
+    def __init__(
+        self,
+        nodes: Mapping[Hashable, Sequence[float]],
+        members: Mapping[Hashable, Element],
+        supports: Mapping[Hashable, Collection[str]],
+        groups: Mapping[str, Collection[Hashable]] | None = None,
+    ):
+        self._coordinates = _read_nodes(nodes)
+        self._members = dict(members)
+        for name, element in self._members.items():
+            check_element(name, element, self._coordinates)
+        self._groups = {group: frozenset(names) for group, names in (groups or {}).items()}
+        self._check_groups()
+        self.dofs = self._free_dofs(supports)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return len(next(iter(self._coordinates.values())))
+
+    @property
+    def groups(self) -> dict[str, frozenset]:
+        """Members of every named group."""
+        return dict(self._groups)
+
+    def assemble(
+        self,
+        parameters: Sequence[str] | Mapping[str, str | Binding],
+        *,
+        groups: Sequence[str] | None = None,
+        n_modes: int = 6,
+        track: bool = False,
+    ) -> AffineModel:
+        """The structure as an FE model.
+
+        Parameters
+        ----------
+        parameters : sequence of str, or mapping of str to group or (property, group)
+            What theta multiplies. A group's name stands for the whole stiffness of the group;
+            ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "density", "k", "m") of
+            its members, in stiffness and mass.
+        groups : sequence of str, optional
+            Groups that can be damaged. By default all of the structure's groups.
+        n_modes : int, default=6
+            Number of modes.
+        track : bool, default=False
+            Whether a column follows its mode rather than its rank.
+
+        Returns
+        -------
+        AffineModel
+
+        Raises
+        ------
+        ValueError
+            If a group or property is unknown, or the structure is a mechanism.
+        """
+        bindings = self._read_parameters(parameters)
+        damageable = [self._known(group, "groups") for group in (self._groups if groups is None else groups)]
+        stiffness, mass = TermAssembler(self.dofs), TermAssembler(self.dofs)
+        for name, element in self._members.items():
+            coordinates = np.array([self._coordinates[node] for node in element.nodes])
+            dofs = element.dofs(self.dimension)
+            bound = {p: prop for p, (prop, group) in bindings.items() if name in self._groups[group]}
+            damage = frozenset(group for group in damageable if name in self._groups[group])
+            stiffness.add(element.stiffness(coordinates), dofs, bound, damage)
+            inertial = {p: prop for p, prop in bound.items() if prop != STIFFNESS}
+            mass.add(element.mass(coordinates), dofs, inertial)
+        names = [f"node {node!r} along {direction}" for node, direction in self.dofs]
+        check_supported(stiffness.total().toarray(), names)
+        return AffineModel(
+            stiffness.terms(),
+            mass.terms(),
+            n_modes=n_modes,
+            parameter_names=tuple(bindings),
+            groups={group: terms for group in damageable if (terms := stiffness.positions(group))},
+            track=track,
+        )
+
+    def _read_parameters(self, parameters) -> dict[str, Binding]:
+        if isinstance(parameters, str):
+            parameters = [parameters]
+        if not isinstance(parameters, Mapping):
+            parameters = {group: group for group in parameters}
+        bindings = {}
+        for name, target in parameters.items():
+            prop, group = (STIFFNESS, target) if isinstance(target, str) else target
+            members = self._groups[self._known(group, f"parameter {name!r}")]
+            known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
+            if prop not in known | {STIFFNESS}:
+                raise ValueError(
+                    f"parameter {name!r} is the property {prop!r} of group {group!r}; "
+                    f"expected {STIFFNESS!r} or one of {sorted(known)}"
+                )
+            bindings[name] = (prop, group)
+        return bindings
+
+    def _known(self, group: str, what: str) -> str:
+        if group not in self._groups:
+            raise ValueError(f"{what}: unknown group {group!r}; expected one of {sorted(self._groups)}")
+        return group
+
+    def _check_groups(self) -> None:
+        for group, members in self._groups.items():
+            unknown = [member for member in members if member not in self._members]
+            if unknown or not members:
+                raise ValueError(f"group {group!r} holds {unknown or 'no member'}; expected names of members")
+
+    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
+        directions = tuple(TRANSLATIONS[: self.dimension])
+        used: set[Dof] = set()
+        for name, element in self._members.items():
+            used.update(element.dofs(self.dimension))
+            for node, direction in element.dofs(self.dimension):
+                if direction not in directions:
+                    raise ValueError(
+                        f"member {name!r} acts along {direction!r} of node {node!r}; expected {directions}"
+                    )
+        connected = {node for element in self._members.values() for node in element.nodes}
+        for node in self._coordinates:
+            if node not in connected:
+                raise ValueError(f"node {node!r} is disconnected: no member ends there")
+        for node, fixed in supports.items():
+            if node not in self._coordinates:
+                raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
+            for direction in fixed:
+                if direction not in directions:
+                    raise ValueError(f"support of node {node!r} along {direction!r}; expected {directions}")
+        return [
+            (node, direction)
+            for node in self._coordinates
+            for direction in directions
+            if (node, direction) in used and direction not in supports.get(node, ())
+        ]
+
+    def __repr__(self) -> str:
+        return (
+            f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
+            f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
+        )
+
+
+def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    if not nodes:
+        raise ValueError("nodes is empty; expected a mapping of node to coordinates")
+    coordinates: dict[Hashable, Array] = {}
+    places: dict[tuple[float, ...], Hashable] = {}
+    first = np.asarray(next(iter(nodes.values())))
+    for node, place in nodes.items():
+        xyz = np.asarray(place, dtype=float)
+        if xyz.shape not in ((2,), (3,)) or xyz.shape != first.shape or not np.isfinite(xyz).all():
+            raise ValueError(
+                f"node {node!r} has the coordinates {place!r}; expected two or three finite numbers, "
+                "as many as the first node has"
+            )
+        twin = places.setdefault(tuple(xyz + 0.0), node)
+        if twin != node:
+            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+        coordinates[node] = xyz
+    return coordinates

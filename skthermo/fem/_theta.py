@@ -1,0 +1,53 @@
+"""Rows of parameter multipliers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def nominal_theta(n_parameters: int) -> NDArray[np.float64]:
+    """One row of ones: every parameter at its nominal value."""
+    return np.ones((1, n_parameters))
+
+
+def check_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.float64]:
+    """Rows of finite, positive multipliers, one column for each parameter.
+
+    Parameters
+    ----------
+    theta : array-like or DataFrame of shape (n_samples, n_parameters) or (n_parameters,)
+        Multipliers of the nominal values. A frame's columns must be the parameters' names
+        in their order; a vector is one row.
+    parameter_names : sequence of str
+        The parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_parameters)
+
+    Raises
+    ------
+    ValueError
+        If the width or the names differ, or a value is not finite and positive.
+    """
+    names = list(parameter_names)
+    if hasattr(theta, "columns") and list(theta.columns) != names:
+        raise ValueError(
+            f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order"
+        )
+    values = np.asarray(theta, dtype=float)
+    rows = values[np.newaxis] if values.ndim == 1 else values
+    if rows.ndim != 2 or rows.shape[1] != len(names):
+        raise ValueError(
+            f"theta has shape {values.shape}; expected (n_samples, {len(names)}), "
+            f"a column for each of the parameters {names}"
+        )
+    wrong = ~(np.isfinite(rows) & (rows > 0))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"theta must be finite and positive; row {row}, parameter {names[column]!r} "
+            f"is {rows[row, column]} ({np.count_nonzero(wrong)} such values in all)"
+        )
+    return rows

@@ -1,0 +1,92 @@
+"""Which mode is which: modal assurance criterion, pairing, order."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+
+if TYPE_CHECKING:
+    from skthermo.fem._protocol import FEModel
+
+
+def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
+    """Modal assurance criterion of every pair of mode shapes.
+
+    ``|phi_a^H phi_b|^2 / (phi_a^H phi_a * phi_b^H phi_b)``: 1 for the same shape whatever its
+    scale, sign or phase, 0 for orthogonal ones.
+
+    Parameters
+    ----------
+    phi_a : array-like of shape (n_dof, n_a) or (n_dof,)
+        Mode shapes in columns, real or complex.
+    phi_b : array-like of shape (n_dof, n_b) or (n_dof,)
+        Mode shapes at the same degrees of freedom.
+
+    Returns
+    -------
+    ndarray of shape (n_a, n_b)
+
+    Raises
+    ------
+    ValueError
+        If the numbers of degrees of freedom differ, or a shape is zero throughout.
+
+    References
+    ----------
+    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982.
+
+    Examples
+    --------
+    >>> mac([[1.0, 1.0], [2.0, -0.5]], [2.0, 4.0]).round(12)
+    array([[1.],
+           [0.]])
+    """
+    a, b = (_columns(phi, name) for phi, name in ((phi_a, "phi_a"), (phi_b, "phi_b")))
+    if len(a) != len(b):
+        raise ValueError(f"phi_a has {len(a)} degrees of freedom and phi_b {len(b)}; expected the same")
+    cross = np.abs(a.conj().T @ b) ** 2
+    return cross / np.outer(_squared_norms(a), _squared_norms(b))
+
+
+def pair_modes(likeness: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Assign to every reference mode the candidate that keeps the summed likeness highest.
+
+    Parameters
+    ----------
+    likeness : ndarray of shape (n_samples, n_modes, n_candidates)
+        MAC of reference modes and candidates.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_modes)
+        Candidate of each reference mode; no candidate serves twice.
+    """
+    best = likeness.argmax(axis=2)
+    clear = np.take_along_axis(likeness, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > 0.5
+    distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
+    for sample in np.flatnonzero(~(clear & distinct)):
+        best[sample] = linear_sum_assignment(likeness[sample], maximize=True)[1]
+    return best
+
+
+def share_reordered(model: "FEModel", theta: NDArray[np.float64]) -> float:
+    """Share of the rows of theta at which the model's modes change their nominal order."""
+    nominal = model.modes(np.ones((1, theta.shape[1])))[1][0]
+    likeness = np.stack([mac(nominal, shapes) for shapes in model.modes(theta)[1]])
+    return float((pair_modes(likeness) != np.arange(nominal.shape[1])).any(axis=1).mean())
+
+
+def _columns(phi: ArrayLike, name: str) -> NDArray:
+    array = np.asarray(phi)
+    array = array[:, np.newaxis] if array.ndim == 1 else array
+    if array.ndim != 2:
+        raise ValueError(f"{name} has shape {array.shape}; expected (n_dof, n_modes)")
+    empty = np.flatnonzero(~array.any(axis=0))
+    if empty.size:
+        raise ValueError(f"{name}: shape {empty[0]} is zero at every degree of freedom")
+    return array
+
+
+def _squared_norms(phi: NDArray) -> NDArray[np.float64]:
+    return np.einsum("im,im->m", phi.conj(), phi).real
