@@ -1,0 +1,122 @@
+"""The one import point for scikit-learn's private helpers, and input checks shared by estimators."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.utils import check_array, check_random_state
+from sklearn.utils._param_validation import HasMethods, Interval, Options, StrOptions
+from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, validate_data
+
+__all__ = [
+    "HasMethods",
+    "Interval",
+    "Options",
+    "StrOptions",
+    "_check_feature_names_in",
+    "_fit_context",
+    "_num_samples",
+    "check_array",
+    "check_is_fitted",
+    "check_columns",
+    "check_same_rows",
+    "clone_sharing_models",
+    "column_names",
+    "is_model",
+    "like",
+    "seed_parts",
+    "validate_data",
+]
+
+
+def is_model(candidate: Any) -> bool:
+    """Whether an object is an FE model, judged by what it can do."""
+    return hasattr(candidate, "frequencies") and hasattr(candidate, "parameter_names")
+
+
+def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
+    """Values as a frame with X's index where X is a frame, else as they are."""
+    return pd.DataFrame(values, index=X.index, columns=list(columns)) if isinstance(X, pd.DataFrame) else values
+
+
+def column_names(X: Any, default: str) -> list[str]:
+    """Names of X's columns, for messages and outputs: a frame's own, else default1, default2, ..."""
+    if isinstance(X, pd.DataFrame):
+        return [str(name) for name in X.columns]
+    return [f"{default}{i + 1}" for i in range(np.shape(X)[1])]
+
+
+def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
+    """Refuse columns that hold no value, or (``varying``) only one value in two or more rows.
+
+    Raises
+    ------
+    ValueError
+        Names the column.
+    """
+    values = np.asarray(X, dtype=float)
+    for name, column in zip(column_names(X, what[0].upper()), values.T, strict=True):
+        present = column[~np.isnan(column)]
+        if not present.size:
+            raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
+        if varying and len(column) > 1 and np.ptp(present) == 0:
+            raise ValueError(
+                f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
+                "expected one that varies: leave the sensor out"
+            )
+
+
+def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
+    """Refuse two tables of different length or, where both are frames, of different index.
+
+    Raises
+    ------
+    ValueError
+        Names the first row that differs.
+    """
+    if _num_samples(X) != _num_samples(y):
+        raise ValueError(
+            f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
+        )
+    indices = [getattr(table, "index", None) for table in (X, y)]
+    if all(isinstance(index, pd.Index) for index in indices) and not indices[0].equals(indices[1]):
+        differing = [i for i, (a, b) in enumerate(zip(*indices, strict=True)) if a != b]
+        where = f"row {differing[0]}: {indices[0][differing[0]]} and {indices[1][differing[0]]}" if differing else (
+            f"{indices[0].dtype} and {indices[1].dtype}"
+        )
+        raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
+
+
+def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState) -> None:
+    """Seed every ``random_state`` of an estimator and its parts that is None.
+
+    A seed is drawn for the others too, so that seeding one part leaves the rest as they were.
+    """
+    parameters = estimator.get_params(deep=True)
+    seeds = {}
+    for name in sorted(parameters):
+        if name == "random_state" or name.endswith("__random_state"):
+            seed = random_state.randint(np.iinfo(np.int32).max)
+            if parameters[name] is None:
+                seeds[name] = seed
+    estimator.set_params(**seeds)
+
+
+def clone_sharing_models(estimator: BaseEstimator) -> BaseEstimator:
+    """scikit-learn's clone, but FE models are shared and never copied."""
+    parameters = estimator.get_params(deep=False)
+    twin = type(estimator)(
+        **{name: value if is_model(value) else clone(value, safe=False) for name, value in parameters.items()}
+    )
+    for name in ("_metadata_request", "_sklearn_output_config"):
+        if hasattr(estimator, name):
+            setattr(twin, name, clone(getattr(estimator, name), safe=False))
+    return twin
+
+
+def random_state_or_none(random_state: Any) -> np.random.RandomState | None:
+    """None stays None (parts then draw from numpy's global state), else a RandomState."""
+    return None if random_state is None else check_random_state(random_state)

@@ -1,0 +1,135 @@
+"""Synthetic monitoring of the 28-bar truss."""
+
+from collections.abc import Mapping
+from numbers import Integral
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import Bunch, check_random_state
+
+from skthermo.datasets._truss import PARAMETERS, ZONES, truss_structure
+from skthermo.fem import add_noise
+
+SEASON = np.array([[15, 15], [15, 20], [17, 25]])  # mean and amplitude in C, eqs. (11)-(13)
+DAILY = np.array([20, 16, 20])
+SCATTER = np.array([3, 2, 8])
+PHASE = np.array([0, 0, np.pi / 6])
+
+
+def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
+    """Multiplier of Young's modulus at a temperature, eq. (10).
+
+    E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
+
+    Parameters
+    ----------
+    temperature : array-like
+        In degrees Celsius.
+
+    Returns
+    -------
+    ndarray
+        Dimensionless, of the same shape.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import steel_modulus
+    >>> steel_modulus([-10.0, 20.0, 40.0]).round(4)
+    array([1.1658, 1.    , 0.933 ])
+    """
+    celsius = np.asarray(temperature, dtype=float)
+    return 1 - (celsius - 20) / 200 * np.exp(-0.01 * celsius)
+
+
+def make_truss_campaign(
+    n_years: int = 1,
+    *,
+    samples_per_year: int = 365,
+    samples_per_day: int = 1,
+    noise: ArrayLike = 0.01,
+    damage: Mapping[str, float] | None = None,
+    random_state: int | np.random.RandomState | None = None,
+) -> Bunch:
+    """Temperatures and frequencies of the 28-bar truss by its thermo-mechanical law.
+
+    The ground truth of Kamali et al. (2026), Section 3: three thermocouples follow season, day
+    and chance (eqs. (11)-(13)), each sets Young's modulus (eq. (10)) of the members in its zone,
+    and an eigenvalue analysis gives the frequencies.
+
+    Parameters
+    ----------
+    n_years : int, default=1
+        Length of the campaign.
+    samples_per_year : int, default=365
+        Records in one seasonal cycle, S.
+    samples_per_day : int, default=1
+        Records in one daily cycle, n_d. Hourly data have 24, and 8760 in a year.
+    noise : float or array-like of shape (6,), default=0.01
+        Relative standard deviation of the Gaussian noise on every frequency.
+    damage : mapping of str to float, optional
+        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``.
+    random_state : int, RandomState or None, default=None
+        Seed. With the same integer, campaigns that differ in ``damage`` or ``noise`` have the
+        same temperatures.
+
+    Returns
+    -------
+    Bunch
+        temperatures : DataFrame of shape (n_records, 3)
+            ``T1``..``T3`` in degrees Celsius.
+        frequencies : DataFrame of shape (n_records, 6)
+            ``f1``..``f6`` in Hz, with noise and damage.
+        clean_frequencies : DataFrame of shape (n_records, 6)
+            Without noise.
+        theta : DataFrame of shape (n_records, 3)
+            Multipliers of Young's modulus in the three zones.
+        model : AffineModel
+            The undamaged thermo-mechanical model, whose parameters are the zones and whose
+            damage groups are those of `make_truss`.
+
+    Raises
+    ------
+    ValueError
+        If a count is not a positive integer, or damage or noise are wrong.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> campaign = make_truss_campaign(random_state=0)
+    >>> campaign.temperatures.shape, campaign.frequencies.shape
+    ((365, 3), (365, 6))
+    """
+    counts = {"n_years": n_years, "samples_per_year": samples_per_year, "samples_per_day": samples_per_day}
+    for name, count in counts.items():
+        if not isinstance(count, Integral) or count < 1:
+            raise ValueError(f"{name} is {count!r}; expected a positive integer")
+    random = check_random_state(random_state)
+    index = pd.date_range(
+        "2025-01-01", periods=n_years * samples_per_year, freq=pd.Timedelta(days=1) / samples_per_day, name="time"
+    )
+    record = np.arange(1, len(index) + 1)[:, np.newaxis]
+    temperatures = pd.DataFrame(
+        SEASON[:, 0]
+        + SEASON[:, 1] * np.sin(2 * np.pi * record / samples_per_year + PHASE)
+        + DAILY * np.sin(2 * np.pi * record / samples_per_day + PHASE)
+        + SCATTER * random.standard_normal((len(index), len(ZONES))),
+        index=index,
+        columns=ZONES,
+    )
+    model = truss_structure().assemble(ZONES, groups=PARAMETERS)
+    theta = steel_modulus(temperatures)
+    clean = model.damaged(damage or {}).frequencies(theta)
+    noisy = add_noise(clean, noise, random_state=random)
+    modes = [f"f{i + 1}" for i in range(model.n_modes)]
+    return Bunch(
+        temperatures=temperatures,
+        frequencies=pd.DataFrame(noisy, index=index, columns=modes),
+        clean_frequencies=pd.DataFrame(clean, index=index, columns=modes),
+        theta=pd.DataFrame(theta, index=index, columns=ZONES),
+        model=model,
+    )

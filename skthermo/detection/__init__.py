@@ -1,0 +1,5 @@
+"""Damage detection from frequencies."""
+
+from skthermo.detection._mahalanobis import MahalanobisDetector
+
+__all__ = ["MahalanobisDetector"]

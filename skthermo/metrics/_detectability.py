@@ -1,0 +1,115 @@
+"""How often alarms are false, how often damage is found, and how small it may be."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
+    """Share of healthy records above the threshold (PFA).
+
+    Parameters
+    ----------
+    damage_index : array-like of shape (n_samples,)
+        Damage index of records of the healthy structure that the baseline has not seen; NaN is
+        ignored. The Mahalanobis index is unsquared, and so must the threshold be.
+    threshold : float
+        Alarm above it.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; NaN if no record has an index.
+
+    Raises
+    ------
+    ValueError
+        If the index is not a vector or the threshold not finite.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import probability_of_false_alarm
+    >>> probability_of_false_alarm([1.0, 2.0, 4.0, float("nan")], threshold=3.0)
+    0.3333333333333333
+    """
+    return _share_above(damage_index, threshold)
+
+
+def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float:
+    """Share of records of the damaged structure above the threshold (POD).
+
+    Parameters
+    ----------
+    damage_index : array-like of shape (n_samples,)
+        Damage index of records of the damaged structure; NaN is ignored.
+    threshold : float
+        Alarm above it.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; NaN if no record has an index.
+
+    Raises
+    ------
+    ValueError
+        If the index is not a vector or the threshold not finite.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import probability_of_detection
+    >>> probability_of_detection([3.5, 2.0, 4.0, 5.0], threshold=3.0)
+    0.75
+    """
+    return _share_above(damage_index, threshold)
+
+
+def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: float = 0.9) -> float:
+    """Smallest tested severity from which on damage is detected reliably (MDD).
+
+    Parameters
+    ----------
+    severities : array-like of shape (n_severities,)
+        Tested severities in any order, such as 0.1, 0.2, 0.3.
+    pod : array-like of shape (n_severities,)
+        Probability of detection at each, between 0 and 1.
+    level : float, default=0.9
+        POD that counts as reliable.
+
+    Returns
+    -------
+    float
+        The smallest severity at which, and at every larger one, the POD reaches the level;
+        NaN if it does not at the largest. Nothing is interpolated between tested severities.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a severity repeats or is NaN, or a probability is not within 0 and 1.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import minimum_detectable_damage
+    >>> minimum_detectable_damage([0.1, 0.2, 0.3], [0.26, 0.95, 1.0])
+    0.2
+    """
+    s, p = np.asarray(severities, dtype=float), np.asarray(pod, dtype=float)
+    if s.ndim != 1 or s.shape != p.shape or not s.size:
+        raise ValueError(f"severities have shape {s.shape} and pod {p.shape}; expected two vectors of one length")
+    if np.isnan(s).any() or len(np.unique(s)) < len(s):
+        raise ValueError(f"severities are {s.tolist()}; expected different numbers")
+    for name, values in (("pod", p), ("level", np.asarray(level))):
+        if not ((values >= 0) & (values <= 1)).all():
+            raise ValueError(f"{name} is {values.tolist()}; expected probabilities between 0 and 1, not percent")
+    descending = np.argsort(-s)
+    reliable = np.logical_and.accumulate(p[descending] >= level)
+    return float(s[descending][reliable].min()) if reliable.any() else float("nan")
+
+
+def _share_above(damage_index: ArrayLike, threshold: float) -> float:
+    index: NDArray[np.float64] = np.asarray(damage_index, dtype=float)
+    if index.ndim != 1:
+        raise ValueError(f"damage_index has shape {index.shape}; expected a vector (n_samples,)")
+    if not np.isfinite(threshold):
+        raise ValueError(f"threshold is {threshold}; expected a finite number")
+    present = index[~np.isnan(index)]
+    return float((present > threshold).mean()) if present.size else float("nan")

@@ -1,0 +1,150 @@
+"""Errors of predicted frequencies, by mode and by scenario."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.metrics import r2_score
+
+from skthermo._validation import check_same_rows, column_names
+
+AVERAGE = "Average"
+
+
+def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
+    """Mean absolute percentage error of every mode, eq. (19).
+
+    Parameters
+    ----------
+    y_true : array-like or DataFrame of shape (n_samples, n_modes)
+        Measured frequencies in Hz.
+    y_pred : array-like or DataFrame of shape (n_samples, n_modes)
+        Predicted frequencies in Hz. Where either is NaN, the value is ignored.
+
+    Returns
+    -------
+    ndarray of shape (n_modes,)
+        In percent; NaN for a mode without any pair of values.
+
+    Raises
+    ------
+    ValueError
+        If the shapes or the indices differ.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import mape
+    >>> mape([[2.0, 4.0], [2.0, 4.0]], [[2.02, 4.0], [1.98, float("nan")]])
+    array([1., 0.])
+    """
+    measured, predicted = _paired(y_true, y_pred)
+    return 100 * pd.DataFrame(np.abs((measured - predicted) / measured)).mean().to_numpy()
+
+
+def error_table(
+    y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None
+) -> pd.DataFrame:
+    """MAPE of every scenario and mode, with averages, as in Table 2 of the paper.
+
+    Parameters
+    ----------
+    y_true : array-like or DataFrame of shape (n_samples, n_modes)
+        Measured frequencies in Hz.
+    y_pred : array-like or DataFrame of shape (n_samples, n_modes)
+        Predicted frequencies in Hz. Where either is NaN, the value is ignored.
+    scenarios : sequence of length n_samples, optional
+        Scenario of every row, such as "SH-0" or "SB-50". By default all rows are one, "all".
+
+    Returns
+    -------
+    DataFrame of shape (n_scenarios + 1, n_modes + 1)
+        In percent; the last row and the last column are averages.
+
+    Raises
+    ------
+    ValueError
+        If shapes, indices or the number of scenarios disagree.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import error_table
+    >>> error_table([[2.0], [4.0]], [[2.02], [4.12]], scenarios=["healthy", "damaged"]).round(2)
+              f1  Average
+    healthy  1.0      1.0
+    damaged  3.0      3.0
+    Average  2.0      2.0
+    """
+    measured, predicted = _paired(y_true, y_pred)
+    labels = np.full(len(measured), "all") if scenarios is None else np.asarray(scenarios)
+    if labels.shape != (len(measured),):
+        raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
+    table = pd.DataFrame(
+        {label: mape(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
+        index=column_names(y_true, "f"),
+    ).T
+    table.loc[AVERAGE] = table.mean()
+    table[AVERAGE] = table.mean(axis=1)
+    return table
+
+
+def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
+    """R2 over the rows without NaN, averaged over modes; NaN with fewer than two such rows."""
+    measured, predicted = _paired(y_true, y_pred)
+    complete = _complete(measured, predicted)
+    return float(r2_score(measured[complete], predicted[complete])) if complete.sum() > 1 else float("nan")
+
+
+def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, float]:
+    """Scores for ``cross_validate`` and ``GridSearchCV`` that ignore rows with NaN and count them.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Fitted; predicts frequencies.
+    X : array-like or DataFrame of shape (n_samples, n_sensors)
+        Temperatures in degrees Celsius.
+    y : array-like or DataFrame of shape (n_samples, n_modes)
+        Measured frequencies in Hz.
+
+    Returns
+    -------
+    dict
+        ``neg_mape`` in percent, negative so that higher is better; ``r2``; ``share_scored``, the
+        share of rows in which every mode is both measured and predicted.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.dummy import DummyRegressor
+    >>> from skthermo.metrics import frequency_scorer
+    >>> T, F = np.zeros((4, 1)), np.array([[1.0], [3.0], [2.0], [2.0]])
+    >>> frequency_scorer(DummyRegressor().fit(T, F), T, [[2.5], [2.5], [2.0], [np.nan]])
+    {'neg_mape': -13.333333333333334, 'r2': -2.0, 'share_scored': 0.75}
+    """
+    measured, predicted = _paired(y, estimator.predict(X))
+    complete = _complete(measured, predicted)
+    return {
+        "neg_mape": -float(mape(measured[complete], predicted[complete]).mean()),
+        "r2": complete_r2(measured, predicted),
+        "share_scored": float(complete.mean()),
+    }
+
+
+def _paired(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    measured, predicted = np.asarray(y_true, dtype=float), np.asarray(y_pred, dtype=float)
+    if measured.ndim != 2 or measured.shape != predicted.shape:
+        raise ValueError(
+            f"y_true has shape {measured.shape} and y_pred {predicted.shape}; expected the same (n_samples, n_modes)"
+        )
+    check_same_rows(y_true, y_pred, ("y_true", "y_pred"))
+    return measured, predicted
+
+
+def _complete(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return ~(np.isnan(measured) | np.isnan(predicted)).any(axis=1)

@@ -1,0 +1,164 @@
+"""The offset between a structure and its model."""
+
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
+
+from skthermo._validation import (
+    HasMethods,
+    StrOptions,
+    _fit_context,
+    check_array,
+    check_columns,
+    check_is_fitted,
+    clone_sharing_models,
+    is_model,
+    like,
+    validate_data,
+)
+
+
+class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
+    """Move measured frequencies so that their means are the model's frequencies, eq. (22).
+
+    Parameters
+    ----------
+    reference : array-like of shape (n_modes,), FE model or None, default=None
+        What the means become: a vector in Hz, a model's nominal frequencies, or zero (one
+        for ``method="scale"``).
+    method : {"shift", "scale"}, default="shift"
+        ``F - mean(F) + reference``, or ``F / mean(F) * reference``, which keeps relative changes.
+
+    Attributes
+    ----------
+    mean_ : ndarray of shape (n_modes,)
+        Mean of the measured frequencies in Hz, NaN left out.
+    reference_ : ndarray of shape (n_modes,)
+        What it becomes.
+    n_features_in_ : int
+        Number of modes.
+    feature_names_in_ : ndarray of str
+        Names of the modes, where `fit` saw a frame with such names.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> from skthermo.preprocessing import BiasAligner
+    >>> aligner = BiasAligner([4.0, 9.0]).fit([[3.9, 9.3], [4.3, 9.5]])
+    >>> aligner.transform([[4.1, 9.5]]).round(3)
+    array([[4. , 9.1]])
+    >>> aligner.inverse_transform([[4.0, 9.1]]).round(3)
+    array([[4.1, 9.5]])
+    """
+
+    _parameter_constraints: dict = {
+        "reference": ["array-like", HasMethods(["frequencies"]), None],
+        "method": [StrOptions({"shift", "scale"})],
+    }
+
+    def __init__(self, reference: Any = None, *, method: Literal["shift", "scale"] = "shift"):
+        self.reference = reference
+        self.method = method
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: None = None) -> "BiasAligner":
+        """Learn the means.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz; NaN is left out.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        BiasAligner
+            The fitted transformer.
+
+        Raises
+        ------
+        ValueError
+            If a mode was never measured, the reference has another number of modes, or a mean
+            to scale by is zero.
+        """
+        F = self._validated(X, reset=True)
+        check_columns(like(X, F, self.get_feature_names_out()), "frequency")
+        self.mean_ = np.nanmean(F, axis=0)
+        self.reference_ = self._read_reference(F.shape[1])
+        if self.method == "scale":
+            for what, values in (("mean", self.mean_), ("reference", self.reference_)):
+                if (values == 0).any():
+                    raise ValueError(f"the {what} of mode {np.flatnonzero(values == 0)[0]} is zero; cannot scale")
+        return self
+
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Measured frequencies to the model's domain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In Hz; NaN stays NaN.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+        """
+        check_is_fitted(self)
+        F = self._validated(X, reset=False)
+        if self.method == "scale":
+            return like(X, F / self.mean_ * self.reference_, self.get_feature_names_out())
+        return like(X, F - self.mean_ + self.reference_, self.get_feature_names_out())
+
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """The model's frequencies to the measured domain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In Hz; NaN stays NaN.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+        """
+        check_is_fitted(self)
+        F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+        if F.shape[1] != self.n_features_in_:
+            raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
+        if self.method == "scale":
+            return like(X, F / self.reference_ * self.mean_, self.get_feature_names_out())
+        return like(X, F - self.reference_ + self.mean_, self.get_feature_names_out())
+
+    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
+        return validate_data(
+            self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan"
+        )
+
+    def _read_reference(self, n_modes: int) -> NDArray[np.float64]:
+        if self.reference is None:
+            return np.full(n_modes, 1.0 if self.method == "scale" else 0.0)
+        if is_model(self.reference):
+            reference = self.reference.frequencies(np.ones((1, len(self.reference.parameter_names))))[0]
+        else:
+            reference = np.asarray(self.reference, dtype=float)
+        if reference.shape != (n_modes,) or not np.isfinite(reference).all():
+            raise ValueError(
+                f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "
+                f"{n_modes} modes of X"
+            )
+        return reference
+
+    def __sklearn_clone__(self) -> "BiasAligner":
+        return clone_sharing_models(self)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags

@@ -1,0 +1,302 @@
+"""The whole chain: temperatures and frequencies in, a thermal FE model out."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils import check_random_state
+
+from skthermo._validation import (
+    HasMethods,
+    StrOptions,
+    _fit_context,
+    check_array,
+    check_columns,
+    check_is_fitted,
+    check_same_rows,
+    clone_sharing_models,
+    column_names,
+    is_model,
+    like,
+    seed_parts,
+    validate_data,
+)
+from skthermo.fem import FEModel, add_noise
+from skthermo.fem._sampling import solve
+from skthermo.metrics._errors import complete_r2
+from skthermo.surrogate._inverse import InverseSurrogate
+from skthermo.surrogate._mapper import TemperatureMapper
+
+Table = NDArray[np.float64] | pd.DataFrame
+
+
+class DataInformedFEM(RegressorMixin, BaseEstimator):
+    """FE model whose parameters follow temperature as monitoring data say.
+
+    The method of Kamali et al. (2026), Section 2: measured frequencies become parameters
+    (M1, eq. (5)), temperatures are mapped to those parameters (M2, eq. (6)), and the FE model,
+    healthy or damaged, turns them into frequencies again (eqs. (7)-(8)).
+
+    Parameters
+    ----------
+    model : FE model
+        Its modes are the columns of the frequencies.
+    inverse : transformer, optional
+        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets
+        this one.
+    mapper : regressor, optional
+        M2. By default ``TemperatureMapper()``; with thermal inertia, for example
+        ``make_pipeline(LagFeatures(), TemperatureMapper())``.
+    aligner : transformer or "passthrough", default="passthrough"
+        Takes measured frequencies to the model's domain and back, such as ``BiasAligner(model)``.
+    imputer : transformer or "passthrough", default="passthrough"
+        Completes the frequencies from temperatures and frequencies side by side, in `fit` only.
+        Without it, rows with a missing mode do not train M2.
+    random_state : int, RandomState or None, default=None
+        Seeds every part that has no seed of its own.
+
+    Attributes
+    ----------
+    inverse_, mapper_, aligner_ : estimators
+        Fitted clones.
+    imputer_ : estimator or None
+        Fitted clone.
+    parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
+        Multipliers that M1 found in the training data, eq. (5).
+    n_features_in_ : int
+        Number of temperature columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    Notes
+    -----
+    ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T)))``
+    and nothing else: no correction is learned behind the FE model. Temperatures in a frame
+    give frames. A row that cannot be computed is NaN; none is dropped.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.metrics import mape
+    >>> from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+    >>> year = make_truss_campaign(random_state=0)
+    >>> model = make_truss()
+    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(bounds=0.2, noise=0.01), random_state=0)
+    >>> fem = fem.fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"bottom": 0.5}, random_state=1)
+    >>> damaged = fem.simulate(later.temperatures, damage={"bottom": 0.5})
+    >>> bool(mape(later.clean_frequencies, damaged).max() < 1.5)
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"])],
+        "inverse": [HasMethods(["fit", "transform"]), None],
+        "mapper": [HasMethods(["fit", "predict"]), None],
+        "aligner": [HasMethods(["fit", "transform", "inverse_transform"]), StrOptions({"passthrough"})],
+        "imputer": [HasMethods(["fit_transform"]), StrOptions({"passthrough"})],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        model: FEModel,
+        *,
+        inverse: BaseEstimator | None = None,
+        mapper: BaseEstimator | None = None,
+        aligner: BaseEstimator | str = "passthrough",
+        imputer: BaseEstimator | str = "passthrough",
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.model = model
+        self.inverse = inverse
+        self.mapper = mapper
+        self.aligner = aligner
+        self.imputer = imputer
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "DataInformedFEM":
+        """Learn how temperature moves the parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius; NaN is allowed.
+        y : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies of the healthy structure in Hz; NaN is allowed.
+
+        Returns
+        -------
+        DataInformedFEM
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If lengths or indices differ, the number of modes is not the model's, a temperature
+            is constant or missing throughout, or a mode was never measured.
+        """
+        T, F = self._read_records(X, y)
+        self._prepare_parts()
+        if self.imputer_ is not None:
+            F = self._imputed(T, F)
+        aligned = self.aligner_.fit(F).transform(F)
+        self.inverse_.fit(aligned)
+        theta = np.asarray(self.inverse_.transform(aligned))
+        self.parameters_ = like(T, theta, self.model.parameter_names)
+        self.mapper_.fit(T, self.parameters_)
+        return self
+
+    def predict_parameters(self, X: ArrayLike) -> Table:
+        """Parameters at given temperatures, eq. (7).
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters; NaN where M2 has no complete input.
+        """
+        check_is_fitted(self)
+        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
+        theta = np.asarray(self.mapper_.predict(X)).reshape(len(X), -1)
+        return like(X, theta, self.model.parameter_names)
+
+    def predict(self, X: ArrayLike) -> Table:
+        """Frequencies of the healthy structure at given temperatures.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain.
+        """
+        return self._frequencies(self.model, X)
+
+    def simulate(
+        self,
+        X: ArrayLike,
+        *,
+        damage: Mapping[str, float] | None = None,
+        noise: ArrayLike = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Table:
+        """Frequencies of the structure, healthy or damaged, as monitoring would record them, eq. (8).
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        damage : mapping of str to float, optional
+            Severity by damage group of the model: 0.5 is half the stiffness.
+        noise : float or array-like of shape (n_modes,), default=0.0
+            Relative standard deviation of Gaussian noise on the frequencies.
+        random_state : int, RandomState or None, default=None
+            Seed of the noise.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain.
+
+        Raises
+        ------
+        ValueError
+            If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
+        """
+        if damage and not hasattr(self.model, "damaged"):
+            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
+        model = self.model.damaged(damage) if damage else self.model
+        frequencies = self._frequencies(model, X)
+        noisy = add_noise(frequencies, noise, random_state=random_state)
+        return like(X, noisy, self._mode_names)
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: None = None) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over modes.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        y : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz.
+        sample_weight : None
+            Not supported; present for scikit-learn's signature.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete; `skthermo.metrics.frequency_scorer`
+            also reports the share of rows scored.
+        """
+        if sample_weight is not None:
+            raise ValueError("sample_weight is not supported; expected None")
+        check_same_rows(X, y, ("temperatures", "frequencies"))
+        return complete_r2(y, self.predict(X))
+
+    def _frequencies(self, model: FEModel, X: ArrayLike) -> Table:
+        theta = np.asarray(self.predict_parameters(X))
+        simulated = solve(model, theta, n_jobs=getattr(self.inverse_, "n_jobs", None))
+        return like(X, np.asarray(self.aligner_.inverse_transform(simulated)), self._mode_names)
+
+    def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
+        """Temperatures and frequencies, checked; frames stay frames."""
+        if not is_model(self.model):
+            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
+        if y is None:
+            raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
+        T = like(X, values, getattr(X, "columns", ()))
+        F = like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
+        check_same_rows(X, y, ("temperatures", "frequencies"))
+        if F.shape[1] != self.model.n_modes:
+            raise ValueError(f"frequencies have {F.shape[1]} columns; expected the modes of {self.model!r}")
+        check_columns(T, "temperature", varying=True)
+        check_columns(F, "frequency")
+        self._mode_names = column_names(F, "f")
+        return T, F
+
+    def _prepare_parts(self) -> None:
+        inverse = InverseSurrogate() if self.inverse is None else self.inverse
+        mapper = TemperatureMapper() if self.mapper is None else self.mapper
+        self.inverse_, self.mapper_ = clone(inverse), clone(mapper)
+        self.aligner_ = FunctionTransformer() if self.aligner == "passthrough" else clone(self.aligner)
+        self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
+        if isinstance(self.inverse_, InverseSurrogate) and self.inverse_.model is None:
+            self.inverse_.set_params(model=self.model)
+        if self.random_state is not None:
+            random = check_random_state(self.random_state)
+            for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
+                if part is not None:
+                    seed_parts(part, random)
+
+    def _imputed(self, T: Any, F: Any) -> Any:
+        side_by_side = np.hstack([np.asarray(T), np.asarray(F)])
+        completed = np.asarray(self.imputer_.fit_transform(side_by_side))
+        return like(F, completed[:, -F.shape[1] :], self._mode_names)
+
+    def __sklearn_clone__(self) -> "DataInformedFEM":
+        return clone_sharing_models(self)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        tags.target_tags.multi_output = True
+        tags.target_tags.single_output = False
+        return tags

@@ -1,0 +1,257 @@
+"""The inverse surrogate M1: frequencies to parameters."""
+
+import warnings
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from joblib import Memory
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.utils import Bunch, check_random_state
+from sklearn.utils.validation import check_memory
+
+from skthermo._validation import (
+    HasMethods,
+    Interval,
+    _fit_context,
+    check_is_fitted,
+    is_model,
+    like,
+    validate_data,
+)
+from skthermo.fem import FEModel, add_noise, sample
+from skthermo.fem._sampling import solve
+from skthermo.fem._tracking import share_reordered
+from skthermo.surrogate._regression import MultiplierRegressor
+
+ORDER_CHECKS = 100
+
+
+class InverseSurrogate(TransformerMixin, MultiplierRegressor):
+    """Parameters of an FE model from frequencies, learned from simulations; eqs. (3)-(4).
+
+    Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
+
+    Parameters
+    ----------
+    model : FE model, optional
+        Needed unless `fit` gets frequencies and parameters.
+    regressor : regressor, optional
+        Any multi-output regressor; inputs are standardised and the logarithms of the
+        parameters learned, standardised too. By default a small ``MLPRegressor``; see
+        `paper_network` for the paper's.
+    bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        Box of multipliers: a half-width, or lowest and highest of each parameter.
+    n_samples : int, default=1000
+        Number of simulations.
+    noise : float or array-like of shape (n_modes,), default=0.0
+        Relative standard deviation of Gaussian noise added to the simulated frequencies. With
+        the measurement's noise, M1 learns the posterior mean of the parameters and does not
+        amplify that noise, at the price of estimates drawn towards the middle of the box.
+    memory : str or joblib.Memory, optional
+        Where simulations are kept, so that a search over other settings does not repeat them.
+    n_jobs : int, optional
+        Jobs over which simulations are spread.
+    random_state : int, RandomState or None, default=None
+        Seeds the drawing, the noise, and the regressor unless that has its own seed.
+
+    Attributes
+    ----------
+    regressor_ : regressor
+        Fitted; between standardised frequencies and standardised log parameters.
+    samples_ : Bunch
+        ``theta`` and noise-free ``frequencies`` learned from, where they were simulated.
+    n_features_in_ : int
+        Number of modes.
+    feature_names_in_ : ndarray of str
+        Names of the modes, where `fit` saw a frame with such names.
+
+    Notes
+    -----
+    Frequencies cannot tell apart more parameters than there are modes, and an estimate is
+    an effective stiffness rather than a material's.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.surrogate import InverseSurrogate
+    >>> model = make_truss()
+    >>> inverse = InverseSurrogate(model, bounds=0.2, random_state=0).fit()
+    >>> theta = np.array([[0.95, 1.05, 0.9, 1.0]])
+    >>> bool(np.abs(inverse.transform(model.frequencies(theta)) / theta - 1).max() < 0.05)
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"]), None],
+        "regressor": [HasMethods(["fit", "predict"]), None],
+        "bounds": [Real, "array-like"],
+        "n_samples": [Interval(Integral, 2, None, closed="left")],
+        "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "memory": [str, HasMethods(["cache"]), None],
+        "n_jobs": [Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        model: FEModel | None = None,
+        regressor: BaseEstimator | None = None,
+        *,
+        bounds: ArrayLike = 0.3,
+        n_samples: int = 1000,
+        noise: ArrayLike = 0.0,
+        memory: str | Memory | None = None,
+        n_jobs: int | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.model = model
+        self.regressor = regressor
+        self.bounds = bounds
+        self.n_samples = n_samples
+        self.noise = noise
+        self.memory = memory
+        self.n_jobs = n_jobs
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike | None = None, y: ArrayLike | None = None) -> "InverseSurrogate":
+        """Learn the inverse.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes), optional
+            Frequencies in Hz. Without y only their number and names count.
+        y : array-like or DataFrame of shape (n_samples, n_parameters), optional
+            Multipliers that belong to X. Without them both are simulated.
+
+        Returns
+        -------
+        InverseSurrogate
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If there is neither y nor a model, X has another number of modes than the model, the
+            bounds are infeasible, or multipliers are not positive.
+
+        Warns
+        -----
+        UserWarning
+            If there are more parameters than modes, or modes change their order within the box
+            and the model does not track them.
+        """
+        random = check_random_state(self.random_state)
+        if y is not None or self.model is None:
+            frequencies, theta = self._read_xy(X, y, ("frequencies", "theta, or an FE model to draw it from"))
+        else:
+            frequencies, theta = self._simulate(X, random)
+        self._n_parameters = theta.shape[1]
+        self._learn(frequencies, theta, None if self.random_state is None else random)
+        return self
+
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Multipliers of the nominal parameters, as `predict` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            NaN in rows where a mode is missing. A frame gives a frame on its own index.
+        """
+        return like(X, self._predict_array(X), self.get_feature_names_out())
+
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Frequencies of parameters, by the FE model.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            In Hz; NaN in rows with NaN.
+
+        Raises
+        ------
+        ValueError
+            If the estimator has no model.
+        """
+        check_is_fitted(self)
+        if self.model is None:
+            raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
+        return solve(self.model, np.asarray(X, dtype=float), n_jobs=self.n_jobs)
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the parameters.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Ignored.
+
+        Returns
+        -------
+        ndarray of str
+            The model's parameter names, else y's columns, else theta1, theta2, ...
+        """
+        check_is_fitted(self)
+        numbered = [f"theta{i + 1}" for i in range(self._n_parameters)]
+        return np.array(self._parameter_names or numbered, dtype=object)
+
+    def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
+        if not is_model(self.model):
+            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
+        model = self.model
+        if X is None:
+            self.n_features_in_ = model.n_modes
+        else:
+            n_modes = validate_data(self, X, ensure_all_finite="allow-nan").shape[1]
+            if n_modes != model.n_modes:
+                raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
+        n_parameters = len(model.parameter_names)
+        if n_parameters > model.n_modes:
+            warnings.warn(
+                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart",
+                UserWarning,
+                stacklevel=4,
+            )
+        drawn = check_memory(self.memory).cache(sample, ignore=["n_jobs"])(
+            model,
+            self.bounds,
+            self.n_samples,
+            n_jobs=self.n_jobs,
+            random_state=random.randint(np.iinfo(np.int32).max),
+        )
+        self._warn_of_swaps(drawn.theta)
+        self.samples_ = Bunch(theta=drawn.theta, frequencies=drawn.frequencies)
+        self._parameter_names = list(model.parameter_names)
+        self._y_is_vector = False
+        return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
+
+    def _warn_of_swaps(self, theta: NDArray[np.float64]) -> None:
+        if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):
+            return
+        checked = theta[:ORDER_CHECKS]
+        share = share_reordered(self.model, checked)
+        if share:
+            warnings.warn(
+                f"modes change their order in {share:.0%} of {len(checked)} samples of the box, and the model sorts "
+                "them: expected narrower bounds, or a model with track=True",
+                UserWarning,
+                stacklevel=5,
+            )

@@ -1,0 +1,93 @@
+"""The temperature mapper M2: temperatures to parameters."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator
+from sklearn.utils import check_random_state
+
+from skthermo._validation import HasMethods, _fit_context, check_columns, like
+from skthermo.surrogate._regression import MultiplierRegressor
+
+
+class TemperatureMapper(MultiplierRegressor):
+    """Parameters of an FE model from temperatures, eq. (6).
+
+    Parameters
+    ----------
+    regressor : regressor, optional
+        Any multi-output regressor; temperatures are standardised and the logarithms of the
+        parameters learned, standardised too, so that predictions are positive. By default a
+        small ``MLPRegressor``; see `paper_network` for the paper's.
+    random_state : int, RandomState or None, default=None
+        Seeds the regressor unless that has its own seed.
+
+    Attributes
+    ----------
+    regressor_ : regressor
+        Fitted; between standardised temperatures and standardised log parameters.
+    n_features_in_ : int
+        Number of temperature columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    Notes
+    -----
+    Rows with a missing temperature or parameter are left out in `fit`, and only there.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.surrogate import TemperatureMapper
+    >>> T = np.linspace(-10, 40, 50)[:, np.newaxis]
+    >>> theta = np.exp(-0.004 * T)
+    >>> mapper = TemperatureMapper(random_state=0).fit(T, theta)
+    >>> bool(np.abs(mapper.predict([[20.0]]) - np.exp(-0.08)).max() < 0.01)
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "regressor": [HasMethods(["fit", "predict"]), None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        regressor: BaseEstimator | None = None,
+        *,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.regressor = regressor
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "TemperatureMapper":
+        """Learn the mapping from complete rows.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius, lagged or not.
+        y : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        TemperatureMapper
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If lengths or indices differ, a temperature is constant or missing throughout, fewer
+            than two rows are complete, or multipliers are not positive.
+        """
+        T, theta = self._read_xy(X, y, ("temperatures", "theta"))
+        check_columns(like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
+        self._n_parameters = theta.shape[1]
+        random_state = None if self.random_state is None else check_random_state(self.random_state)
+        self._learn(T, theta, random_state)
+        return self

@@ -1,0 +1,143 @@
+"""What both surrogates share: a regression between standardised inputs and log multipliers."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
+from sklearn.utils import check_random_state
+
+from skthermo._threads import single_blas_thread
+from skthermo._validation import (
+    check_array,
+    check_is_fitted,
+    check_same_rows,
+    clone_sharing_models,
+    column_names,
+    like,
+    seed_parts,
+    validate_data,
+)
+from skthermo.metrics._errors import complete_r2
+from skthermo.surrogate._networks import default_network
+
+
+class MultiplierRegressor(RegressorMixin, BaseEstimator):
+    """Base of regressors onto multipliers: complete rows in, NaN where an input is missing.
+
+    A subclass stores ``regressor`` and ``random_state`` and calls `_learn`.
+    """
+
+    def predict(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Multipliers of the nominal parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Inputs; NaN is allowed.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Positive; NaN in rows where an input is missing. A frame on X's index where X and
+            the multipliers learned from were frames.
+        """
+        theta = self._predict_array(X)
+        if self._y_is_vector:
+            return theta[:, 0]
+        return theta if self._parameter_names is None else like(X, theta, self._parameter_names)
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: None = None) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Inputs.
+        y : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+        sample_weight : None
+            Not supported; present for scikit-learn's signature.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete.
+        """
+        if sample_weight is not None:
+            raise ValueError("sample_weight is not supported; expected None")
+        return complete_r2(_as_columns(y), _as_columns(self.predict(X)))
+
+    def _learn(self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None) -> None:
+        """Fit on the complete rows of X and y (n_samples, n_parameters)."""
+        complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
+        if complete.sum() < 2:
+            raise ValueError(
+                f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
+            )
+        regression = log_regression(default_network() if self.regressor is None else clone(self.regressor))
+        if random_state is not None:
+            seed_parts(regression, random_state)
+        target = y[complete]
+        with single_blas_thread():
+            self._regression = regression.fit(X[complete], target[:, 0] if target.shape[1] == 1 else target)
+        self.regressor_ = self._regression.regressor_[-1]
+
+    def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[NDArray, NDArray]:
+        """X and positive y, (n_samples, n_parameters), with NaN where something is missing."""
+        if y is None:
+            raise ValueError(
+                f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
+                f"expected {names[1]}"
+            )
+        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
+        targets = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
+        check_same_rows(X, y, names)
+        self._y_is_vector = targets.ndim == 1
+        self._parameter_names = column_names(y, "") if isinstance(y, pd.DataFrame) else None
+        targets = _as_columns(targets)
+        if (targets <= 0).any():
+            row, column = np.argwhere(targets <= 0)[0]
+            name = column if self._parameter_names is None else repr(self._parameter_names[column])
+            raise ValueError(
+                f"{names[1]} must be positive, since its logarithm is learned; row {row}, column {name} is "
+                f"{targets[row, column]}"
+            )
+        return inputs, targets
+
+    def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
+        check_is_fitted(self)
+        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        complete = ~np.isnan(inputs).any(axis=1)
+        theta = np.full((len(inputs), self._n_parameters), np.nan)
+        if complete.any():
+            theta[complete] = _as_columns(self._regression.predict(inputs[complete]))
+        return theta
+
+    def __sklearn_clone__(self) -> "MultiplierRegressor":
+        return clone_sharing_models(self)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        tags.target_tags.positive_only = True
+        tags.target_tags.multi_output = True
+        return tags
+
+
+def log_regression(regressor: BaseEstimator) -> TransformedTargetRegressor:
+    """Standardised inputs to standardised logarithms of positive targets."""
+    return TransformedTargetRegressor(
+        make_pipeline(StandardScaler(), regressor),
+        transformer=make_pipeline(FunctionTransformer(np.log, np.exp, check_inverse=False), StandardScaler()),
+        check_inverse=False,
+    )
+
+
+def _as_columns(values: Any) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=float)
+    return array.reshape(len(array), -1)
