@@ -23,6 +23,7 @@ from skthermo._validation import (
 )
 from skthermo.fem import FEModel, add_noise, sample
 from skthermo.fem._sampling import solve
+from skthermo.fem._theta import check_theta
 from skthermo.fem._tracking import share_reordered
 from skthermo.surrogate._regression import MultiplierRegressor
 
@@ -140,8 +141,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Raises
         ------
         ValueError
-            If there is neither y nor a model, X has another number of modes than the model, the
-            bounds are infeasible, or multipliers are not positive.
+            If there is neither y nor a model, the numbers of modes or parameters are not the
+            model's, the bounds are infeasible, or multipliers of a model are not positive.
 
         Warns
         -----
@@ -150,10 +151,13 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             and the model does not track them.
         """
         random = check_random_state(self.random_state)
-        if y is not None or self.model is None:
-            frequencies, theta = self._read_xy(X, y, ("frequencies", "theta, or an FE model to draw it from"))
-        else:
+        if self.model is not None and y is None:
             frequencies, theta = self._simulate(X, random)
+        else:
+            frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
+            if self.model is not None:
+                check_theta(theta[~np.isnan(theta).any(axis=1)], self.model.parameter_names)
+                self._parameter_names = list(self.model.parameter_names)
         self._n_parameters = theta.shape[1]
         self._learn(frequencies, theta, None if self.random_state is None else random)
         return self

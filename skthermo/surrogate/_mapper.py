@@ -16,7 +16,8 @@ class TemperatureMapper(MultiplierRegressor):
     ----------
     regressor : regressor, optional
         Any multi-output regressor; temperatures are standardised and the logarithms of the
-        parameters learned, standardised too, so that predictions are positive. By default a
+        parameters learned, standardised too, so that predictions are positive (parameters
+        that are not all positive, and so no multipliers, are learned as they are). By default a
         small ``MLPRegressor``; see `paper_network` for the paper's.
     random_state : int, RandomState or None, default=None
         Seeds the regressor unless that has its own seed.
@@ -82,8 +83,8 @@ class TemperatureMapper(MultiplierRegressor):
         Raises
         ------
         ValueError
-            If lengths or indices differ, a temperature is constant or missing throughout, fewer
-            than two rows are complete, or multipliers are not positive.
+            If lengths or indices differ, a temperature is constant or missing throughout, or fewer
+            than two rows are complete.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         check_columns(like(X, T, getattr(X, "columns", ())), "temperature", varying=True)

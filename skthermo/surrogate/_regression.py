@@ -1,4 +1,4 @@
-"""What both surrogates share: a regression between standardised inputs and log multipliers."""
+"""What both surrogates share: a regression from standardised inputs to log multipliers."""
 
 from typing import Any
 
@@ -9,7 +9,6 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
-from sklearn.utils import check_random_state
 
 from skthermo._threads import single_blas_thread
 from skthermo._validation import (
@@ -43,7 +42,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Positive; NaN in rows where an input is missing. A frame on X's index where X and
+            Positive if those learned from were; NaN in rows where an input is missing. A frame on X's index where X and
             the multipliers learned from were frames.
         """
         theta = self._predict_array(X)
@@ -79,16 +78,17 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             raise ValueError(
                 f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
             )
-        regression = log_regression(default_network() if self.regressor is None else clone(self.regressor))
+        target = y[complete]
+        regressor = default_network() if self.regressor is None else clone(self.regressor)
+        regression = standardised_regression(regressor, log=bool((target > 0).all()))
         if random_state is not None:
             seed_parts(regression, random_state)
-        target = y[complete]
         with single_blas_thread():
             self._regression = regression.fit(X[complete], target[:, 0] if target.shape[1] == 1 else target)
         self.regressor_ = self._regression.regressor_[-1]
 
     def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[NDArray, NDArray]:
-        """X and positive y, (n_samples, n_parameters), with NaN where something is missing."""
+        """X and y, (n_samples, n_parameters), with NaN where something is missing."""
         if y is None:
             raise ValueError(
                 f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
@@ -99,15 +99,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         check_same_rows(X, y, names)
         self._y_is_vector = targets.ndim == 1
         self._parameter_names = column_names(y, "") if isinstance(y, pd.DataFrame) else None
-        targets = _as_columns(targets)
-        if (targets <= 0).any():
-            row, column = np.argwhere(targets <= 0)[0]
-            name = column if self._parameter_names is None else repr(self._parameter_names[column])
-            raise ValueError(
-                f"{names[1]} must be positive, since its logarithm is learned; row {row}, column {name} is "
-                f"{targets[row, column]}"
-            )
-        return inputs, targets
+        return inputs, _as_columns(targets)
 
     def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
@@ -124,16 +116,16 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
-        tags.target_tags.positive_only = True
         tags.target_tags.multi_output = True
         return tags
 
 
-def log_regression(regressor: BaseEstimator) -> TransformedTargetRegressor:
-    """Standardised inputs to standardised logarithms of positive targets."""
+def standardised_regression(regressor: BaseEstimator, *, log: bool) -> TransformedTargetRegressor:
+    """Standardised inputs to standardised targets, or their logarithms, which keeps them positive."""
+    logarithm = FunctionTransformer(np.log, np.exp, check_inverse=False) if log else FunctionTransformer()
     return TransformedTargetRegressor(
         make_pipeline(StandardScaler(), regressor),
-        transformer=make_pipeline(FunctionTransformer(np.log, np.exp, check_inverse=False), StandardScaler()),
+        transformer=make_pipeline(logarithm, StandardScaler()),
         check_inverse=False,
     )
 

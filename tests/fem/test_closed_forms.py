@@ -1,0 +1,126 @@
+"""Frequencies of structures that have closed forms."""
+
+import numpy as np
+import pytest
+
+from skthermo.datasets import make_truss
+from skthermo.fem import Bar, PointMass, Spring, Structure
+
+E, A, DENSITY = 210e9, 0.01, 7850.0
+NOMINAL = np.ones((1, 1))
+
+
+def rod(n_elements, length=3.0, *, lumped=False):
+    """A clamped-free rod as a chain of bars along x."""
+    nodes = {i: (length * i / n_elements, 0.0) for i in range(n_elements + 1)}
+    bars = {f"bar {i}": Bar(i, i + 1, E, A, DENSITY, lumped) for i in range(n_elements)}
+    supports = {i: "xy" if i == 0 else "y" for i in nodes}
+    return Structure(nodes, bars, supports, {"rod": list(bars)})
+
+
+def test_one_bar_with_a_heavy_mass():
+    structure = Structure(
+        {"wall": (0, 0), "tip": (2, 0)},
+        {"bar": Bar("wall", "tip", E, A), "mass": PointMass("tip", 500.0)},
+        {"wall": "xy", "tip": "y"},
+        {"bar": ["bar"]},
+    )
+    frequency = structure.assemble(["bar"], n_modes=1).frequencies(NOMINAL)
+    np.testing.assert_allclose(frequency, [[np.sqrt(E * A / 2 / 500) / (2 * np.pi)]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("lumped", "factor"), [(False, 3.0), (True, 2.0)])
+def test_one_bar_with_its_own_mass(lumped, factor):
+    frequency = rod(1, length=2.0, lumped=lumped).assemble(["rod"], n_modes=1).frequencies(NOMINAL)
+    np.testing.assert_allclose(frequency, [[np.sqrt(factor * E / DENSITY) / 2 / (2 * np.pi)]], rtol=1e-12)
+
+
+def test_two_bar_truss():
+    half_span, height, mass = 1.5, 2.0, 800.0
+    length = np.hypot(half_span, height)
+    structure = Structure(
+        {"left": (-half_span, 0), "right": (half_span, 0), "apex": (0, height)},
+        {"l": Bar("left", "apex", E, A), "r": Bar("right", "apex", E, A), "m": PointMass("apex", mass)},
+        {"left": "xy", "right": "xy"},
+        {"bars": ["l", "r"]},
+    )
+    stiffness = 2 * E * A / length**3 * np.array([half_span**2, height**2])
+    frequencies = structure.assemble(["bars"], n_modes=2).frequencies(NOMINAL)
+    np.testing.assert_allclose(frequencies[0], np.sqrt(stiffness / mass) / (2 * np.pi), rtol=1e-12)
+
+
+def test_king_post_truss_moves_up_and_down_on_its_rafters_and_post():
+    """A mass at the tie's middle, hung from the apex by the post: springs in series."""
+    half_span, height, mass = 3.0, 2.0, 400.0
+    structure = Structure(
+        {"left": (-half_span, 0), "foot": (0, 0), "right": (half_span, 0), "apex": (0, height)},
+        {
+            "tie 1": Bar("left", "foot", E, A),
+            "tie 2": Bar("foot", "right", E, A),
+            "rafter 1": Bar("left", "apex", E, A),
+            "rafter 2": Bar("apex", "right", E, A),
+            "post": Bar("foot", "apex", E, A),
+            "mass": PointMass("foot", mass),
+        },
+        {"left": "xy", "right": "xy"},
+        {"all": ["tie 1", "tie 2", "rafter 1", "rafter 2", "post"]},
+    )
+    rafters = 2 * E * A * height**2 / np.hypot(half_span, height) ** 3
+    post = E * A / height
+    ties = 2 * E * A / half_span
+    expected = np.sqrt(np.sort([1 / (1 / rafters + 1 / post), ties]) / mass) / (2 * np.pi)
+    np.testing.assert_allclose(
+        structure.assemble(["all"], n_modes=2).frequencies(NOMINAL)[0], expected, rtol=1e-12
+    )
+
+
+def test_spring_in_three_dimensions():
+    springs = {d: Spring("node", d, k) for d, k in (("x", 1e6), ("y", 4e6), ("z", 9e6))}
+    structure = Structure({"node": (0, 0, 0)}, springs | {"m": PointMass("node", 100.0)}, {}, {"soil": ["x", "y", "z"]})
+    frequencies = structure.assemble(["soil"], n_modes=3).frequencies(NOMINAL)[0]
+    np.testing.assert_allclose(frequencies, np.array([100, 200, 300]) / (2 * np.pi), rtol=1e-12)
+
+
+def test_tripod_in_three_dimensions():
+    """Three bars at 120 degrees: equal stiffness in both horizontal directions."""
+    angles = 2 * np.pi * np.arange(3) / 3
+    feet = {f"foot {i}": (np.cos(a), np.sin(a), 0.0) for i, a in enumerate(angles)}
+    bars = {f"leg {i}": Bar(foot, "top", E, A) for i, foot in enumerate(feet)}
+    structure = Structure(
+        feet | {"top": (0.0, 0.0, 2.0)},
+        bars | {"m": PointMass("top", 100.0)},
+        {foot: "xyz" for foot in feet},
+        {"legs": list(bars)},
+    )
+    unit = E * A / np.sqrt(5) ** 3
+    expected = np.sqrt(unit * np.array([1.5, 1.5, 12.0]) / 100) / (2 * np.pi)
+    np.testing.assert_allclose(structure.assemble(["legs"], n_modes=3).frequencies(NOMINAL)[0], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_chain_of_bars_converges_to_the_rod_at_second_order(lumped):
+    length, modes = 3.0, np.arange(1, 4)
+    exact = (2 * modes - 1) / 4 * np.sqrt(E / DENSITY) / length
+    sizes = np.array([8, 16, 32, 64])
+    errors = [
+        np.abs(rod(n, length, lumped=lumped).assemble(["rod"], n_modes=3).frequencies(NOMINAL)[0] / exact - 1)
+        for n in sizes
+    ]
+    orders = np.diff(np.log(errors), axis=0) / np.diff(np.log(1 / sizes))[:, np.newaxis]
+    np.testing.assert_allclose(orders[-1], 2.0, atol=0.02)
+
+
+def test_consistent_mass_bounds_the_rod_from_above_and_lumped_from_below():
+    exact = np.sqrt(E / DENSITY) / 3.0 / 4
+    assert rod(10, lumped=True).assemble(["rod"], n_modes=1).frequencies(NOMINAL)[0, 0] < exact
+    assert rod(10).assemble(["rod"], n_modes=1).frequencies(NOMINAL)[0, 0] > exact
+
+
+def test_truss_has_the_published_frequencies():
+    truss = make_truss()
+    healthy = [7.48477, 27.500374, 37.842078, 62.614472, 67.170412, 95.411833]
+    halved = [6.359491, 23.468491, 34.325975, 59.338728, 66.10077, 92.816677]
+    nominal = np.ones((1, 4))
+    np.testing.assert_allclose(truss.frequencies(nominal)[0], healthy, rtol=1e-6)
+    np.testing.assert_allclose(truss.damaged({"bottom": 0.5}).frequencies(nominal)[0], halved, rtol=1e-6)
+    assert truss.parameter_names == ("bottom", "top", "diagonal", "vertical")

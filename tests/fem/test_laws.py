@@ -1,0 +1,165 @@
+"""Laws that every structure obeys."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, Bar, PointMass, Spring, Structure
+
+TRUSS = make_truss()
+THETAS = st.lists(st.floats(0.3, 3.0), min_size=4, max_size=4).map(lambda row: np.array([row]))
+FEW = settings(max_examples=25, deadline=None)
+
+
+def square(rotation=np.eye(2), shift=(0.0, 0.0), order=(0, 1, 2, 3)):
+    """A braced square, pinned at two corners, with its nodes listed in any order."""
+    corners = np.array([[0, 0], [4, 0], [4, 3], [0, 3.0]]) @ np.asarray(rotation).T + shift
+    steel = {"E": 70e9, "A": 2e-3, "density": 2700.0}
+    ends = [(0, 2), (1, 2), (2, 3), (3, 0), (1, 3)]
+    return Structure(
+        {i: corners[i] for i in order},
+        {j: Bar(a, b, **steel) for j, (a, b) in enumerate(ends)},
+        {0: "xy", 1: "xy"},
+        {"frame": [1, 2, 3], "braces": [0, 4]},
+    ).assemble(["frame", "braces"], n_modes=4)
+
+
+@FEW
+@given(THETAS, st.floats(0.1, 10.0))
+def test_frequencies_grow_with_the_square_root_of_stiffness(theta, factor):
+    zones = {g: g for g in TRUSS.parameter_names}
+    stiffness, mass = TRUSS.matrices(theta)
+    scaled = AffineModel({(): stiffness[0] * 0, ("all",): stiffness[0]}, mass[0])
+    np.testing.assert_allclose(
+        scaled.frequencies([[factor]]), np.sqrt(factor) * TRUSS.frequencies(theta), rtol=1e-10
+    )
+    assert set(zones) == set(TRUSS.groups)
+
+
+@FEW
+@given(THETAS)
+def test_batched_analysis_agrees_with_the_generalised_solver(theta):
+    stiffness, mass = TRUSS.matrices(theta)
+    expected = np.sqrt(scipy.linalg.eigh(stiffness[0], mass[0], eigvals_only=True)[:6]) / (2 * np.pi)
+    np.testing.assert_allclose(TRUSS.frequencies(theta)[0], expected, rtol=1e-10)
+
+
+@FEW
+@given(THETAS)
+def test_shapes_have_unit_modal_mass_and_solve_the_eigenproblem(theta):
+    frequencies, shapes = TRUSS.modes(theta)
+    stiffness, mass = TRUSS.matrices(theta)
+    phi, eigenvalues = shapes[0], (2 * np.pi * frequencies[0]) ** 2
+    np.testing.assert_allclose(phi.T @ mass[0] @ phi, np.eye(6), atol=1e-10)
+    np.testing.assert_allclose(phi.T @ stiffness[0] @ phi, np.diag(eigenvalues), atol=1e-8 * eigenvalues[-1])
+
+
+@FEW
+@given(st.permutations(range(4)))
+def test_frequencies_do_not_depend_on_the_order_of_nodes(order):
+    theta = [[0.9, 1.2]]
+    np.testing.assert_allclose(square(order=order).frequencies(theta), square().frequencies(theta), rtol=1e-10)
+
+
+@FEW
+@given(st.floats(-np.pi, np.pi), st.floats(-100, 100), st.floats(-100, 100))
+def test_frequencies_do_not_depend_on_the_frame_of_reference(angle, x, y):
+    rotation = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    theta = [[0.9, 1.2]]
+    np.testing.assert_allclose(square(rotation, (x, y)).frequencies(theta), square().frequencies(theta), rtol=1e-9)
+
+
+def product_model(**options):
+    """Stiffness E * A, mass A: every kind of term."""
+    steel = {"E": 70e9, "A": 2e-3, "density": 2700.0}
+    return Structure(
+        {0: (0, 0), 1: (4, 0), 2: (4, 3), 3: (0, 3)},
+        {j: Bar(a, b, **steel) for j, (a, b) in enumerate([(0, 2), (1, 2), (2, 3), (3, 0), (1, 3)])}
+        | {"tank": PointMass(2, 50.0), "soil": Spring(1, "x", 3e7)},
+        {0: "xy", 1: "y"},
+        {"frame": [1, 2, 3], "braces": [0, 4], "tank": ["tank"], "soil": ["soil"]},
+    ).assemble(
+        {
+            "E": ("E", "frame"),
+            "A": ("A", "frame"),
+            "braces": "braces",
+            "tank": ("m", "tank"),
+            "soil": ("k", "soil"),
+        },
+        n_modes=4,
+        **options,
+    )
+
+
+@pytest.mark.parametrize("model", [TRUSS, product_model(), product_model(track=True)], ids=repr)
+def test_jacobian_equals_central_differences(model):
+    n = len(model.parameter_names)
+    theta = np.random.default_rng(0).uniform(0.8, 1.2, (5, n))
+    step = 1e-5
+    differences = np.stack(
+        [
+            (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit)) / (2 * step)
+            for unit in np.eye(n)
+        ],
+        axis=2,
+    )
+    scale = model.frequencies(theta)[:, :, np.newaxis]
+    np.testing.assert_allclose(model.jacobian(theta) / scale, differences / scale, atol=1e-6)
+
+
+def test_sensitivities_to_stiffness_sum_to_one_half():
+    """f is homogeneous of degree 1/2 in stiffness (Euler's theorem)."""
+    structure = square()
+    theta = np.random.default_rng(1).uniform(0.5, 1.5, (4, 2))
+    total = (structure.jacobian(theta) * theta[:, np.newaxis]).sum(axis=2) / structure.frequencies(theta)
+    np.testing.assert_allclose(total, 0.5, rtol=1e-9)
+
+
+def test_damage_multiplies_stiffness_and_leaves_mass():
+    damaged = TRUSS.damaged({"bottom": 0.3, "top": -0.15})
+    theta = np.array([[0.9, 1.1, 1.0, 1.2]])
+    np.testing.assert_allclose(
+        damaged.frequencies(theta), TRUSS.frequencies(theta * [0.7, 1.15, 1, 1]), rtol=1e-12
+    )
+    np.testing.assert_array_equal(damaged.matrices(theta)[1], TRUSS.matrices(theta)[1])
+    assert damaged.groups == TRUSS.groups
+
+
+def test_damage_accumulates_and_zero_damage_changes_nothing():
+    theta = np.ones((1, 4))
+    twice = TRUSS.damaged({"top": 0.5}).damaged({"top": 0.5})
+    np.testing.assert_allclose(twice.frequencies(theta), TRUSS.damaged({"top": 0.75}).frequencies(theta), rtol=1e-12)
+    np.testing.assert_array_equal(TRUSS.damaged({}).frequencies(theta), TRUSS.frequencies(theta))
+
+
+def test_damage_of_the_product_model_scales_the_groups_stiffness_only():
+    model = product_model()
+    theta = np.array([[1.1, 0.9, 1.0, 1.2, 0.8]])
+    weaker = model.damaged({"frame": 0.25})
+    np.testing.assert_allclose(
+        weaker.frequencies(theta), model.frequencies(theta * [0.75, 1, 1, 1, 1]), rtol=1e-12
+    )
+    assert "tank" not in model.groups
+
+
+def test_massless_degrees_of_freedom_follow_statically():
+    """A massless node between two springs: springs in series."""
+    k1, k2, m = 3e5, 6e5, 10.0
+    model = AffineModel(
+        {("k",): np.array([[k1 + k2, -k2], [-k2, k2]])}, np.diag([0.0, m]), n_modes=1, track=True
+    )
+    expected = np.sqrt(1 / (1 / k1 + 1 / k2) / m) / (2 * np.pi)
+    np.testing.assert_allclose(model.frequencies([[1.0], [4.0]])[:, 0], [expected, 2 * expected], rtol=1e-12)
+
+
+def test_wide_spectra_keep_the_lowest_modes_digits():
+    """A soft mode beside springs ten orders stiffer."""
+    model = AffineModel(
+        {("k",): np.diag([1.0, 0, 0]), (): np.array([[1e10, -1e10, 0], [-1e10, 2e10, -1e10], [0, -1e10, 1e10 + 1]])},
+        np.eye(3),
+        n_modes=1,
+    )
+    np.testing.assert_allclose(model.frequencies([[1.0]]), np.sqrt(2 / 3) / (2 * np.pi), rtol=1e-6)

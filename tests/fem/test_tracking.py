@@ -1,0 +1,91 @@
+"""Modes that cross, and the criterion that tells them apart."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.fem import AffineModel, mac
+from skthermo.fem._tracking import pair_modes, share_reordered
+
+
+def crossing(**options):
+    """Three masses on springs of their own: mode j has frequency j times the root of its parameter."""
+    keys = ("a", "b", "c", "d")
+    terms = {(key,): np.diag(np.eye(4)[j] * (2 * np.pi * (j + 1)) ** 2) for j, key in enumerate(keys)}
+    return AffineModel(terms, np.eye(4), n_modes=3, **options)
+
+
+def test_sorted_columns_are_ranks_and_tracked_columns_are_modes():
+    theta = [[9.0, 1.0, 1.0, 1.0], [1.0, 16.0, 1.0, 0.01]]
+    np.testing.assert_allclose(crossing().frequencies(theta), [[2, 3, 3], [0.4, 1, 3]], atol=1e-12)
+    np.testing.assert_allclose(crossing(track=True).frequencies(theta), [[3, 2, 3], [1, 8, 3]], atol=1e-12)
+
+
+def test_an_intruder_does_not_push_out_a_tracked_mode():
+    """The fourth mode falls below the three that are asked for."""
+    theta = [[1.0, 1.0, 1.0, 0.01]]
+    np.testing.assert_allclose(crossing(track=True).frequencies(theta), [[1, 2, 3]], atol=1e-12)
+
+
+def test_tracked_jacobian_follows_its_modes():
+    theta = np.array([[9.5, 1.0, 1.0, 1.0]])
+    jacobian = crossing(track=True).jacobian(theta)[0]
+    np.testing.assert_allclose(jacobian[:, :3], np.diag([0.5 / np.sqrt(9.5), 1.0, 1.5]), atol=1e-10)
+    np.testing.assert_allclose(jacobian[:, 3], 0, atol=1e-12)
+
+
+def test_tracked_shapes_match_the_nominal_ones():
+    model = crossing(track=True)
+    nominal = model.modes(np.ones((1, 4)))[1][0]
+    for shapes in model.modes(np.random.default_rng(0).uniform(0.1, 9, (20, 4)))[1]:
+        np.testing.assert_allclose(mac(nominal, shapes), np.eye(3), atol=1e-12)
+
+
+def test_a_damaged_model_keeps_the_healthy_models_columns():
+    damaged = crossing(track=True).damaged({"c": 1 - 1 / 36})
+    np.testing.assert_allclose(damaged.frequencies(np.ones((1, 4))), [[1, 2, 0.5]], atol=1e-12)
+
+
+def test_modes_that_veer_are_followed_through_a_weak_coupling():
+    """Two coupled oscillators swap shapes; the tracked frequency stays continuous to the coupling."""
+    coupling = 0.2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    model = AffineModel(
+        {(): np.diag([0.0, 40.0]) + coupling, ("k",): np.diag([30.0, 0.0])}, np.eye(2), n_modes=2, track=True
+    )
+    theta = np.linspace(1, 2, 41)[:, np.newaxis]
+    first = model.frequencies(theta)[:, 0]
+    assert first[-1] > model.frequencies(theta)[-1, 1]
+    np.testing.assert_allclose(first, np.sqrt(30 * theta[:, 0]) / (2 * np.pi), rtol=0.02)
+
+
+def test_share_of_reordered_samples():
+    assert share_reordered(crossing(), np.array([[1.0, 1, 1, 1], [9, 1, 1, 1]])) == 0.5
+
+
+def test_no_candidate_serves_two_modes():
+    likeness = np.array([[[0.9, 0.1, 0.0], [0.8, 0.15, 0.05]]])
+    np.testing.assert_array_equal(pair_modes(likeness), [[0, 1]])
+
+
+shapes = st.integers(0, 2**31).map(lambda seed: np.random.default_rng(seed).standard_normal((5, 3, 2)) @ [1, 1j])
+
+
+@settings(max_examples=25, deadline=None)
+@given(shapes, st.complex_numbers(min_magnitude=0.1, max_magnitude=10))
+def test_mac_ignores_scale_and_phase(phi, scale):
+    np.testing.assert_allclose(np.diag(mac(phi, scale * phi)), 1, rtol=1e-10)
+    values = mac(phi, phi)
+    assert ((values >= 0) & (values <= 1 + 1e-12)).all()
+    np.testing.assert_allclose(values, values.T, rtol=1e-10)
+
+
+def test_mac_of_orthogonal_shapes_is_zero():
+    np.testing.assert_allclose(mac(np.eye(3)[:, :2], np.eye(3)), np.eye(3)[:2], atol=0)
+
+
+def test_mac_refuses_what_it_cannot_compare():
+    with pytest.raises(ValueError, match="phi_a has 3 degrees of freedom and phi_b 2"):
+        mac(np.eye(3), np.eye(2))
+    with pytest.raises(ValueError, match="phi_b: shape 1 is zero"):
+        mac(np.eye(2), [[1.0, 0.0], [1.0, 0.0]])
