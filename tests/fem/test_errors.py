@@ -1,0 +1,178 @@
+"""Bad structures, models and parameters are refused by name."""
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, Bar, CallableModel, PointMass, Spring, Structure, sample
+
+STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
+NODES = {"a": (0, 0), "b": (3, 0), "c": (3, 2)}
+MEMBERS = {"ab": Bar("a", "b", **STEEL), "bc": Bar("b", "c", **STEEL), "ca": Bar("c", "a", **STEEL)}
+SUPPORTS = {"a": "xy", "b": "y"}
+GROUPS = {"tie": ["ab"], "rest": ["bc", "ca"]}
+
+
+def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
+    return Structure(nodes, members, supports, groups)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"nodes": NODES | {"d": (9, 9)}}, "node 'd' is disconnected"),
+        ({"nodes": NODES | {"d": (3, 2)}}, "nodes 'c' and 'd' are duplicates"),
+        ({"nodes": NODES | {"d": (3, 2, 1)}}, "node 'd' has the coordinates"),
+        ({"nodes": NODES | {"c": (3, np.nan)}}, "node 'c' has the coordinates"),
+        ({"nodes": {}}, "nodes is empty"),
+        ({"members": MEMBERS | {"aa": Bar("a", "a", **STEEL)}}, "member 'aa' .* has zero length"),
+        ({"members": MEMBERS | {"ax": Bar("a", "x", **STEEL)}}, "member 'ax' ends at node 'x'"),
+        ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"E": -1.0})}}, "member 'ab' has E = -1.0"),
+        ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"A": 0.0})}}, "member 'ab' has A = 0.0"),
+        ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"density": -1.0})}}, "density = -1.0; expected zero or"),
+        ({"members": MEMBERS | {"s": Spring("c", "x", float("nan"))}}, "member 's' has k = nan"),
+        ({"members": MEMBERS | {"s": Spring("c", "z", 1.0)}}, "member 's' acts along 'z' of node 'c'"),
+        ({"members": MEMBERS | {"m": PointMass("c", -2.0)}}, "member 'm' has m = -2.0"),
+        ({"supports": {"q": "x"}}, "supports name node 'q'"),
+        ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'"),
+        ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
+        ({"groups": {"tie": []}}, "group 'tie' holds no member"),
+    ],
+)
+def test_structure_names_what_is_wrong(changes, message):
+    with pytest.raises(ValueError, match=message):
+        structure(**changes)
+
+
+def test_mechanism_names_the_node_that_moves():
+    unbraced = {"a": (0, 0), "b": (3, 0), "c": (0, 2), "d": (3, 2)}
+    bars = {name: Bar(*name, **STEEL) for name in ("ac", "cd", "bd")}
+    with pytest.raises(ValueError, match=r"mechanism: node 'c' along x, node 'd' along x can move|node 'd' along x, node 'c'"):
+        Structure(unbraced, bars, {"a": "xy", "b": "xy"}, {"all": list(bars)}).assemble(["all"], n_modes=2)
+    with pytest.raises(ValueError, match="mechanism"):
+        structure(supports={"a": "xy"}).assemble(["tie"], n_modes=1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"parameters": ["deck"]}, "parameter 'deck': unknown group 'deck'; expected one of .'rest', 'tie'."),
+        ({"parameters": {"k": ("k", "tie")}}, "parameter 'k' is the property 'k' of group 'tie'"),
+        ({"parameters": ["tie"], "groups": ["deck"]}, "groups: unknown group 'deck'"),
+        ({"parameters": ["tie"], "n_modes": 4}, "n_modes is 4, but 3 degrees of freedom"),
+        ({"parameters": ["tie"], "n_modes": 0}, "n_modes is 0; expected a positive integer"),
+    ],
+)
+def test_assembly_names_what_is_wrong(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        structure().assemble(**({"n_modes": 1} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("theta", "message"),
+    [
+        (np.ones((2, 3)), r"theta has shape \(2, 3\); expected \(n_samples, 4\)"),
+        (np.ones(3), r"theta has shape \(3,\)"),
+        ([[1, 1, np.nan, 1]], "row 0, parameter 'diagonal' is nan"),
+        ([[1, 1, 1, 1], [1, -1, 1, 1]], "row 1, parameter 'top' is -1"),
+        ([[1, 1, 0, 1]], "row 0, parameter 'diagonal' is 0"),
+    ],
+)
+@pytest.mark.parametrize("method", ["frequencies", "modes", "jacobian", "matrices"])
+def test_theta_is_checked_everywhere(method, theta, message):
+    with pytest.raises(ValueError, match=message):
+        getattr(make_truss(), method)(theta)
+
+
+def test_theta_frame_must_have_the_models_columns():
+    import pandas as pd
+
+    truss = make_truss()
+    frame = pd.DataFrame(np.ones((2, 4)), columns=truss.parameter_names)
+    np.testing.assert_array_equal(truss.frequencies(frame), truss.frequencies(frame.to_numpy()))
+    with pytest.raises(ValueError, match="theta has the columns"):
+        truss.frequencies(frame[["top", "bottom", "diagonal", "vertical"]])
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        ({"deck": 0.1}, "unknown damage group 'deck'; expected one of"),
+        ({"top": 1.0}, "damage of group 'top' has severity 1.0; expected a number below 1"),
+        ({"top": float("nan")}, "damage of group 'top' has severity nan"),
+        ({"top": "half"}, "damage of group 'top' has severity 'half'"),
+        (0.5, "damage is 0.5; expected a mapping"),
+    ],
+)
+def test_damage_is_checked(damage, message):
+    with pytest.raises(ValueError, match=message):
+        make_truss().damaged(damage)
+
+
+I2 = np.eye(2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"stiffness": {}}, "stiffness has no terms"),
+        ({"stiffness": {("k",): np.ones((2, 3))}}, r"stiffness term \('k',\) has shape \(2, 3\)"),
+        ({"stiffness": {("k",): I2, ("h",): np.eye(3)}}, r"term \('h',\) has shape \(3, 3\); expected \(2, 2\)"),
+        ({"stiffness": {("k",): [[1, 0.5], [0, 1]]}}, r"is not symmetric: entries \(0, 1\)"),
+        ({"stiffness": {("k",): [[1, np.inf], [np.inf, 1]]}}, "not finite"),
+        ({"stiffness": {3: I2}}, "stiffness has the key 3"),
+        ({"stiffness": {(): I2}}, "no term names a parameter"),
+        ({"stiffness": {("k",): np.diag([1.0, 0.0])}}, "mechanism: degree of freedom 1 can move"),
+        ({"stiffness": {("k",): [[1, 1], [1, 1.0]]}}, "mechanism: degree of freedom 0, degree of freedom 1|1, degree"),
+        ({"mass": np.eye(3)}, r"mass term \(\) has shape \(3, 3\); expected \(2, 2\)"),
+        ({"mass": np.diag([1.0, -1.0])}, "negative eigenvalue"),
+        ({"mass": np.diag([1.0, 0.0]), "n_modes": 2}, "1 of them massless, have only 1 modes"),
+        ({"parameter_names": ["E"]}, r"terms name \['k'\]; expected only the parameters \['E'\]"),
+        ({"parameter_names": ["k", "E"]}, r"no term names the parameters \['E'\]"),
+        ({"parameter_names": ["k", "k"]}, "expected one or more different names"),
+        ({"groups": {"deck": [("E",)]}}, r"group 'deck' names the term \('E',\)"),
+        ({"groups": {"deck": []}}, "group 'deck' names no stiffness term"),
+    ],
+)
+def test_affine_model_names_what_is_wrong(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        AffineModel(**({"stiffness": {("k",): I2}, "mass": I2, "n_modes": 1} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"bounds": 1.0}, "bounds is 1.0; expected a half-width between 0 and 1"),
+        ({"bounds": [[0.8, 1.2]] * 3}, r"bounds has shape \(3, 2\)"),
+        ({"bounds": [[0.8, 1.2]] * 3 + [[1.2, 0.8]]}, r"bounds of parameter 'vertical' are \[1.2, 0.8\]"),
+        ({"bounds": [[0.0, 1.2]] * 4}, "bounds of parameter 'bottom'"),
+        ({"bounds": [[0.8, np.nan]] * 4}, "bounds of parameter 'bottom'"),
+        ({"n_samples": 0}, "n_samples is 0"),
+        ({"method": "grid"}, "method is 'grid'; expected one of"),
+    ],
+)
+def test_sampling_names_what_is_wrong(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        sample(make_truss(), **({"bounds": 0.2, "n_samples": 4} | arguments))
+
+
+def test_callable_model_names_the_shape_it_got():
+    model = CallableModel(lambda row: row[:2], ["a", "b", "c"], 3)
+    with pytest.raises(ValueError, match=r"function returned shape \(2,\); expected \(3,\) for one row"):
+        model.frequencies([[1.0, 2.0, 3.0]])
+
+
+def test_dense_and_sparse_matrices_and_plain_keys_are_one_model():
+    dense = AffineModel({("k",): 2 * I2, (): I2}, I2, n_modes=2)
+    sparse = AffineModel([("k", scipy.sparse.csr_array(2 * I2)), ((), scipy.sparse.coo_matrix(I2))], I2, n_modes=2)
+    nested = AffineModel({"k": [[2, 0], [0, 2]], (): [[1, 0], [0, 1]]}, [[1, 0], [0, 1]], n_modes=2)
+    for other in (sparse, nested):
+        np.testing.assert_array_equal(dense.frequencies([[1.7]]), other.frequencies([[1.7]]))
+
+
+def test_a_repeated_key_lets_groups_cut_through_a_parameter():
+    first, second = np.diag([1.0, 0.0]), np.diag([0.0, 4.0])
+    model = AffineModel([(("k",), first), (("k",), second)], I2, n_modes=2, groups={"left": [0], "right": [1]})
+    hertz = model.damaged({"right": 0.75}).frequencies([[4.0]]) * 2 * np.pi
+    np.testing.assert_allclose(hertz, [[2.0, 2.0]])

@@ -1,0 +1,122 @@
+"""How models live: immutable, shared by clones, the same bits however they are spread."""
+
+import pickle
+
+import joblib
+import numpy as np
+import pytest
+from scipy.stats import qmc
+from sklearn.base import clone
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, sample
+
+
+def big_model(n_dof=400):
+    """More than 1 MB, so that joblib hands it to workers as a read-only memory map."""
+    chain = np.diag(np.full(n_dof, 2.0)) - np.diag(np.ones(n_dof - 1), 1) - np.diag(np.ones(n_dof - 1), -1)
+    half = np.diag(np.arange(n_dof) < n_dof // 2).astype(float)
+    return AffineModel({("left",): half @ chain @ half + half, ("right",): chain}, np.eye(n_dof), n_modes=3)
+
+
+def row_model(row):
+    return np.sqrt(row @ [1.0, 2.0]) * np.array([1.0, 2.0])
+
+
+def test_models_are_the_documented_duck_type():
+    assert isinstance(make_truss(), FEModel)
+    assert isinstance(CallableModel(row_model, ["a", "b"], 2), FEModel)
+
+
+def test_clone_shares_and_pickle_copies():
+    truss = make_truss()
+    assert clone(truss) is truss
+    theta = [[0.9, 1.0, 1.1, 1.2]]
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(truss)).frequencies(theta), truss.frequencies(theta))
+
+
+def test_a_model_keeps_its_own_copy_of_matrices():
+    matrix = np.eye(2)
+    model = AffineModel({("k",): matrix}, np.eye(2), n_modes=1)
+    matrix[0, 0] = 100.0
+    np.testing.assert_allclose(model.frequencies([[1.0]]), 1 / (2 * np.pi))
+    with pytest.raises(ValueError, match="read-only"):
+        model._stiffness.matrices[0, 0, 0] = 5.0
+
+
+def test_damaged_leaves_the_model_as_it_was_and_shares_its_matrices():
+    truss = make_truss()
+    before = truss.frequencies(np.ones((1, 4)))
+    damaged = truss.damaged({"top": 0.5})
+    assert damaged._stiffness.matrices is truss._stiffness.matrices
+    np.testing.assert_array_equal(truss.frequencies(np.ones((1, 4))), before)
+
+
+@pytest.mark.parametrize("method", ["uniform", "lhs", "sobol"])
+def test_samples_fill_the_box_and_repeat_with_their_seed(method):
+    bounds = np.array([[0.5, 0.6], [0.9, 1.5], [1.0, 2.0], [0.1, 3.0]])
+    first, second = (sample(make_truss(), bounds, 256, method=method, random_state=5) for _ in range(2))
+    np.testing.assert_array_equal(first.theta, second.theta)
+    np.testing.assert_array_equal(first.frequencies, second.frequencies)
+    assert ((first.theta > bounds[:, 0]) & (first.theta < bounds[:, 1])).all()
+    unit = (first.theta - bounds[:, 0]) / np.ptp(bounds, axis=1)
+    np.testing.assert_allclose(unit.mean(axis=0), 0.5, atol=0.06)
+
+
+def test_designs_fill_space_more_evenly_than_chance():
+    discrepancy = {
+        method: qmc.discrepancy(sample(make_truss(), 0.5, 256, method=method, random_state=0).theta - 0.5)
+        for method in ("uniform", "lhs", "sobol")
+    }
+    assert discrepancy["sobol"] < discrepancy["lhs"] < discrepancy["uniform"]
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+@pytest.mark.parametrize("model", [make_truss(), big_model()], ids=repr)
+def test_same_bits_however_samples_are_spread(model, backend):
+    n_samples = 600 if model.n_dof < 100 else 40
+    alone = sample(model, 0.2, n_samples, random_state=0)
+    with joblib.parallel_config(backend):
+        for _ in range(2):
+            spread = sample(model, 0.2, n_samples, n_jobs=2, random_state=0)
+            np.testing.assert_array_equal(spread.theta, alone.theta)
+            np.testing.assert_array_equal(spread.frequencies, alone.frequencies)
+
+
+def test_big_models_are_as_big_as_they_should_be_for_a_memory_map():
+    assert big_model()._stiffness.matrices.nbytes > 1_000_000
+
+
+def test_third_party_programs_run_row_by_row_or_all_at_once():
+    rows = np.random.default_rng(0).uniform(0.8, 1.2, (300, 2))
+    by_row = CallableModel(row_model, ["a", "b"], 2)
+    at_once = CallableModel(lambda theta: np.sqrt(theta @ [1.0, 2.0])[:, None] * [1.0, 2.0], ["a", "b"], 2, vectorized=True)
+    np.testing.assert_allclose(by_row.frequencies(rows), at_once.frequencies(rows), rtol=1e-15)
+    np.testing.assert_array_equal(
+        sample(by_row, 0.2, 300, n_jobs=2, random_state=1).frequencies,
+        sample(by_row, 0.2, 300, random_state=1).frequencies,
+    )
+    assert clone(by_row) is by_row
+
+
+def test_callable_model_may_wrap_another_models_frequencies():
+    truss = make_truss()
+    wrapped = CallableModel(truss.frequencies, truss.parameter_names, 6)
+    theta = np.random.default_rng(0).uniform(0.8, 1.2, (5, 4))
+    np.testing.assert_allclose(wrapped.frequencies(theta), truss.frequencies(theta), rtol=1e-12)
+
+
+def test_noise_is_relative_gaussian_and_by_mode():
+    clean = np.full((40_000, 2), [5.0, 50.0])
+    noisy = add_noise(clean, [0.01, 0.02], random_state=0)
+    np.testing.assert_allclose((noisy / clean - 1).std(axis=0), [0.01, 0.02], rtol=0.02)
+    np.testing.assert_array_equal(add_noise(clean, 0.0), clean)
+    for wrong in (-0.1, [0.1, 0.1, 0.1], np.nan):
+        with pytest.raises(ValueError, match="expected a relative standard deviation"):
+            add_noise(clean, wrong)
+
+
+def test_no_rows_in_no_rows_out():
+    frequencies, shapes = make_truss().modes(np.empty((0, 4)))
+    assert frequencies.shape == (0, 6)
+    assert shapes.shape == (0, 23, 6)
