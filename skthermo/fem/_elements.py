@@ -186,5 +186,5 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
             raise ValueError(f"member {name!r} from node {start!r} to node {end!r} has zero length")
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
-        if not (isinstance(value, Real) and isfinite(value) and (value > 0 or may_be_zero and value == 0)):
+        if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):
             raise ValueError(f"member {name!r} has {symbol} = {value!r}; expected {expected}")

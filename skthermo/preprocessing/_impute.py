@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
-from skthermo._validation import column_names, like
+from skthermo._validation import _check_feature_names_in, check_is_fitted, column_names, like
 
 
 class KNNGapImputer(KNNImputer):
@@ -112,3 +112,19 @@ class KNNGapImputer(KNNImputer):
             A frame gives a frame on its own index.
         """
         return like(X, super().transform(X), self.get_feature_names_out())
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the columns: those of the input, and of the indicators where asked for.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Names of the input's columns; by default those seen in `fit`.
+
+        Returns
+        -------
+        ndarray of str
+        """
+        check_is_fitted(self)
+        names = _check_feature_names_in(self, input_features)
+        return self._concatenate_indicator_feature_names_out(names, names)

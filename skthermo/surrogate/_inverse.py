@@ -2,6 +2,7 @@
 
 import warnings
 from numbers import Integral, Real
+from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         amplify that noise, at the price of estimates drawn towards the middle of the box.
     memory : str or joblib.Memory, optional
         Where simulations are kept, so that a search over other settings does not repeat them.
+        Clear it when the program behind a model of your own changes.
     n_jobs : int, optional
         Jobs over which simulations are spread.
     random_state : int, RandomState or None, default=None
@@ -234,18 +236,22 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 UserWarning,
                 stacklevel=4,
             )
-        drawn = check_memory(self.memory).cache(sample, ignore=["n_jobs"])(
-            model,
-            self.bounds,
-            self.n_samples,
-            n_jobs=self.n_jobs,
-            random_state=random.randint(np.iinfo(np.int32).max),
-        )
+        drawn = self._sample(random.randint(np.iinfo(np.int32).max))
         self._warn_of_swaps(drawn.theta)
         self.samples_ = Bunch(theta=drawn.theta, frequencies=drawn.frequencies)
         self._parameter_names = list(model.parameter_names)
         self._y_is_vector = False
         return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
+
+    def _sample(self, seed: int) -> Bunch:
+        remembered = check_memory(self.memory).cache(sample, ignore=["n_jobs"])
+        try:
+            return remembered(self.model, self.bounds, self.n_samples, n_jobs=self.n_jobs, random_state=seed)
+        except PicklingError as error:
+            raise ValueError(
+                f"memory cannot recognise {self.model!r}; expected one that can be pickled, without lambdas or "
+                "functions defined within functions, or memory=None"
+            ) from error
 
     def _warn_of_swaps(self, theta: NDArray[np.float64]) -> None:
         if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):

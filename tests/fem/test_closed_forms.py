@@ -89,7 +89,7 @@ def test_tripod_in_three_dimensions():
     structure = Structure(
         feet | {"top": (0.0, 0.0, 2.0)},
         bars | {"m": PointMass("top", 100.0)},
-        {foot: "xyz" for foot in feet},
+        dict.fromkeys(feet, "xyz"),
         {"legs": list(bars)},
     )
     unit = E * A / np.sqrt(5) ** 3

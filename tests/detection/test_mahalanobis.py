@@ -1,0 +1,94 @@
+"""The damage index and its alarms."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.distance import mahalanobis
+from scipy.stats import chi
+from sklearn.covariance import LedoitWolf, MinCovDet
+
+from skthermo.detection import MahalanobisDetector
+
+RNG = np.random.default_rng(0)
+COVARIANCE = np.array([[1.0, 0.6, 0.2], [0.6, 2.0, 0.3], [0.2, 0.3, 0.5]])
+F = RNG.multivariate_normal([4, 9, 12], 0.01 * COVARIANCE, 400)
+
+
+def test_index_is_the_unsquared_distance():
+    detector = MahalanobisDetector().fit(F)
+    inverse = np.linalg.inv(np.cov(F.T, bias=True))
+    expected = [mahalanobis(row, F.mean(axis=0), inverse) for row in F[:20]]
+    np.testing.assert_allclose(detector.damage_index(F[:20]), expected, rtol=1e-10)
+
+
+def test_index_of_gaussian_records_follows_the_chi_distribution():
+    detector = MahalanobisDetector().fit(RNG.multivariate_normal([0, 0, 0], COVARIANCE, 100_000))
+    assert detector.threshold_ == pytest.approx(chi(3).ppf(0.98), rel=0.01)
+
+
+def test_threshold_is_the_quantile_of_the_baseline():
+    detector = MahalanobisDetector(contamination=0.05).fit(F)
+    index = detector.damage_index(F)
+    assert detector.threshold_ == np.quantile(index, 0.95)
+    assert (index > detector.threshold_).mean() == 0.05
+
+
+def test_scores_form_one_chain():
+    detector = MahalanobisDetector().fit(F)
+    index = detector.damage_index(F)
+    np.testing.assert_array_equal(detector.score_samples(F), -index)
+    np.testing.assert_array_equal(detector.decision_function(F), detector.threshold_ - index)
+    np.testing.assert_array_equal(detector.predict(F) == -1, index > detector.threshold_)
+
+
+def test_index_does_not_depend_on_units():
+    scale = np.array([1.0, 60.0, 0.001])
+    np.testing.assert_allclose(
+        MahalanobisDetector().fit(F * scale).damage_index(F * scale), MahalanobisDetector().fit(F).damage_index(F)
+    )
+
+
+@pytest.mark.parametrize("covariance", [LedoitWolf(), MinCovDet(random_state=0)], ids=repr)
+def test_any_covariance_estimator_serves(covariance):
+    detector = MahalanobisDetector(covariance=covariance).fit(F)
+    np.testing.assert_allclose(detector.damage_index(F) ** 2, detector.covariance_.mahalanobis(F))
+    assert not hasattr(covariance, "covariance_")
+
+
+def test_missing_modes_give_no_index_and_no_alarm():
+    frame = pd.DataFrame(F, columns=["f1", "f2", "f3"], index=pd.date_range("2025", periods=400, freq="h"))
+    holed = frame.copy()
+    holed.iloc[[3, 7], 1] = np.nan
+    holed.iloc[7:9] += 10
+    detector = MahalanobisDetector().fit(frame)
+    index = detector.damage_index(holed)
+    assert index.index.equals(holed.index)
+    np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
+    with pytest.warns(UserWarning, match="2 of 400 rows have a missing mode"):
+        alarms = detector.predict(holed)
+    np.testing.assert_array_equal(alarms[[3, 7, 8]], [1, 1, -1])
+
+
+def test_incomplete_rows_do_not_enter_the_baseline():
+    holed = np.vstack([F, [[np.nan, 100.0, 100.0]]])
+    assert MahalanobisDetector().fit(holed).threshold_ == MahalanobisDetector().fit(F).threshold_
+
+
+@pytest.mark.parametrize(
+    ("X", "message"),
+    [
+        (F[:3], "covariance of 3 complete baseline rows and 3 modes is singular .rank 2."),
+        (F * [1, 1, 0], r"singular \(rank 2\)"),
+        (np.column_stack([F, F[:, 0]]), r"400 complete baseline rows and 4 modes is singular \(rank 3\)"),
+        (F[:1], "1 sample"),
+        (np.vstack([F[:1], np.full((5, 3), np.nan)]), "1 of 6 rows have every mode"),
+        (np.where(F[5] == F, np.inf, F), "infinity"),
+    ],
+)
+def test_bad_baselines_are_named(X, message):
+    with pytest.raises(ValueError, match=message):
+        MahalanobisDetector().fit(X)
+
+
+def test_few_records_do_with_a_shrunk_covariance():
+    assert MahalanobisDetector(covariance=LedoitWolf()).fit(F[:3]).threshold_ > 0

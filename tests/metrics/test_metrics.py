@@ -1,0 +1,110 @@
+"""PFA, POD, minimum detectable damage, error tables, scores."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sklearn.dummy import DummyRegressor
+from sklearn.metrics import mean_absolute_percentage_error, r2_score
+from sklearn.model_selection import cross_validate
+
+from skthermo.metrics import (
+    error_table,
+    frequency_scorer,
+    mape,
+    minimum_detectable_damage,
+    probability_of_detection,
+    probability_of_false_alarm,
+)
+
+RNG = np.random.default_rng(0)
+MEASURED = RNG.uniform(3, 5, (60, 2))
+PREDICTED = MEASURED * RNG.normal(1, 0.02, (60, 2))
+
+
+@given(st.lists(st.floats(0, 10), min_size=1), st.floats(0, 10), st.integers(0, 5))
+def test_probabilities_are_shares_above_the_threshold(index, threshold, n_missing):
+    expected = sum(value > threshold for value in index) / len(index)
+    padded = index + [np.nan] * n_missing
+    assert probability_of_detection(padded, threshold) == pytest.approx(expected)
+    assert probability_of_false_alarm(padded, threshold) == pytest.approx(expected)
+
+
+def test_nothing_to_count_is_nan_and_bad_input_is_named():
+    assert np.isnan(probability_of_detection([np.nan], 1.0))
+    with pytest.raises(ValueError, match=r"damage_index has shape \(1, 2\)"):
+        probability_of_false_alarm([[1.0, 2.0]], 1.0)
+    with pytest.raises(ValueError, match="threshold is nan"):
+        probability_of_detection([1.0], np.nan)
+
+
+@pytest.mark.parametrize(
+    ("pod", "expected"),
+    [
+        ([0.26, 0.95, 1.0], 0.2),
+        ([0.9, 0.95, 1.0], 0.1),
+        ([0.95, 0.5, 1.0], 0.3),  # found by luck at 0.1, missed at 0.2
+        ([0.1, 0.2, 0.3], np.nan),
+    ],
+)
+def test_minimum_detectable_damage(pod, expected):
+    np.testing.assert_equal(minimum_detectable_damage([0.1, 0.2, 0.3], pod), expected)
+    np.testing.assert_equal(minimum_detectable_damage([0.3, 0.1, 0.2], np.take(pod, [2, 0, 1])), expected)
+
+
+@pytest.mark.parametrize(
+    ("severities", "pod", "level", "message"),
+    [
+        ([0.1, 0.2], [0.5], 0.9, "severities have shape"),
+        ([0.1, 0.1], [0.5, 0.6], 0.9, "expected different numbers"),
+        ([0.1, 0.2], [50, 60], 0.9, "not percent"),
+        ([0.1, 0.2], [0.5, np.nan], 0.9, "pod is"),
+        ([0.1, 0.2], [0.5, 0.6], 90, "level is 90"),
+    ],
+)
+def test_minimum_detectable_damage_names_what_is_wrong(severities, pod, level, message):
+    with pytest.raises(ValueError, match=message):
+        minimum_detectable_damage(severities, pod, level)
+
+
+def test_mape_is_scikit_learns_on_complete_data_and_ignores_gaps():
+    expected = 100 * mean_absolute_percentage_error(MEASURED, PREDICTED, multioutput="raw_values")
+    np.testing.assert_allclose(mape(MEASURED, PREDICTED), expected)
+    holed = np.vstack([MEASURED, [[np.nan, np.nan]]])
+    np.testing.assert_allclose(mape(holed, np.vstack([PREDICTED, [[4.0, 4.0]]])), expected)
+
+
+def test_error_table_has_a_row_for_each_scenario_in_order_and_averages():
+    scenarios = np.repeat(["SH-0", "SB-50", "SD-50"], 20)
+    index = pd.date_range("2025", periods=60, freq="D")
+    frames = [pd.DataFrame(values, columns=["first", "second"], index=index) for values in (MEASURED, PREDICTED)]
+    table = error_table(*frames, scenarios=scenarios)
+    assert list(table.index) == ["SH-0", "SB-50", "SD-50", "Average"]
+    assert list(table.columns) == ["first", "second", "Average"]
+    np.testing.assert_allclose(table.loc["SB-50", ["first", "second"]], mape(MEASURED[20:40], PREDICTED[20:40]))
+    assert table.loc["Average", "Average"] == pytest.approx(table.iloc[:3, :2].to_numpy().mean())
+    with pytest.raises(ValueError, match=r"y_true and y_pred have different indices \(row 0"):
+        error_table(frames[0], frames[1].shift(freq="1D"))
+    with pytest.raises(ValueError, match=r"scenarios has shape \(2,\); expected \(60,\)"):
+        error_table(*frames, scenarios=["a", "b"])
+    with pytest.raises(ValueError, match="y_true has shape"):
+        error_table(MEASURED, PREDICTED[:, :1])
+
+
+def test_scorer_works_in_cross_validation_and_counts_the_rows_it_scored():
+    holed = MEASURED.copy()
+    holed[::3, 0] = np.nan
+    T = RNG.normal(size=(60, 1))
+
+    class Mean(DummyRegressor):
+        def fit(self, X, y):
+            return super().fit(X, np.nan_to_num(y, nan=4.0))
+
+    scores = cross_validate(Mean(), T, holed, cv=3, scoring=frequency_scorer)
+    np.testing.assert_allclose(scores["test_share_scored"], 2 / 3, atol=0.05)
+    model = Mean().fit(T, holed)
+    complete = ~np.isnan(holed).any(axis=1)
+    scored = frequency_scorer(model, T, holed)
+    assert scored["r2"] == pytest.approx(r2_score(holed[complete], model.predict(T)[complete]))
+    assert scored["neg_mape"] == pytest.approx(-mape(holed[complete], model.predict(T)[complete]).mean())

@@ -1,0 +1,84 @@
+"""Gaps and offsets."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.impute import KNNImputer
+
+from skthermo.datasets import make_truss
+from skthermo.preprocessing import BiasAligner, KNNGapImputer
+
+RNG = np.random.default_rng(0)
+HOURS = pd.date_range("2025-01-01", periods=80, freq="h")
+F = pd.DataFrame(RNG.normal([4.0, 9.0, 12.0], 0.1, (80, 3)), index=HOURS, columns=["f1", "f2", "f3"])
+GAPPY = F.mask(RNG.random(F.shape) < 0.2)
+
+
+@pytest.mark.parametrize("weights", ["uniform", "distance"])
+def test_imputer_gives_scikit_learns_values_on_a_frame_of_its_own(weights):
+    filled = KNNGapImputer(weights=weights).fit_transform(GAPPY)
+    expected = KNNImputer(n_neighbors=10, weights=weights).fit_transform(GAPPY)
+    np.testing.assert_array_equal(filled.to_numpy(), expected)
+    assert filled.index.equals(GAPPY.index)
+    assert list(filled.columns) == list(GAPPY.columns)
+    present = GAPPY.notna()
+    pd.testing.assert_frame_equal(filled[present], GAPPY[present])
+
+
+def test_imputer_keeps_arrays_and_single_precision():
+    assert isinstance(KNNGapImputer().fit_transform(GAPPY.to_numpy()), np.ndarray)
+    single = KNNGapImputer().fit_transform(GAPPY.astype(np.float32))
+    assert (single.dtypes == np.float32).all()
+
+
+def test_imputer_refuses_an_empty_column_by_name():
+    empty = GAPPY.assign(f2=np.nan)
+    with pytest.raises(ValueError, match=r"the columns \['f2'\] are missing in all 80 rows"):
+        KNNGapImputer().fit(empty)
+    filled = KNNGapImputer(keep_empty_features=True).fit_transform(empty)
+    assert (filled["f2"] == 0).all()
+
+
+@pytest.mark.parametrize("method", ["shift", "scale"])
+def test_aligned_means_are_the_reference_and_the_way_back_is_exact(method):
+    reference = np.array([4.2, 8.7, 12.5])
+    aligner = BiasAligner(reference, method=method).fit(GAPPY)
+    aligned = aligner.transform(GAPPY)
+    np.testing.assert_allclose(aligned.mean(), reference, rtol=1e-12)
+    pd.testing.assert_frame_equal(aligner.inverse_transform(aligned), GAPPY)
+    assert aligned.index.equals(GAPPY.index)
+
+
+def test_methods_keep_differences_or_ratios():
+    aligned = {m: BiasAligner([8.0, 18.0, 24.0], method=m).fit_transform(F) for m in ("shift", "scale")}
+    np.testing.assert_allclose(aligned["shift"] - aligned["shift"].mean(), F - F.mean(), atol=1e-12)
+    np.testing.assert_allclose(aligned["scale"] / aligned["scale"].mean(), F / F.mean(), rtol=1e-12)
+
+
+def test_reference_may_be_a_model_or_nothing():
+    truss = make_truss(n_modes=3)
+    nominal = truss.frequencies(np.ones((1, 4)))[0]
+    np.testing.assert_array_equal(BiasAligner(truss).fit(F).reference_, nominal)
+    np.testing.assert_array_equal(BiasAligner().fit(F).reference_, 0)
+    np.testing.assert_array_equal(BiasAligner(method="scale").fit(F).reference_, 1)
+
+
+@pytest.mark.parametrize(
+    ("aligner", "X", "message"),
+    [
+        (BiasAligner([4.0, 9.0]), F, r"reference .* has shape \(2,\); expected a frequency for each of the 3 modes"),
+        (BiasAligner([4.0, np.nan, 9.0]), F, "reference"),
+        (BiasAligner(make_truss()), F, r"has shape \(6,\)"),
+        (BiasAligner(), F.assign(f3=np.nan), "frequency column 'f3' is NaN in all 80 rows"),
+        (BiasAligner(method="scale"), F * [1, 1, 0], "the mean of mode 2 is zero"),
+        (BiasAligner(method="ratio"), F, "method"),
+    ],
+)
+def test_aligner_names_what_is_wrong(aligner, X, message):
+    with pytest.raises(ValueError, match=message):
+        aligner.fit(X)
+
+
+def test_aligner_wants_as_many_modes_back():
+    with pytest.raises(ValueError, match="X has 2 features; expected 3 modes"):
+        BiasAligner().fit(F).inverse_transform(F[["f1", "f2"]])

@@ -1,0 +1,146 @@
+"""Lagged temperatures, by row and by time."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.preprocessing import LagFeatures
+
+HOURS = pd.date_range("2025-01-01", periods=30, freq="h")
+T = pd.DataFrame({"T1": np.arange(30.0), "T2": np.arange(30.0) ** 2}, index=HOURS)
+
+
+def naive_lag(frame, stamp, lag, freq, tolerance):
+    """The definition, one value at a time."""
+    wanted = stamp - lag * freq
+    past = frame.loc[frame.index <= wanted].sort_index()
+    if past.empty:
+        return frame.sort_index().iloc[0]
+    return past.iloc[-1] if wanted - past.index[-1] <= tolerance else past.iloc[-1] * np.nan
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.integers(0, 200), min_size=2, max_size=25, unique=True),
+    st.lists(st.integers(0, 12), min_size=1, max_size=4, unique=True),
+    st.integers(1, 10),
+)
+def test_lags_by_time_follow_their_definition(hours, lags, tolerance):
+    index = pd.Timestamp("2025-03-01") + pd.to_timedelta(hours, unit="h")
+    frame = pd.DataFrame({"a": np.arange(len(hours), dtype=float)}, index=index)
+    hour, tolerance = pd.Timedelta("1h"), pd.Timedelta(hours=tolerance)
+    lagged = LagFeatures(lags, freq="1h", tolerance=tolerance).fit_transform(frame)
+    expected = [[naive_lag(frame, stamp, lag, hour, tolerance)["a"] for lag in lags] for stamp in index]
+    np.testing.assert_array_equal(lagged.to_numpy(), expected)
+    assert lagged.index.equals(index)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 40), st.integers(1, 8), st.sampled_from(["edge", "nan"]))
+def test_lags_by_row_are_shifts(n_rows, n_lags, padding):
+    X = np.random.default_rng(0).standard_normal((n_rows, 2))
+    frame = pd.DataFrame(X)
+    columns = []
+    for sensor in range(2):
+        for lag in range(n_lags):
+            shifted = frame[sensor].shift(lag)
+            columns.append(shifted.fillna(X[0, sensor]) if padding == "edge" else shifted)
+    np.testing.assert_array_equal(LagFeatures(n_lags, padding=padding).fit_transform(X), np.column_stack(columns))
+
+
+def test_a_regular_index_gives_the_same_as_rows():
+    by_time = LagFeatures(5).fit_transform(T)
+    np.testing.assert_array_equal(by_time.to_numpy(), LagFeatures(5).fit_transform(T.to_numpy()))
+    assert list(by_time.columns) == [f"{s}_lag{k}" for s in ("T1", "T2") for k in range(5)]
+
+
+def test_records_of_fit_are_the_history_of_transform():
+    lags = LagFeatures(3, freq="1h").fit(T.iloc[:20])
+    np.testing.assert_array_equal(lags.transform(T.iloc[20:])[["T1_lag0", "T1_lag1", "T1_lag2"]].iloc[0], [20, 19, 18])
+    np.testing.assert_array_equal(lags.transform(T.iloc[[25]])["T1_lag1"], [19])  # five hours old
+    assert np.isnan(lags.transform(T.iloc[[29]])["T1_lag1"]).all()  # nine hours old
+
+
+def test_a_new_value_at_a_known_stamp_replaces_the_old_one():
+    lags = LagFeatures(2, freq="1h").fit(T)
+    corrected = T.iloc[[4, 5]] + 100
+    np.testing.assert_array_equal(lags.transform(corrected)["T1_lag1"], [3, 104])
+
+
+def test_shuffled_rows_come_back_in_their_own_order():
+    shuffled = T.sample(frac=1, random_state=0)
+    ordered = LagFeatures(4).fit_transform(T)
+    pd.testing.assert_frame_equal(LagFeatures(4).fit_transform(shuffled), ordered.loc[shuffled.index])
+
+
+def test_gaps_are_bridged_up_to_the_tolerance():
+    gappy = T.drop(T.index[10:14])
+    lags = {tolerance: LagFeatures(2, freq="1h", tolerance=tolerance).fit_transform(gappy) for tolerance in ("2h", "4h")}
+    after = T.index[14]
+    assert np.isnan(lags["2h"].loc[after, "T1_lag1"])
+    assert lags["4h"].loc[after, "T1_lag1"] == 9
+
+
+def test_missing_values_are_carried_along():
+    holed = T.copy()
+    holed.iloc[7, 0] = np.nan
+    lagged = LagFeatures(3).fit_transform(holed)
+    assert np.isnan(lagged.loc[HOURS[9], "T1_lag2"])
+    assert lagged.loc[HOURS[9], "T2_lag2"] == 49
+
+
+def test_padding_with_nan_applies_only_before_the_first_record():
+    lagged = LagFeatures([0, 2], freq="1h", padding="nan").fit_transform(T)
+    assert lagged["T1_lag2"].isna().sum() == 2
+    assert not LagFeatures([0, 2], freq="1h").fit_transform(T).isna().any(axis=None)
+
+
+def test_time_zones_and_resolutions():
+    local = T.tz_localize("Europe/Brussels")
+    np.testing.assert_array_equal(LagFeatures(3).fit_transform(local), LagFeatures(3).fit_transform(T))
+    coarse = T.set_axis(T.index.as_unit("s"))
+    np.testing.assert_array_equal(LagFeatures(3).fit(T).transform(coarse), LagFeatures(3).fit_transform(T))
+    with pytest.raises(ValueError, match="X has stamps in time zone Europe/Brussels; expected None"):
+        LagFeatures(3).fit(T).transform(local)
+
+
+def test_the_step_is_the_usual_one_and_frames_without_stamps_are_rows():
+    assert LagFeatures().fit(T.iloc[[0, 1, 2, 3, 9, 10]]).freq_ == pd.Timedelta("1h")
+    numbered = T.reset_index(drop=True)
+    assert LagFeatures().fit(numbered).freq_ is None
+    assert LagFeatures(2).fit_transform(numbered).shape == (30, 4)
+
+
+def test_set_output_and_single_precision():
+    assert isinstance(LagFeatures(2).set_output(transform="pandas").fit_transform(T.to_numpy()), pd.DataFrame)
+    assert LagFeatures(2).fit_transform(T.to_numpy(dtype=np.float32)).dtype == np.float32
+
+
+@pytest.mark.parametrize(
+    ("options", "X", "message"),
+    [
+        ({"freq": "1h"}, T.to_numpy(), "freq is '1h', but X has no DatetimeIndex"),
+        ({"tolerance": "1h"}, T.to_numpy(), "tolerance is '1h', but X has no DatetimeIndex"),
+        ({"freq": "soon"}, T, "freq is 'soon'; expected a duration"),
+        ({"freq": "-1h"}, T, "freq is '-1h'; expected a positive duration"),
+        ({"lags": [0, 0]}, T, r"lags is \[0, 0\]; expected"),
+        ({"lags": [-1]}, T, r"lags is \[-1\]"),
+        ({"lags": []}, T, r"lags is \[\]"),
+        ({"lags": 0}, T, "lags"),
+        ({}, pd.concat([T, T.iloc[[3]]]), "1 duplicate stamps, the first 2025-01-01 03:00:00 in row 30"),
+        ({}, T.set_axis([pd.NaT, *T.index[1:]]), r"missing stamp \(NaT\) in row 0"),
+        ({}, T.iloc[[0]], "X has 1 sample, whose stamp gives no step"),
+    ],
+)
+def test_bad_input_is_named(options, X, message):
+    with pytest.raises(ValueError, match=message):
+        LagFeatures(**options).fit(X)
+
+
+def test_transform_wants_the_kind_of_rows_that_fit_saw():
+    with pytest.raises(ValueError, match="X has rows without a DatetimeIndex; expected a DatetimeIndex"):
+        LagFeatures().fit(T).transform(T.reset_index(drop=True))
+    with pytest.raises(ValueError, match="X has a DatetimeIndex; expected rows without"):
+        LagFeatures().fit(T.reset_index(drop=True)).transform(T)

@@ -1,0 +1,271 @@
+"""The whole chain and its laws."""
+
+import pickle
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.exceptions import NotFittedError
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score, cross_validate
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.fem import AffineModel, CallableModel
+from skthermo.metrics import frequency_scorer, mape
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(random_state=0)
+LATER = make_truss_campaign(random_state=1)
+T, F = YEAR.temperatures, YEAR.frequencies
+
+
+def inverse(**options):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
+
+
+def mapper(lags=2):
+    return make_pipeline(LagFeatures(lags), TemperatureMapper(LinearRegression()))
+
+
+def chain(**options):
+    defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
+    return DataInformedFEM(TRUSS, **(defaults | options))
+
+
+FITTED = chain().fit(T, F)
+
+
+def test_predicts_unseen_temperatures_to_a_fraction_of_the_noise():
+    assert mape(LATER.clean_frequencies, FITTED.predict(LATER.temperatures)).max() < 1.0
+    assert FITTED.score(LATER.temperatures, LATER.clean_frequencies) > 0.9
+
+
+def test_predict_is_the_fe_model_and_nothing_else():
+    theta = FITTED.predict_parameters(LATER.temperatures)
+    expected = FITTED.aligner_.inverse_transform(TRUSS.frequencies(theta))
+    np.testing.assert_allclose(FITTED.predict(LATER.temperatures), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seeded", [True, False])
+def test_equals_scikit_learns_transformed_target_regressor(seeded):
+    parts = (inverse(), mapper()) if seeded else (
+        InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, random_state=5), TemperatureMapper(random_state=6)
+    )
+    transformer = make_pipeline(BiasAligner(TRUSS), parts[0])
+    words = TransformedTargetRegressor(parts[1], transformer=transformer, check_inverse=False).fit(T, F)
+    whole = chain(inverse=parts[0], mapper=parts[1]).fit(T, F)
+    np.testing.assert_allclose(whole.predict(LATER.temperatures), words.predict(LATER.temperatures), rtol=1e-12)
+
+
+def test_damage_is_put_into_the_fe_model():
+    theta = FITTED.predict_parameters(T)
+    expected = FITTED.aligner_.inverse_transform(TRUSS.damaged({"top": 0.4}).frequencies(theta))
+    np.testing.assert_allclose(FITTED.simulate(T, damage={"top": 0.4}), expected, rtol=1e-12)
+    np.testing.assert_array_equal(FITTED.simulate(T), FITTED.predict(T))
+
+
+def test_simulated_noise_is_relative_and_seeded():
+    noisy = [FITTED.simulate(T, noise=0.01, random_state=0) for _ in range(2)]
+    pd.testing.assert_frame_equal(*noisy)
+    assert (noisy[0] / FITTED.predict(T) - 1).std(axis=None) == pytest.approx(0.01, rel=0.1)
+
+
+def test_frames_in_frames_out_arrays_in_arrays_out():
+    for method in ("predict", "simulate", "predict_parameters"):
+        assert getattr(FITTED, method)(T).index.equals(T.index)
+    assert list(FITTED.predict(T).columns) == list(F.columns)
+    assert list(FITTED.predict_parameters(T).columns) == list(TRUSS.parameter_names)
+    arrays = chain().fit(T.to_numpy(), F.to_numpy())
+    assert isinstance(arrays.predict(T.to_numpy()), np.ndarray)
+    np.testing.assert_allclose(arrays.predict(T.to_numpy()), FITTED.predict(T), rtol=1e-12)
+
+
+def gappy():
+    rng = np.random.default_rng(0)
+    return T.mask(rng.random(T.shape) < 0.03), F.mask(rng.random(F.shape) < 0.05)
+
+
+def test_gaps_flow_through_fit_predict_and_score():
+    holed_T, holed_F = gappy()
+    model = chain(mapper=mapper(lags=1)).fit(holed_T, holed_F)
+    predicted = model.predict(holed_T)
+    np.testing.assert_array_equal(predicted.isna().any(axis=1), holed_T.isna().any(axis=1))
+    np.testing.assert_array_equal(model.parameters_.isna().any(axis=1), holed_F.isna().any(axis=1))
+    assert 0.5 < model.score(holed_T, holed_F) < 1
+
+
+def test_gaps_flow_through_cross_validation():
+    holed_T, holed_F = gappy()
+    model, folds = chain(mapper=mapper(lags=1)), KFold(3)
+    assert np.isfinite(cross_val_score(model, holed_T, holed_F, cv=folds)).all()
+    predicted = cross_val_predict(model, holed_T, holed_F, cv=folds)
+    np.testing.assert_array_equal(np.isnan(predicted).any(axis=1), holed_T.isna().any(axis=1))
+    scores = cross_validate(model, holed_T, holed_F, cv=folds, scoring=frequency_scorer)
+    assert (scores["test_share_scored"] < 1).all()
+    assert (scores["test_neg_mape"] > -3).all()
+
+
+def test_imputer_completes_frequencies_in_fit_only():
+    holed_T, holed_F = gappy()
+    with_imputer = chain(imputer=KNNGapImputer(), mapper=mapper(lags=1)).fit(holed_T, holed_F)
+    assert with_imputer.parameters_.notna().all(axis=None)
+    side_by_side = np.hstack([holed_T, holed_F])
+    completed = KNNGapImputer().fit_transform(side_by_side)[:, 3:]
+    np.testing.assert_allclose(
+        with_imputer.parameters_,
+        with_imputer.inverse_.transform(with_imputer.aligner_.transform(pd.DataFrame(completed, columns=F.columns))),
+        rtol=1e-12,
+    )
+    assert with_imputer.predict(holed_T).isna().any(axis=None)
+
+
+def test_clone_shares_the_model_and_drops_what_was_fitted():
+    twin = clone(FITTED)
+    assert twin.model is TRUSS
+    assert twin.inverse.model is TRUSS
+    assert twin.inverse is not FITTED.inverse
+    assert not hasattr(twin, "mapper_")
+    np.testing.assert_array_equal(twin.fit(T, F).predict(T), FITTED.predict(T))
+
+
+def test_third_party_models_are_held_by_reference():
+    class Foreign:
+        parameter_names = TRUSS.parameter_names
+        n_modes = 6
+
+        def frequencies(self, theta):
+            return TRUSS.frequencies(theta)
+
+        def __deepcopy__(self, memo):
+            raise AssertionError("copied")
+
+    foreign = Foreign()
+    model = clone(DataInformedFEM(foreign, inverse=InverseSurrogate(foreign, LinearRegression()), aligner=BiasAligner(foreign), mapper=mapper()))
+    assert model.inverse.model is foreign
+    assert clone(model.fit(T, F).aligner).reference is foreign
+    with pytest.raises(ValueError, match="has no method 'damaged'"):
+        model.simulate(T, damage={"top": 0.1})
+
+
+def test_pickle_keeps_predictions():
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(FITTED)).predict(T), FITTED.predict(T))
+
+
+def test_fit_is_idempotent_and_leaves_parameters_alone():
+    model = chain()
+    before = {name: repr(value) for name, value in model.get_params().items()}
+    first = model.fit(T, F).predict(T)
+    np.testing.assert_array_equal(model.fit(T, F).predict(T), first)
+    assert {name: repr(value) for name, value in model.get_params().items()} == before
+
+
+def test_nested_parameters_can_be_set():
+    model = chain().set_params(
+        mapper__lagfeatures__lags=4, inverse__regressor__ridge__alpha=0.1, inverse__noise=0.01, aligner__method="scale"
+    )
+    assert model.fit(T, F).mapper_[0].lags_ == [0, 1, 2, 3]
+    assert model.inverse_.regressor_[-1].alpha == 0.1
+
+
+def test_methods_need_a_fit_first():
+    for method in ("predict", "simulate", "predict_parameters"):
+        with pytest.raises(NotFittedError):
+            getattr(chain(), method)(T)
+    with pytest.raises(NotFittedError):
+        chain().score(T, F)
+
+
+def test_feature_names_are_remembered_and_checked():
+    assert list(FITTED.feature_names_in_) == ["T1", "T2", "T3"]
+    assert FITTED.n_features_in_ == 3
+    with pytest.raises(ValueError, match="feature names"):
+        FITTED.predict(T.rename(columns={"T1": "air"}))
+    with pytest.raises(ValueError, match="Feature names seen at fit time, yet now missing:\n- T3"):
+        FITTED.predict(T[["T1", "T2"]])
+
+
+def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
+    grid = {"mapper__lagfeatures__lags": [1, 2], "inverse__noise": [0.0, 0.01]}
+    searches = [
+        GridSearchCV(chain(inverse=inverse(memory=str(tmp_path))), grid, cv=KFold(3), n_jobs=n_jobs).fit(T, F)
+        for n_jobs in (1, 2)
+    ]
+    np.testing.assert_array_equal(*(search.cv_results_["mean_test_score"] for search in searches))
+    np.testing.assert_array_equal(*(search.predict(T) for search in searches))
+
+
+def test_same_seed_same_bits():
+    model = DataInformedFEM(TRUSS, inverse=InverseSurrogate(bounds=0.2, noise=0.01, n_samples=300), random_state=0)
+    alone = clone(model).fit(T, F).predict(T)
+    with joblib.parallel_config("loky"):
+        for _ in range(2):
+            spread = clone(model).set_params(inverse__n_jobs=2).fit(T, F).predict(T)
+            np.testing.assert_array_equal(spread, alone)
+    other = clone(model).set_params(random_state=1).fit(T, F).predict(T)
+    assert not np.array_equal(other, alone)
+
+
+def test_seed_fills_only_what_has_none():
+    seeded = DataInformedFEM(TRUSS, inverse=inverse(), random_state=0).fit(T, F)
+    assert seeded.inverse_.random_state == 3
+    assert isinstance(seeded.mapper_.random_state, int)
+    assert seeded.mapper is None
+
+
+def test_large_models_work_in_worker_processes():
+    """Matrices above 1 MB reach workers as read-only memory maps."""
+    n = 380
+    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
+    model = AffineModel({("k",): 1e4 * chain_of_springs, ("g",): np.eye(n)}, np.eye(n), n_modes=2)
+    warm = pd.DataFrame({"T": np.linspace(0, 30, 40)})
+    measured = model.frequencies(np.column_stack([1 - 0.005 * warm["T"], 1 + 0 * warm["T"]]))
+    estimator = DataInformedFEM(
+        model,
+        inverse=InverseSurrogate(regressor=LinearRegression(), n_samples=30, bounds=0.2),
+        mapper=TemperatureMapper(LinearRegression()),
+        random_state=0,
+    )
+    alone, spread = (
+        cross_val_predict(estimator, warm, measured, cv=2, n_jobs=n_jobs) for n_jobs in (1, 2)
+    )
+    np.testing.assert_array_equal(spread, alone)
+    np.testing.assert_allclose(alone, measured, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("X", "y", "message"),
+    [
+        (T, F.iloc[:100], "temperatures has 365 rows and frequencies 100"),
+        (T, F.shift(freq="1D"), "temperatures and frequencies have different indices"),
+        (T, F[["f1", "f2"]], "frequencies have 2 columns; expected the modes of AffineModel"),
+        (T.assign(T2=20.0), F, "temperature column 'T2' is constant"),
+        (T.assign(T2=np.nan), F, "temperature column 'T2' is NaN in all 365 rows"),
+        (T, F.assign(f3=np.nan), "frequency column 'f3' is NaN in all 365 rows"),
+        (T.iloc[:1], F.iloc[:1], "1 sample"),
+        (T, None, "requires y"),
+        (pd.concat([T, T.iloc[:1]]), pd.concat([F, F.iloc[:1]]), "duplicate stamps"),
+        (T.replace({T.iloc[4, 1]: np.inf}), F, "infinity"),
+    ],
+)
+def test_bad_input_is_named(X, y, message):
+    with pytest.raises(ValueError, match=message):
+        chain().fit(X, y)
+
+
+def test_bad_damage_and_noise_are_named():
+    with pytest.raises(ValueError, match="unknown damage group 'deck'"):
+        FITTED.simulate(T, damage={"deck": 0.1})
+    with pytest.raises(ValueError, match="severity 1.0"):
+        FITTED.simulate(T, damage={"top": 1.0})
+    with pytest.raises(ValueError, match="noise is"):
+        FITTED.simulate(T, noise=-1)
+    with pytest.raises(ValueError, match="model"):
+        DataInformedFEM(CallableModel).fit(T, F)

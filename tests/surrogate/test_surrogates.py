@@ -1,0 +1,199 @@
+"""M1 and M2, each on its own."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel, add_noise, sample
+from skthermo.surrogate import InverseSurrogate, TemperatureMapper, paper_network
+
+TRUSS = make_truss()
+QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+CALLS: list[int] = []
+
+
+def counted(theta):
+    CALLS.append(len(theta))
+    return TRUSS.frequencies(theta)
+
+
+HELD_OUT = sample(TRUSS, 0.2, 200, random_state=99)
+T = pd.DataFrame({"T1": np.linspace(-10, 40, 60), "T2": np.cos(np.arange(60))})
+THETA = pd.DataFrame({"E": np.exp(-0.004 * T["T1"]), "k": 1 + 0.1 * T["T2"]})
+
+
+def test_inverse_recovers_the_parameters_of_unseen_simulations():
+    inverse = InverseSurrogate(TRUSS, QUADRATIC, bounds=0.2, random_state=0).fit()
+    errors = np.abs(inverse.transform(HELD_OUT.frequencies) / HELD_OUT.theta - 1)
+    assert errors.mean() < 0.005
+    assert inverse.score(HELD_OUT.frequencies, HELD_OUT.theta) > 0.99
+    np.testing.assert_array_equal(inverse.transform(HELD_OUT.frequencies), inverse.predict(HELD_OUT.frequencies))
+
+
+def test_simulations_and_given_pairs_are_the_same_lesson():
+    drawn = InverseSurrogate(TRUSS, LinearRegression(), random_state=0, bounds=0.2).fit()
+    given = InverseSurrogate(regressor=LinearRegression()).fit(drawn.samples_.frequencies, drawn.samples_.theta)
+    np.testing.assert_allclose(given.predict(HELD_OUT.frequencies), drawn.predict(HELD_OUT.frequencies), rtol=1e-12)
+
+
+def test_inverse_transform_is_the_fe_model():
+    inverse = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, random_state=0).fit()
+    theta = np.vstack([HELD_OUT.theta, np.full(4, np.nan)])
+    np.testing.assert_array_equal(inverse.inverse_transform(theta)[:-1], TRUSS.frequencies(HELD_OUT.theta))
+    assert np.isnan(inverse.inverse_transform(theta)[-1]).all()
+
+
+def test_noise_in_training_damps_the_noise_of_estimates():
+    noisy = add_noise(HELD_OUT.frequencies, 0.01, random_state=1)
+    errors = [
+        np.abs(InverseSurrogate(TRUSS, QUADRATIC, bounds=0.2, noise=noise, random_state=0).fit().predict(noisy) - HELD_OUT.theta).mean()
+        for noise in (0.0, 0.01)
+    ]
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_noise_by_mode_reaches_that_mode_only():
+    """A mode that is pure noise in training is ignored: its coefficients vanish."""
+    noise = [0, 0, 0, 0, 0, 10.0]
+    inverse = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, noise=noise, random_state=0).fit()
+    weights = np.abs(inverse.regressor_.coef_).max(axis=0)
+    assert weights[5] < 0.2 * weights[:5].max()
+
+
+def test_frames_in_frames_out_and_nan_flows_through():
+    index = pd.date_range("2025", periods=200, freq="h")
+    F = pd.DataFrame(HELD_OUT.frequencies, index=index, columns=[f"f{i}" for i in range(6)])
+    F.iloc[5, 2] = np.nan
+    theta = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, random_state=0).fit(F).transform(F)
+    assert list(theta.columns) == list(TRUSS.parameter_names)
+    assert theta.index.equals(index)
+    assert theta.isna().all(axis=1).sum() == 1
+    assert theta.iloc[5].isna().all()
+
+
+def test_simulations_are_remembered(tmp_path):
+    model = CallableModel(counted, TRUSS.parameter_names, 6, vectorized=True)
+    settings = {"bounds": 0.2, "n_samples": 50, "random_state": 0, "memory": str(tmp_path)}
+    CALLS.clear()
+    first, second = (
+        InverseSurrogate(model, LinearRegression(), noise=noise, **settings).fit().samples_ for noise in (0.0, 0.01)
+    )
+    np.testing.assert_array_equal(first.frequencies, second.frequencies)
+    assert CALLS == [50]
+    InverseSurrogate(model, LinearRegression(), **(settings | {"random_state": 1})).fit()
+    assert CALLS == [50, 50]
+
+
+def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
+    model = CallableModel(lambda theta: TRUSS.frequencies(theta), TRUSS.parameter_names, 6)
+    with pytest.raises(ValueError, match="memory cannot recognise CallableModel.*expected one that can be pickled"):
+        InverseSurrogate(model, LinearRegression(), n_samples=5, memory=str(tmp_path)).fit()
+
+
+def test_more_parameters_than_modes_warns():
+    with pytest.warns(UserWarning, match="4 parameters and 3 modes"):
+        InverseSurrogate(make_truss(n_modes=3), LinearRegression(), bounds=0.2, n_samples=20).fit()
+
+
+def crossing(track):
+    springs = {("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 1.21])}
+    return AffineModel(springs, np.eye(2), n_modes=2, track=track)
+
+
+def test_modes_that_change_order_warn_with_their_share_unless_tracked(recwarn):
+    with pytest.warns(UserWarning, match=r"modes change their order in \d+% of 100 samples"):
+        InverseSurrogate(crossing(False), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()
+    recwarn.clear()
+    InverseSurrogate(crossing(True), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()
+    InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, n_samples=100, random_state=0).fit()
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize(
+    ("arguments", "X", "y", "message"),
+    [
+        ({}, HELD_OUT.frequencies, None, "requires y to be passed, but the target y is None; expected theta"),
+        ({"model": TRUSS}, np.ones((5, 4)), None, "X has 4 columns; expected the 6 modes"),
+        ({"model": TRUSS, "bounds": 1.5}, None, None, "bounds is 1.5"),
+        ({"model": TRUSS, "noise": -0.1}, None, None, "noise"),
+        ({"model": TRUSS, "bounds": 0.2, "noise": [0.1, 0.1]}, None, None, "noise is"),
+        ({"model": TRUSS, "n_samples": 0}, None, None, "n_samples"),
+        ({"model": TRUSS}, HELD_OUT.frequencies, HELD_OUT.theta[:, :3], r"theta has shape \(200, 3\)"),
+        ({"model": TRUSS}, HELD_OUT.frequencies, -HELD_OUT.theta, "row 0, parameter 'bottom'"),
+        ({}, HELD_OUT.frequencies, HELD_OUT.theta[:9], "frequencies has 200 rows and theta 9"),
+        ({"model": object()}, None, None, "model"),
+    ],
+)
+def test_inverse_names_what_is_wrong(arguments, X, y, message):
+    with pytest.raises(ValueError, match=message):
+        InverseSurrogate(**({"regressor": LinearRegression()} | arguments)).fit(X, y)
+
+
+def test_inverse_without_a_model_has_no_way_back():
+    inverse = InverseSurrogate(regressor=LinearRegression()).fit(HELD_OUT.frequencies, HELD_OUT.theta)
+    with pytest.raises(ValueError, match="InverseSurrogate has no model"):
+        inverse.inverse_transform(HELD_OUT.theta)
+    assert list(inverse.get_feature_names_out()) == ["theta1", "theta2", "theta3", "theta4"]
+
+
+def test_mapper_learns_positive_multipliers_and_keeps_names():
+    mapper = TemperatureMapper(LinearRegression()).fit(T, THETA)
+    predicted = mapper.predict(T * 100)
+    assert (predicted > 0).all(axis=None)
+    assert list(predicted.columns) == ["E", "k"]
+    np.testing.assert_allclose(mapper.predict(T)["E"], THETA["E"], rtol=0.01)
+
+
+def test_mapper_leaves_incomplete_rows_out_of_fit_and_keeps_them_in_predict():
+    holed_T, holed_theta = T.copy(), THETA.copy()
+    holed_T.iloc[3, 0] = np.nan
+    holed_theta.iloc[8, 1] = np.nan
+    fitted = TemperatureMapper(LinearRegression()).fit(holed_T, holed_theta)
+    complete = T.index.difference([3, 8])
+    reference = TemperatureMapper(LinearRegression()).fit(T.loc[complete], THETA.loc[complete])
+    np.testing.assert_allclose(fitted.predict(T), reference.predict(T), rtol=1e-12)
+    assert fitted.predict(holed_T).isna().all(axis=1).sum() == 1
+    assert fitted.score(holed_T, THETA) == pytest.approx(reference.score(T.drop(3), THETA.drop(3)))
+
+
+@pytest.mark.parametrize(
+    ("X", "y", "message"),
+    [
+        (T.assign(T2=12.0), THETA, "temperature column 'T2' is constant .12 in all 60 rows"),
+        (T.assign(T2=np.nan), THETA, "temperature column 'T2' is NaN in all 60 rows"),
+        (T, THETA[:30], "temperatures has 60 rows and theta 30"),
+        (T, THETA.set_axis(THETA.index + 1), r"different indices \(row 0: 0 and 1\)"),
+        (T[:1], THETA[:1], "1 complete rows of 1 samples"),
+        (T, None, "requires y to be passed"),
+        (T.mask(T["T1"] > -10), THETA, "constant|1 complete rows of 60"),
+    ],
+)
+def test_mapper_names_what_is_wrong(X, y, message):
+    with pytest.raises(ValueError, match=message):
+        TemperatureMapper(LinearRegression()).fit(X, y)
+
+
+def test_seeds_reach_parts_without_one_and_leave_the_others():
+    own = TemperatureMapper(MLPRegressor(hidden_layer_sizes=(4,), random_state=7, max_iter=5), random_state=0)
+    none = TemperatureMapper(MLPRegressor(hidden_layer_sizes=(4,), max_iter=5), random_state=0)
+    with pytest.warns(UserWarning, match="Maximum iterations"):
+        assert own.fit(T, THETA).regressor_.random_state == 7
+        first, second = none.fit(T, THETA).regressor_.random_state, none.fit(T, THETA).regressor_.random_state
+    assert isinstance(first, int)
+    assert first == second
+
+
+@pytest.mark.parametrize("table", [1, 4, 6])
+def test_paper_networks(table):
+    network = paper_network(table, max_iter=3)
+    assert network.max_iter == 3
+    assert not network.early_stopping
+    with pytest.warns(UserWarning, match="Maximum iterations"):
+        assert TemperatureMapper(network, random_state=0).fit(T, THETA).predict(T).shape == (60, 2)
+    with pytest.raises(ValueError, match="table is 2; expected one of"):
+        paper_network(2)
