@@ -22,6 +22,4 @@ def import_optional(module: str, *, extra: str) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        raise ImportError(
-            f"{module!r} is not installed; get it with: pip install \"skthermo[{extra}]\""
-        ) from error
+        raise ImportError(f'{module!r} is not installed; get it with: pip install "skthermo[{extra}]"') from error

@@ -19,6 +19,7 @@ __all__ = [
     "_check_feature_names_in",
     "_fit_context",
     "_num_samples",
+    "as_columns",
     "check_array",
     "check_is_fitted",
     "check_columns",
@@ -40,6 +41,12 @@ def is_model(candidate: Any) -> bool:
 def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
     """Values as a frame with X's index where X is a frame, else as they are."""
     return pd.DataFrame(values, index=X.index, columns=list(columns)) if isinstance(X, pd.DataFrame) else values
+
+
+def as_columns(values: ArrayLike) -> NDArray[np.float64]:
+    """A table of floats; a vector becomes its only column."""
+    array = np.asarray(values, dtype=float)
+    return array[:, np.newaxis] if array.ndim == 1 else array
 
 
 def column_names(X: Any, default: str) -> list[str]:
@@ -84,9 +91,9 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     indices = [getattr(table, "index", None) for table in (X, y)]
     if all(isinstance(index, pd.Index) for index in indices) and not indices[0].equals(indices[1]):
         differing = [i for i, (a, b) in enumerate(zip(*indices, strict=True)) if a != b]
-        where = f"row {differing[0]}: {indices[0][differing[0]]} and {indices[1][differing[0]]}" if differing else (
-            f"{indices[0].dtype} and {indices[1].dtype}"
-        )
+        where = f"{indices[0].dtype} and {indices[1].dtype}"
+        if differing:
+            where = f"row {differing[0]}: {indices[0][differing[0]]} and {indices[1][differing[0]]}"
         raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
 
 

@@ -81,9 +81,9 @@ class AffineModel:
     AffineModel(1 parameter, 2 degrees of freedom, 2 modes)
     >>> model.frequencies([[1.0], [0.5]]).round(3)
     array([[1.967, 5.15 ],
-           [1.723, 4.158]])
+           [1.723, 4.159]])
     >>> model.damaged({"k": 0.5}).frequencies([[1.0]]).round(3)
-    array([[1.723, 4.158]])
+    array([[1.723, 4.159]])
     """
 
     _joblib_prefer = "threads"  # LAPACK works outside Python's lock; nothing need be copied

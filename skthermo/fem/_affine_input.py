@@ -119,9 +119,7 @@ def count_modes(mass: Array, *, at_least: int) -> int:
     eigenvalues = np.linalg.eigvalsh(mass)
     tolerance = 10 * len(mass) * np.finfo(float).eps * abs(eigenvalues[-1])
     if eigenvalues[0] < -tolerance:
-        raise ValueError(
-            f"the nominal mass has the negative eigenvalue {eigenvalues[0]:.3g}; expected none below zero"
-        )
+        raise ValueError(f"the nominal mass has the negative eigenvalue {eigenvalues[0]:.3g}; expected none below zero")
     count = int((eigenvalues > tolerance).sum())
     if count < at_least:
         raise ValueError(

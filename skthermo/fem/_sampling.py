@@ -48,9 +48,7 @@ def check_bounds(bounds: ArrayLike, parameter_names: tuple[str, ...]) -> Array:
         )
     for name, (lowest, highest) in zip(parameter_names, array, strict=True):
         if not 0 < lowest < highest < np.inf:
-            raise ValueError(
-                f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest"
-            )
+            raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
     return array
 
 

@@ -55,7 +55,7 @@ class Structure:
     ...     groups={"rafters": ["rafter 1", "rafter 2"], "post": ["post"]})
     >>> model = structure.assemble(["rafters", "post"], n_modes=2)
     >>> model.frequencies([[1.0, 1.0]]).round(2)
-    array([[127.57, 142.43]])
+    array([[ 93.94, 186.36]])
     """
 
     def __init__(

@@ -33,9 +33,7 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.
     """
     names = list(parameter_names)
     if hasattr(theta, "columns") and list(theta.columns) != names:
-        raise ValueError(
-            f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order"
-        )
+        raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
     values = np.asarray(theta, dtype=float)
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):

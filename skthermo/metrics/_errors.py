@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
-from skthermo._validation import check_same_rows, column_names
+from skthermo._validation import as_columns, check_same_rows, column_names
 
 AVERAGE = "Average"
 
@@ -43,9 +43,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     return 100 * pd.DataFrame(np.abs((measured - predicted) / measured)).mean().to_numpy()
 
 
-def error_table(
-    y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None
-) -> pd.DataFrame:
+def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None) -> pd.DataFrame:
     """MAPE of every scenario and mode, with averages, as in Table 2 of the paper.
 
     Parameters
@@ -124,8 +122,9 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     >>> from sklearn.dummy import DummyRegressor
     >>> from skthermo.metrics import frequency_scorer
     >>> T, F = np.zeros((4, 1)), np.array([[1.0], [3.0], [2.0], [2.0]])
-    >>> frequency_scorer(DummyRegressor().fit(T, F), T, [[2.5], [2.5], [2.0], [np.nan]])
-    {'neg_mape': -13.333333333333334, 'r2': -2.0, 'share_scored': 0.75}
+    >>> scores = frequency_scorer(DummyRegressor().fit(T, F), T, [[2.5], [1.6], [2.0], [np.nan]])
+    >>> {name: round(score, 2) for name, score in scores.items()}
+    {'neg_mape': -15.0, 'r2': -0.01, 'share_scored': 0.75}
     """
     measured, predicted = _paired(y, estimator.predict(X))
     complete = _complete(measured, predicted)
@@ -137,8 +136,8 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
 
 
 def _paired(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    measured, predicted = np.asarray(y_true, dtype=float), np.asarray(y_pred, dtype=float)
-    if measured.ndim != 2 or measured.shape != predicted.shape:
+    measured, predicted = (as_columns(values) for values in (y_true, y_pred))
+    if measured.shape != predicted.shape:
         raise ValueError(
             f"y_true has shape {measured.shape} and y_pred {predicted.shape}; expected the same (n_samples, n_modes)"
         )

@@ -137,9 +137,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         return like(X, F - self.reference_ + self.mean_, self.get_feature_names_out())
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(
-            self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan"
-        )
+        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
     def _read_reference(self, n_modes: int) -> NDArray[np.float64]:
         if self.reference is None:

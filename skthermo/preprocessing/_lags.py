@@ -188,9 +188,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         return np.array([f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_], dtype=object)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(
-            self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan"
-        )
+        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
     def _consecutive(self, n_rows: int) -> list[NDArray[np.intp]]:
         first = 0 if self.padding == "edge" else MISSING

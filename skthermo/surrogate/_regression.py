@@ -12,6 +12,7 @@ from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 from skthermo._threads import single_blas_thread
 from skthermo._validation import (
+    as_columns,
     check_array,
     check_is_fitted,
     check_same_rows,
@@ -69,7 +70,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         """
         if sample_weight is not None:
             raise ValueError("sample_weight is not supported; expected None")
-        return complete_r2(_as_columns(y), _as_columns(self.predict(X)))
+        return complete_r2(as_columns(y), as_columns(self.predict(X)))
 
     def _learn(self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
@@ -99,7 +100,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         check_same_rows(X, y, names)
         self._y_is_vector = targets.ndim == 1
         self._parameter_names = column_names(y, "") if isinstance(y, pd.DataFrame) else None
-        return inputs, _as_columns(targets)
+        return inputs, as_columns(targets)
 
     def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
@@ -107,7 +108,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self._n_parameters), np.nan)
         if complete.any():
-            theta[complete] = _as_columns(self._regression.predict(inputs[complete]))
+            theta[complete] = as_columns(self._regression.predict(inputs[complete]))
         return theta
 
     def __sklearn_clone__(self) -> "MultiplierRegressor":
@@ -128,8 +129,3 @@ def standardised_regression(regressor: BaseEstimator, *, log: bool) -> Transform
         transformer=make_pipeline(logarithm, StandardScaler()),
         check_inverse=False,
     )
-
-
-def _as_columns(values: Any) -> NDArray[np.float64]:
-    array = np.asarray(values, dtype=float)
-    return array.reshape(len(array), -1)

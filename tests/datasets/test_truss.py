@@ -55,9 +55,7 @@ def test_one_seed_gives_one_weather_whatever_the_damage():
     healthy, damaged = (make_truss_campaign(damage=d, random_state=4) for d in (None, {"bottom": 0.5}))
     pd.testing.assert_frame_equal(healthy.temperatures, damaged.temperatures)
     pd.testing.assert_frame_equal(healthy.frequencies, make_truss_campaign(random_state=4).frequencies)
-    np.testing.assert_array_equal(
-        make_truss_campaign(noise=0, random_state=4).frequencies, healthy.clean_frequencies
-    )
+    np.testing.assert_array_equal(make_truss_campaign(noise=0, random_state=4).frequencies, healthy.clean_frequencies)
     assert not np.array_equal(add_noise(healthy.clean_frequencies, 0.01), healthy.frequencies)
 
 

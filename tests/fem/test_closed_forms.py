@@ -69,9 +69,7 @@ def test_king_post_truss_moves_up_and_down_on_its_rafters_and_post():
     post = E * A / height
     ties = 2 * E * A / half_span
     expected = np.sqrt(np.sort([1 / (1 / rafters + 1 / post), ties]) / mass) / (2 * np.pi)
-    np.testing.assert_allclose(
-        structure.assemble(["all"], n_modes=2).frequencies(NOMINAL)[0], expected, rtol=1e-12
-    )
+    np.testing.assert_allclose(structure.assemble(["all"], n_modes=2).frequencies(NOMINAL)[0], expected, rtol=1e-12)
 
 
 def test_spring_in_three_dimensions():

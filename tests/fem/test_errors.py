@@ -48,7 +48,7 @@ def test_structure_names_what_is_wrong(changes, message):
 def test_mechanism_names_the_node_that_moves():
     unbraced = {"a": (0, 0), "b": (3, 0), "c": (0, 2), "d": (3, 2)}
     bars = {name: Bar(*name, **STEEL) for name in ("ac", "cd", "bd")}
-    with pytest.raises(ValueError, match=r"mechanism: node 'c' along x, node 'd' along x can move|node 'd' along x, node 'c'"):
+    with pytest.raises(ValueError, match=r"mechanism: node '[cd]' along x, node '[cd]' along x can move"):
         Structure(unbraced, bars, {"a": "xy", "b": "xy"}, {"all": list(bars)}).assemble(["all"], n_modes=2)
     with pytest.raises(ValueError, match="mechanism"):
         structure(supports={"a": "xy"}).assemble(["tie"], n_modes=1)

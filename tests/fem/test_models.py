@@ -90,7 +90,9 @@ def test_big_models_are_as_big_as_they_should_be_for_a_memory_map():
 def test_third_party_programs_run_row_by_row_or_all_at_once():
     rows = np.random.default_rng(0).uniform(0.8, 1.2, (300, 2))
     by_row = CallableModel(row_model, ["a", "b"], 2)
-    at_once = CallableModel(lambda theta: np.sqrt(theta @ [1.0, 2.0])[:, None] * [1.0, 2.0], ["a", "b"], 2, vectorized=True)
+    at_once = CallableModel(
+        lambda theta: np.sqrt(theta @ [1.0, 2.0])[:, None] * [1.0, 2.0], ["a", "b"], 2, vectorized=True
+    )
     np.testing.assert_allclose(by_row.frequencies(rows), at_once.frequencies(rows), rtol=1e-15)
     np.testing.assert_array_equal(
         sample(by_row, 0.2, 300, n_jobs=2, random_state=1).frequencies,

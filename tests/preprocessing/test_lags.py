@@ -77,7 +77,9 @@ def test_shuffled_rows_come_back_in_their_own_order():
 
 def test_gaps_are_bridged_up_to_the_tolerance():
     gappy = T.drop(T.index[10:14])
-    lags = {tolerance: LagFeatures(2, freq="1h", tolerance=tolerance).fit_transform(gappy) for tolerance in ("2h", "4h")}
+    lags = {
+        tolerance: LagFeatures(2, freq="1h", tolerance=tolerance).fit_transform(gappy) for tolerance in ("2h", "4h")
+    }
     after = T.index[14]
     assert np.isnan(lags["2h"].loc[after, "T1_lag1"])
     assert lags["4h"].loc[after, "T1_lag1"] == 9
