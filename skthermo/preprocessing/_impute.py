@@ -43,8 +43,9 @@ class KNNGapImputer(KNNImputer):
     >>> import pandas as pd
     >>> from skthermo.preprocessing import KNNGapImputer
     >>> F = pd.DataFrame({"f1": [4.0, 4.1, np.nan, 4.3], "f2": [5.0, 5.1, 5.1, 5.3]})
-    >>> KNNGapImputer(n_neighbors=1).fit_transform(F).loc[2, "f1"]
-    np.float64(4.1)
+    >>> KNNGapImputer(n_neighbors=1).fit_transform(F).loc[[2]]
+        f1   f2
+    2  4.1  5.1
     """
 
     def __init__(
