@@ -40,7 +40,9 @@ def is_model(candidate: Any) -> bool:
 
 def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
     """Values as a frame with X's index where X is a frame, else as they are."""
-    return pd.DataFrame(values, index=X.index, columns=list(columns)) if isinstance(X, pd.DataFrame) else values
+    if not isinstance(X, pd.DataFrame):
+        return values
+    return pd.DataFrame(values, index=X.index, columns=list(columns), copy=False)
 
 
 def as_columns(values: ArrayLike) -> NDArray[np.float64]:

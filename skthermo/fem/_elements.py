@@ -118,6 +118,12 @@ class Spring(_Sheet):
         "x", "y" or "z".
     k : float
         Stiffness in N/m.
+
+    Examples
+    --------
+    >>> from skthermo.fem import Spring
+    >>> Spring("abutment", "x", k=3e9).dofs(dimension=3)
+    [('abutment', 'x')]
     """
 
     node: Hashable
@@ -152,6 +158,12 @@ class PointMass(_Sheet):
         Name of its node.
     m : float
         Mass in kg.
+
+    Examples
+    --------
+    >>> from skthermo.fem import PointMass
+    >>> PointMass("deck", m=250.0).dofs(dimension=2)
+    [('deck', 'x'), ('deck', 'y')]
     """
 
     node: Hashable

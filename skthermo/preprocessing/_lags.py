@@ -161,14 +161,9 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
         if stamps is None:
-            sources = self._consecutive(len(values))
+            lagged = self._by_row(values, self.lags_)
         else:
-            values, sources = self._by_time(stamps, values)
-        n_lags = len(self.lags_)
-        lagged = np.empty((len(sources[0]), values.shape[1] * n_lags), dtype=values.dtype, order="F")
-        for k, source in enumerate(sources):
-            lagged[:, k::n_lags] = values[source]
-            lagged[source == MISSING, k::n_lags] = np.nan
+            lagged = self._by_time(stamps, values)
         return like(X, lagged, self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -190,17 +185,24 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
-    def _consecutive(self, n_rows: int) -> list[NDArray[np.intp]]:
-        first = 0 if self.padding == "edge" else MISSING
-        rows = np.arange(n_rows)
-        return [np.where(rows >= lag, rows - lag, first) for lag in self.lags_]
+    def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
+        n_rows, sensors = len(values), np.ascontiguousarray(values.T)
+        lagged = np.empty((len(sensors), len(lags), n_rows), dtype=values.dtype)
+        for k, lag in enumerate(lags):
+            before = min(lag, n_rows)
+            lagged[:, k, before:] = sensors[:, : n_rows - before]
+            lagged[:, k, :before] = sensors[:, :1] if self.padding == "edge" else np.nan
+        return lagged.reshape(-1, n_rows).T
 
-    def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> tuple[NDArray, list[NDArray[np.intp]]]:
+    def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> NDArray:
         old_stamps, old_values = self._history
         if (old_stamps.tz is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {stamps.tz}; expected {old_stamps.tz}, as in fit")
         own = stamps.as_unit("ns").asi8
         old = old_stamps.as_unit("ns").asi8
+        rows_per_lag = _even_rows(own, self.freq_.value)
+        if rows_per_lag and np.array_equal(own, old):
+            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_])
         earlier = ~np.isin(old, own)
         known = np.concatenate([old[earlier], own])
         order = np.argsort(known)
@@ -213,12 +215,30 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             before = at < 0
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        return np.concatenate([old_values[earlier], values]), sources
+        return _gather(np.concatenate([old_values[earlier], values]), sources)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def _gather(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
+    """Rows of values by lag, one block of columns for each sensor; column by column, as memory lies."""
+    sensors = np.ascontiguousarray(values.T)
+    lagged = np.empty((len(sensors), len(sources), len(sources[0])), dtype=values.dtype)
+    for k, source in enumerate(sources):
+        for sensor, column in zip(sensors, lagged[:, k], strict=True):
+            np.take(sensor, source, out=column, mode="clip")
+        lagged[:, k, source == MISSING] = np.nan
+    return lagged.reshape(-1, len(sources[0])).T
+
+
+def _even_rows(stamps: NDArray[np.int64], step: int) -> int | None:
+    """How many rows a step spans, where stamps ascend evenly and it spans whole ones."""
+    steps = np.diff(stamps)
+    even = steps.size and steps[0] > 0 and step % steps[0] == 0 and (steps == steps[0]).all()
+    return int(step // steps[0]) if even else None
 
 
 def _read_lags(lags: Any) -> list[int]:

@@ -227,7 +227,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         noisy = add_noise(frequencies, noise, random_state=random_state)
         return like(X, noisy, self._mode_names)
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: None = None) -> float:
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
 
         Parameters
@@ -236,8 +236,6 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             Temperatures in degrees Celsius.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz.
-        sample_weight : None
-            Not supported; present for scikit-learn's signature.
 
         Returns
         -------
@@ -245,8 +243,6 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             NaN if fewer than two rows are complete; `skthermo.metrics.frequency_scorer`
             also reports the share of rows scored.
         """
-        if sample_weight is not None:
-            raise ValueError("sample_weight is not supported; expected None")
         check_same_rows(X, y, ("temperatures", "frequencies"))
         return complete_r2(y, self.predict(X))
 

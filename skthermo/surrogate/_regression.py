@@ -51,7 +51,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             return theta[:, 0]
         return theta if self._parameter_names is None else like(X, theta, self._parameter_names)
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: None = None) -> float:
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.
 
         Parameters
@@ -60,16 +60,12 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             Inputs.
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers.
-        sample_weight : None
-            Not supported; present for scikit-learn's signature.
 
         Returns
         -------
         float
             NaN if fewer than two rows are complete.
         """
-        if sample_weight is not None:
-            raise ValueError("sample_weight is not supported; expected None")
         return complete_r2(as_columns(y), as_columns(self.predict(X)))
 
     def _learn(self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None) -> None:

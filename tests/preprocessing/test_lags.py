@@ -56,6 +56,14 @@ def test_a_regular_index_gives_the_same_as_rows():
     assert list(by_time.columns) == [f"{s}_lag{k}" for s in ("T1", "T2") for k in range(5)]
 
 
+@pytest.mark.parametrize("freq", ["1h", "2h", "90min"])
+@pytest.mark.parametrize("padding", ["edge", "nan"])
+def test_even_records_take_a_short_way_to_the_same_values(freq, padding):
+    """Without its last row the frame is another than in fit, and goes the long way."""
+    lags = LagFeatures([0, 1, 3], freq=freq, padding=padding).fit(T)
+    pd.testing.assert_frame_equal(lags.transform(T).iloc[:-1], lags.transform(T.iloc[:-1]), check_freq=False)
+
+
 def test_records_of_fit_are_the_history_of_transform():
     lags = LagFeatures(3, freq="1h").fit(T.iloc[:20])
     np.testing.assert_array_equal(lags.transform(T.iloc[20:])[["T1_lag0", "T1_lag1", "T1_lag2"]].iloc[0], [20, 19, 18])

@@ -1,0 +1,72 @@
+"""Batched modal analysis of the truss against a loop over samples.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/modal_analysis.py
+
+Medians of several rounds in one run; the loops and the one-thread batch have one BLAS thread. Peak
+memory is what one call allocates beyond its input.
+"""
+
+import argparse
+import os
+import statistics
+import time
+import tracemalloc
+
+import scipy.linalg
+from threadpoolctl import threadpool_limits
+
+from skthermo.datasets import make_truss
+from skthermo.fem import sample
+
+
+def loop(model, theta, **options):
+    """One assembly and one scipy.linalg.eigh for each sample."""
+    terms, mass = model._stiffness, model.matrices(theta[:1])[1][0]
+    for coefficients in terms.coefficients(theta):
+        stiffness = sum(c * matrix for c, matrix in zip(coefficients, terms.matrices, strict=True))
+        scipy.linalg.eigh(stiffness, mass, **options)
+
+
+def peak_megabytes(function):
+    tracemalloc.start()
+    function()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    model = make_truss()
+    theta = sample(model, 0.2, options.samples, random_state=0).theta
+    ways = {
+        "batch, one thread": lambda: model.frequencies(theta),
+        "sample, n_jobs=2": lambda: sample(model, 0.2, options.samples, n_jobs=2, random_state=0),
+        "loop, eigh(K, M)": lambda: loop(model, theta),
+        "loop, eigh(K, M, eigvals_only=True)": lambda: loop(model, theta, eigvals_only=True),
+        "loop, eigh(K, M, eigvals_only=True, subset_by_index=[0, 5])": lambda: loop(
+            model, theta, eigvals_only=True, subset_by_index=[0, 5]
+        ),
+    }
+    seconds = {name: [] for name in ways}
+    with threadpool_limits(1):
+        for _ in range(options.rounds):
+            for name, way in ways.items():
+                start = time.perf_counter()
+                way()
+                seconds[name].append(time.perf_counter() - start)
+    medians = {name: statistics.median(values) for name, values in seconds.items()}
+    batch = medians["batch, one thread"]
+    print(f"{options.samples} truss solves, {os.cpu_count()} cores, median of {options.rounds} rounds")
+    print(f"{'':60s} seconds   over batch   peak MB")
+    for name, median in medians.items():
+        memory = peak_megabytes(ways[name])
+        print(f"{name:60s} {median:7.3f}   {median / batch:10.2f}   {memory:7.1f}")
+    print(f"{'fastest loop over n_jobs=2':60s} {'':7s}   {min(list(medians.values())[2:]) / medians['sample, n_jobs=2']:10.2f}")
+
+
+if __name__ == "__main__":
+    main()
