@@ -119,17 +119,20 @@ class Study:
 
     def rates(self, indices):
         """PFA and POD by scenario and source (Table 3), in percent."""
-        return 100 * pd.DataFrame(
-            {
-                scenario: {
-                    name: (probability_of_false_alarm if scenario == HEALTHY else probability_of_detection)(
-                        index, self.detector.threshold_
-                    )
-                    for name, index in by_source.items()
+        return (
+            100
+            * pd.DataFrame(
+                {
+                    scenario: {
+                        name: (probability_of_false_alarm if scenario == HEALTHY else probability_of_detection)(
+                            index, self.detector.threshold_
+                        )
+                        for name, index in by_source.items()
+                    }
+                    for scenario, by_source in indices.items()
                 }
-                for scenario, by_source in indices.items()
-            }
-        ).T
+            ).T
+        )
 
 
 def frame_of(values, like):

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from threading import Lock
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController  # installed with scikit-learn, which requires it
 
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 _lock = Lock()
 _depth = 0
-_limits = None
+_limits: Any = None
 
 
 @cache

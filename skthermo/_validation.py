@@ -90,13 +90,14 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
         raise ValueError(
             f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
         )
-    indices = [getattr(table, "index", None) for table in (X, y)]
-    if all(isinstance(index, pd.Index) for index in indices) and not indices[0].equals(indices[1]):
-        differing = [i for i, (a, b) in enumerate(zip(*indices, strict=True)) if a != b]
-        where = f"{indices[0].dtype} and {indices[1].dtype}"
-        if differing:
-            where = f"row {differing[0]}: {indices[0][differing[0]]} and {indices[1][differing[0]]}"
-        raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
+    if not isinstance(X, pd.DataFrame) or not isinstance(y, pd.DataFrame | pd.Series) or X.index.equals(y.index):
+        return
+    where = f"{X.index.dtype} and {y.index.dtype}"
+    for row, (left, right) in enumerate(zip(X.index, y.index, strict=True)):
+        if left != right:
+            where = f"row {row}: {left} and {right}"
+            break
+    raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
 
 
 def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState) -> None:

@@ -60,8 +60,10 @@ ELEMENT_METHODS = ("dofs", "stiffness", "mass")
 def is_contract_of_a_protocol(name):
     """Methods whose parameters a protocol documents once, for every class that follows it."""
     owner, _, method = name.rpartition(".")
-    return owner in PROTOCOLS or name in PROTOCOLS or (
-        owner.rsplit(".", 1)[-1] in ("Bar", "Spring", "PointMass") and method in ELEMENT_METHODS
+    return (
+        owner in PROTOCOLS
+        or name in PROTOCOLS
+        or (owner.rsplit(".", 1)[-1] in ("Bar", "Spring", "PointMass") and method in ELEMENT_METHODS)
     )
 
 
@@ -75,9 +77,7 @@ def test_documented_parameters_are_the_signatures(name, function, documented):
         for p in inspect.signature(function).parameters.values()
         if p.name not in ("self", "cls")
     ]
-    documented_names = [
-        part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")
-    ]
+    documented_names = [part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")]
     assert documented_names == expected
 
 

@@ -4,7 +4,7 @@ from skthermo.fem._affine import AffineModel
 from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._noise import add_noise
-from skthermo.fem._protocol import DamageableModel, FEModel
+from skthermo.fem._protocol import FEModel
 from skthermo.fem._sampling import sample
 from skthermo.fem._structure import Structure
 from skthermo.fem._tracking import mac
@@ -13,7 +13,6 @@ __all__ = [
     "AffineModel",
     "Bar",
     "CallableModel",
-    "DamageableModel",
     "FEModel",
     "PointMass",
     "Spring",

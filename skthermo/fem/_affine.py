@@ -113,7 +113,7 @@ class AffineModel:
         nominal_mass = self._mass.assemble(nominal)[0]
         self._n_candidates = min(2 * n_modes, count_modes(nominal_mass, at_least=n_modes))
         self._form = dense_form(self._stiffness, self._mass)
-        _, shapes = self._form.solve(nominal, n_modes, vectors=True)
+        _, shapes = self._form.modes(nominal, n_modes)
         self._reference = nominal_mass @ shapes[0]
         self._reference.flags.writeable = False
 
@@ -177,7 +177,8 @@ class AffineModel:
         shapes : ndarray of shape (n_samples, n_dof, n_modes)
             With unit modal mass; signs are arbitrary.
         """
-        return self._in_chunks(self._modes, theta)
+        frequencies, shapes = self._in_chunks(self._modes, theta)
+        return frequencies, shapes
 
     def jacobian(self, theta: ArrayLike) -> Array:
         """Exact derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi.
@@ -249,14 +250,13 @@ class AffineModel:
     def _frequencies(self, theta: Array) -> tuple[Array]:
         if self.track:
             return (self._modes(theta)[0],)
-        eigenvalues, _ = self._form.solve(theta, self.n_modes, vectors=False)
-        return (hertz(eigenvalues),)
+        return (hertz(self._form.eigenvalues(theta, self.n_modes)),)
 
     def _modes(self, theta: Array) -> tuple[Array, Array]:
         if not self.track:
-            eigenvalues, shapes = self._form.solve(theta, self.n_modes, vectors=True)
+            eigenvalues, shapes = self._form.modes(theta, self.n_modes)
             return hertz(eigenvalues), shapes
-        eigenvalues, shapes = self._form.solve(theta, self._n_candidates, vectors=True)
+        eigenvalues, shapes = self._form.modes(theta, self._n_candidates)
         order = pair_modes((self._reference.T @ shapes) ** 2)
         return (
             np.take_along_axis(hertz(eigenvalues), order, axis=1),

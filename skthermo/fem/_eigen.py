@@ -21,8 +21,11 @@ WIDEST_SPECTRUM = 1e6
 class EigenForm(Protocol):
     """What solves the eigenproblem for many theta at once."""
 
-    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
-        """Lowest eigenvalues (n_samples, n_modes), and shapes (n_samples, n_dof, n_modes)."""
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        """Lowest eigenvalues, (n_samples, n_modes)."""
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        """Lowest eigenvalues and their shapes, (n_samples, n_dof, n_modes)."""
 
     def scaled(self, factors: Array) -> "EigenForm":
         """The form of the same structure with its stiffness terms multiplied."""
@@ -44,11 +47,11 @@ class StandardForm:
         basis = scipy.linalg.solve_triangular(lower, np.eye(len(mass)), lower=True).T
         return cls(stiffness.congruent(basis), basis)
 
-    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
-        matrices = self._stiffness.assemble(theta)
-        if not vectors:
-            return np.linalg.eigvalsh(matrices)[:, :n_modes], None
-        eigenvalues, shapes = np.linalg.eigh(matrices)
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        return np.asarray(np.linalg.eigvalsh(self._stiffness.assemble(theta))[:, :n_modes], dtype=float)
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        eigenvalues, shapes = np.linalg.eigh(self._stiffness.assemble(theta))
         return eigenvalues[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
 
     def scaled(self, factors: Array) -> "StandardForm":
@@ -66,16 +69,20 @@ class FlexibilityForm:
         self._stiffness = stiffness
         self._mass = mass
 
-    def solve(self, theta: Array, n_modes: int, *, vectors: bool) -> tuple[Array, Array | None]:
-        inverse = np.linalg.inv(np.linalg.cholesky(self._stiffness.assemble(theta)))
-        transposed = inverse.swapaxes(1, 2)
-        flexibility = inverse @ self._mass.assemble(theta) @ transposed
-        if not vectors:
-            return 1 / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes], None
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        flexibility, _ = self._flexibility(theta)
+        return 1 / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes]
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        flexibility, back = self._flexibility(theta)
         inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
         eigenvalues = 1 / inverse_eigenvalues[:, ::-1][:, :n_modes]
-        shapes = transposed @ shapes[:, :, ::-1][:, :, :n_modes]
-        return eigenvalues, shapes * np.sqrt(eigenvalues)[:, np.newaxis]
+        return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
+
+    def _flexibility(self, theta: Array) -> tuple[Array, Array]:
+        inverse = np.linalg.inv(np.linalg.cholesky(self._stiffness.assemble(theta)))
+        transposed = inverse.swapaxes(1, 2)
+        return inverse @ self._mass.assemble(theta) @ transposed, transposed
 
     def scaled(self, factors: Array) -> "FlexibilityForm":
         return FlexibilityForm(self._stiffness.scaled(factors), self._mass)
@@ -89,8 +96,8 @@ def dense_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
         lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]]
         if lowest > len(matrix) * np.finfo(float).eps * highest:
             form = StandardForm.from_mass(stiffness, matrix)
-            eigenvalues, _ = form.solve(nominal, len(matrix), vectors=False)
-            if eigenvalues[0, -1] < WIDEST_SPECTRUM * eigenvalues[0, 0]:
+            eigenvalues = form.eigenvalues(nominal, len(matrix))[0]
+            if eigenvalues[-1] < WIDEST_SPECTRUM * eigenvalues[0]:
                 return form
     return FlexibilityForm(stiffness, mass)
 

@@ -23,7 +23,9 @@ TRANSLATIONS = "xyz"
 class Element(Protocol):
     """What `Structure` assembles."""
 
-    nodes: tuple[Hashable, ...]
+    @property
+    def nodes(self) -> tuple[Hashable, ...]:
+        """Names of its nodes."""
 
     def dofs(self, dimension: int) -> list[Dof]:
         """(node, direction) of every row of the matrices."""

@@ -16,7 +16,7 @@ def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     array = np.asarray(noise, dtype=float)
     if array.shape not in ((), (n_modes,)) or not (np.isfinite(array) & (array >= 0)).all():
         raise ValueError(
-            f"noise is {noise}; expected a relative standard deviation (0.01 means 1 %), "
+            f"noise is {array}; expected a relative standard deviation (0.01 means 1 %), "
             f"a number or one for each of the {n_modes} modes, none negative"
         )
     return np.broadcast_to(array, (n_modes,))

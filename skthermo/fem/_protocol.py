@@ -31,15 +31,27 @@ class FEModel(Protocol):
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.
     """
 
-    parameter_names: tuple[str, ...]
-    n_modes: int
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Columns of theta."""
+
+    @property
+    def n_modes(self) -> int:
+        """Columns of the frequencies."""
 
     def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:
         """Natural frequencies in Hz, (n_samples, n_modes), of theta (n_samples, n_parameters)."""
 
 
+class ModalModel(FEModel, Protocol):
+    """An FE model that gives mode shapes."""
+
+    def modes(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Frequencies, and shapes (n_samples, n_dof, n_modes) of unit modal mass."""
+
+
 class DamageableModel(FEModel, Protocol):
     """An FE model that damage can be put into."""
 
-    def damaged(self, damage: Mapping[str, float]) -> "FEModel":
+    def damaged(self, damage: Mapping[str, float]) -> FEModel:
         """The model with each group's stiffness times (1 - severity)."""

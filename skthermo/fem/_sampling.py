@@ -39,7 +39,7 @@ def check_bounds(bounds: ArrayLike, parameter_names: tuple[str, ...]) -> Array:
     array = np.asarray(bounds, dtype=float)
     if array.ndim == 0:
         if not 0 < array < 1:
-            raise ValueError(f"bounds is {bounds}; expected a half-width between 0 and 1, such as 0.3")
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
         return np.tile([1 - array, 1 + array], (len(parameter_names), 1))
     if array.shape != (len(parameter_names), 2):
         raise ValueError(

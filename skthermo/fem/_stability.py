@@ -23,7 +23,7 @@ def check_supported(stiffness: NDArray[np.float64], names: Sequence[str]) -> Non
     """
     diagonal = stiffness.diagonal()
     if (diagonal <= 0).any():
-        _refuse([names[i] for i in np.flatnonzero(diagonal <= 0)])
+        _refuse([name for name, stiff in zip(names, diagonal, strict=True) if stiff <= 0])
     scale = 1 / np.sqrt(diagonal)
     eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
     if eigenvalues[0] <= 10 * len(stiffness) * np.finfo(float).eps:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 if TYPE_CHECKING:
-    from skthermo.fem._protocol import FEModel
+    from skthermo.fem._protocol import ModalModel
 
 
 def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ def pair_modes(likeness: NDArray[np.float64]) -> NDArray[np.intp]:
     return best
 
 
-def share_reordered(model: "FEModel", theta: NDArray[np.float64]) -> float:
+def share_reordered(model: "ModalModel", theta: NDArray[np.float64]) -> float:
     """Share of the rows of theta at which the model's modes change their nominal order."""
     nominal = model.modes(np.ones((1, theta.shape[1])))[1][0]
     likeness = np.stack([mac(nominal, shapes) for shapes in model.modes(theta)[1]])

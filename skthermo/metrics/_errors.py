@@ -146,4 +146,4 @@ def _paired(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[NDArray[np.float64], 
 
 
 def _complete(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return ~(np.isnan(measured) | np.isnan(predicted)).any(axis=1)
+    return np.asarray(~np.isnan(measured + predicted).any(axis=1))

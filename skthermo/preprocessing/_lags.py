@@ -160,10 +160,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
-        if stamps is None:
-            lagged = self._by_row(values, self.lags_)
-        else:
-            lagged = self._by_time(stamps, values)
+        lagged = self._by_row(values, self.lags_) if stamps is None else self._by_time(stamps, values)
         return like(X, lagged, self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:

@@ -1,7 +1,7 @@
 """The whole chain: temperatures and frequencies in, a thermal FE model out."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -31,7 +31,7 @@ from skthermo.metrics._errors import complete_r2
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 
-Table = NDArray[np.float64] | pd.DataFrame
+Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
 class DataInformedFEM(RegressorMixin, BaseEstimator):

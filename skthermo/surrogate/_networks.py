@@ -19,7 +19,7 @@ def default_network() -> MLPRegressor:
     that is summed over them: with several outputs its line search fails.
     """
     return MLPRegressor(
-        hidden_layer_sizes=(64,), alpha=0.5, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
+        hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
     )
 
 

@@ -1,0 +1,78 @@
+"""The truss study with few seeds, to the numbers that the benchmark reaches with many."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib").use("Agg")
+
+ROOT = Path(__file__).parents[2]
+
+
+def load(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+BENCHMARK = load(ROOT / "tests" / "benchmarks" / "truss_tables.py")
+STUDY = BENCHMARK.load_study()
+
+
+@pytest.fixture(scope="module")
+def tables():
+    return STUDY.run(range(5))
+
+
+def test_tables_2_and_3(tables):
+    table_2, table_3, pfa, distance = BENCHMARK.summary(STUDY, *tables).values()
+    assert table_2 <= 1.25
+    assert table_3 <= 1.8
+    assert pfa <= 5
+    assert distance <= 2
+
+
+def test_oracle_bounds_what_is_learned(tables):
+    mapes, rates = tables
+    mean = mapes.groupby("source").mean().mean(axis=1)
+    assert 1.128 < mean["oracle"] < mean["informed"]
+    gaps = rates.sub(rates["thermo"], axis=0).abs().mean()
+    assert gaps["oracle"] < gaps["informed"]
+
+
+def test_minimum_detectable_damage_is_the_same_for_simulated_weather(tables):
+    assert STUDY.detectable(tables[1], "informed") == STUDY.detectable(tables[1], "thermo")
+    assert STUDY.detectable(tables[1], "thermo") == {"SB": 20, "ST": 30, "SD": 20}
+
+
+def test_oracle_recovers_parameters_that_exist():
+    model = STUDY.make_truss()
+    theta = np.array([[0.9, 1.1, 1.05, 1.0], [1.2, 0.9, 0.95, 1.0]])
+    fitted = STUDY.best_theta(model, model.frequencies(theta), steps=60)
+    np.testing.assert_allclose(fitted[:, :3], theta[:, :3], rtol=0.01)
+
+
+def test_figures_are_drawn(tmp_path):
+    paths = STUDY.draw(seed=0, folder=tmp_path / "figures")
+    assert [path.name for path in paths] == [
+        "fig04_baseline.png",
+        "fig06_parameters.png",
+        "fig08_verification.png",
+        "fig09_damage_index.png",
+        "fig10_bottom_family.png",
+    ]
+    assert all(path.stat().st_size > 10_000 for path in paths)
+
+
+def test_grid_search_example_has_gappy_weather_that_follows_the_air(monkeypatch):
+    example = load(ROOT / "examples" / "plot_grid_search.py")
+    T, F = example.monitoring(n_days=10)
+    assert T.index.equals(F.index)
+    assert len(T) == 240
+    lagged = T["T1"].ewm(halflife=8).mean()
+    assert abs(np.corrcoef(F["f1"], lagged)[0, 1]) > abs(np.corrcoef(F["f1"], T["T1"])[0, 1])
+    assert "matplotlib" in sys.modules
