@@ -237,7 +237,7 @@ def plot_parameters(study):
         ax.set(title=f"{name} members", ylabel="modulus (GPa)")
     for ax in axes[1]:
         ax.set_xlabel("day")
-    axes[0, 0].legend(loc="upper center")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, markerscale=3)
     return fig
 
 

@@ -17,7 +17,7 @@ from skthermo.fem._affine_input import (
 )
 from skthermo.fem._eigen import dense_form, hertz
 from skthermo.fem._stability import check_supported
-from skthermo.fem._terms import AffineTerms, rows_per_chunk
+from skthermo.fem._terms import CHUNK_BYTES, ROWS_PER_CHUNK, AffineTerms
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem._tracking import pair_modes
 
@@ -50,6 +50,8 @@ class AffineModel:
     track : bool, default=False
         True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
         swap. False: column j is the j-th lowest mode.
+    dof_names : sequence of str, optional
+        What degrees of freedom are called in errors.
 
     Attributes
     ----------
@@ -86,8 +88,6 @@ class AffineModel:
     array([[1.723, 4.159]])
     """
 
-    _joblib_prefer = "threads"  # LAPACK works outside Python's lock; nothing need be copied
-
     def __init__(
         self,
         stiffness: Terms,
@@ -97,6 +97,7 @@ class AffineModel:
         parameter_names: Sequence[str] | None = None,
         groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
         track: bool = False,
+        dof_names: Sequence[str] | None = None,
     ):
         stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=len(stiffness_matrices[0]))
@@ -108,14 +109,14 @@ class AffineModel:
         self._n_modes = n_modes
 
         nominal = nominal_theta(len(self._parameter_names))
-        dofs = [f"degree of freedom {i}" for i in range(self.n_dof)]
+        dofs = dof_names or [f"degree of freedom {i}" for i in range(self.n_dof)]
         check_supported(self._stiffness.assemble(nominal)[0], dofs)
-        nominal_mass = self._mass.assemble(nominal)[0]
-        self._n_candidates = min(2 * n_modes, count_modes(nominal_mass, at_least=n_modes))
+        self._nominal_mass = self._mass.assemble(nominal)[0]
+        self._n_candidates = min(2 * n_modes, count_modes(self._nominal_mass, at_least=n_modes))
         self._form = dense_form(self._stiffness, self._mass)
-        _, shapes = self._form.modes(nominal, n_modes)
-        self._reference = nominal_mass @ shapes[0]
-        self._reference.flags.writeable = False
+        self._nominal_shapes = self._form.modes(nominal, n_modes)[1][0]
+        for array in (self._nominal_mass, self._nominal_shapes):
+            array.flags.writeable = False
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -136,6 +137,11 @@ class AffineModel:
     def track(self) -> bool:
         """Whether a column follows its mode rather than its rank."""
         return self._track
+
+    @property
+    def rows_per_chunk(self) -> int:
+        """How many samples are solved at once, so that memory stays bounded."""
+        return max(1, min(ROWS_PER_CHUNK, CHUNK_BYTES // (8 * self.n_dof**2)))
 
     @property
     def groups(self) -> dict[str, tuple[int, ...]]:
@@ -195,6 +201,22 @@ class AffineModel:
             d f / d theta in Hz.
         """
         return self._in_chunks(self._jacobian, theta)[0]
+
+    def likeness(self, shapes: Array) -> Array:
+        """Mass-weighted MAC of shapes with the healthy nominal modes.
+
+        Parameters
+        ----------
+        shapes : ndarray of shape (n_samples, n_dof, n_candidates)
+            Mode shapes, of any scale.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_candidates)
+            Between 0 and 1.
+        """
+        weighted = self._nominal_mass @ shapes
+        return (self._nominal_shapes.T @ weighted) ** 2 / np.einsum("sim,sim->sm", shapes, weighted)[:, np.newaxis]
 
     def matrices(self, theta: ArrayLike) -> tuple[Array, Array]:
         """Stiffness and mass.
@@ -257,7 +279,7 @@ class AffineModel:
             eigenvalues, shapes = self._form.modes(theta, self.n_modes)
             return hertz(eigenvalues), shapes
         eigenvalues, shapes = self._form.modes(theta, self._n_candidates)
-        order = pair_modes((self._reference.T @ shapes) ** 2)
+        order = pair_modes(self.likeness(shapes))
         return (
             np.take_along_axis(hertz(eigenvalues), order, axis=1),
             np.take_along_axis(shapes, order[:, np.newaxis], axis=2),
@@ -273,6 +295,6 @@ class AffineModel:
 
     def _in_chunks(self, solve, theta: ArrayLike) -> tuple[Array, ...]:
         rows = check_theta(theta, self.parameter_names)
-        size = rows_per_chunk(self.n_dof)
+        size = self.rows_per_chunk
         parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))

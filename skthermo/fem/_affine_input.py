@@ -86,7 +86,7 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
     found = {}
     for group, terms in groups.items():
         positions: set[int] = set()
-        for term in terms:
+        for term in [terms] if isinstance(terms, str) else terms:
             matches = [i for i, key in enumerate(keys) if term in (i, key) or (term,) == key]
             if not matches:
                 raise ValueError(f"group {group!r} names the term {term!r}; expected one of {list(keys)}")

@@ -51,10 +51,6 @@ class TermAssembler:
         terms = [(key, self._matrix(blocks)) for (key, _), blocks in self._entries.items()]
         return terms or [((), self._matrix([]))]
 
-    def total(self) -> scipy.sparse.csr_array:
-        """The sum of all terms."""
-        return self._matrix([block for blocks in self._entries.values() for block in blocks])
-
     def positions(self, group: str) -> list[int]:
         """Positions among the terms of those that a damage group scales."""
         return [i for i, (_, damage) in enumerate(self._entries) if group in damage]

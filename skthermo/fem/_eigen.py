@@ -48,11 +48,12 @@ class StandardForm:
         return cls(stiffness.congruent(basis), basis)
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        return np.asarray(np.linalg.eigvalsh(self._stiffness.assemble(theta))[:, :n_modes], dtype=float)
+        eigenvalues = np.linalg.eigvalsh(self._stiffness.assemble(theta))
+        return _positive(eigenvalues[:, :n_modes], theta)
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
         eigenvalues, shapes = np.linalg.eigh(self._stiffness.assemble(theta))
-        return eigenvalues[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
+        return _positive(eigenvalues[:, :n_modes], theta), self._basis @ shapes[:, :, :n_modes]
 
     def scaled(self, factors: Array) -> "StandardForm":
         return StandardForm(self._stiffness.scaled(factors), self._basis)
@@ -80,12 +81,26 @@ class FlexibilityForm:
         return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
 
     def _flexibility(self, theta: Array) -> tuple[Array, Array]:
-        inverse = np.linalg.inv(np.linalg.cholesky(self._stiffness.assemble(theta)))
+        stiffness = self._stiffness.assemble(theta)
+        try:
+            inverse = np.linalg.inv(np.linalg.cholesky(stiffness))
+        except np.linalg.LinAlgError:
+            _positive(np.linalg.eigvalsh(stiffness), theta)
+            raise
         transposed = inverse.swapaxes(1, 2)
         return inverse @ self._mass.assemble(theta) @ transposed, transposed
 
     def scaled(self, factors: Array) -> "FlexibilityForm":
         return FlexibilityForm(self._stiffness.scaled(factors), self._mass)
+
+
+def _positive(eigenvalues: Array, theta: Array) -> Array:
+    if not (eigenvalues[:, :1] > 0).all():
+        row = theta[np.argmin(eigenvalues[:, 0])]
+        raise ValueError(
+            f"the stiffness at theta = {row.tolist()} is not positive definite; expected a stable structure"
+        )
+    return eigenvalues
 
 
 def dense_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:

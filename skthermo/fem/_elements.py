@@ -5,7 +5,7 @@ any of these properties can become a parameter.
 """
 
 from collections.abc import Hashable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import isfinite
 from numbers import Real
 from typing import Protocol
@@ -41,14 +41,14 @@ class Element(Protocol):
 
 
 class _Sheet:
-    """Names and values of an element's numeric fields."""
+    """Names and values of an element's physical properties."""
 
+    _properties: tuple[str, ...]
     _may_be_zero: tuple[str, ...] = ()
 
     def properties(self) -> Iterator[tuple[str, float, bool]]:
-        for field in fields(self):  # type: ignore[arg-type]
-            if field.type is float:
-                yield field.name, getattr(self, field.name), field.name in self._may_be_zero
+        for name in self._properties:
+            yield name, getattr(self, name), name in self._may_be_zero
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,7 @@ class Bar(_Sheet):
     density: float = 0.0
     lumped: bool = False
 
+    _properties = ("E", "A", "density")
     _may_be_zero = ("density",)
 
     @property
@@ -132,6 +133,8 @@ class Spring(_Sheet):
     direction: str
     k: float
 
+    _properties = ("k",)
+
     @property
     def nodes(self) -> tuple[Hashable]:
         """Its node."""
@@ -170,6 +173,8 @@ class PointMass(_Sheet):
 
     node: Hashable
     m: float
+
+    _properties = ("m",)
 
     @property
     def nodes(self) -> tuple[Hashable]:

@@ -58,5 +58,7 @@ def add_noise(
     array([0.  , 0.04])
     """
     clean = np.asarray(frequencies, dtype=float)
+    if clean.ndim != 2:
+        raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
     deviation = check_noise(noise, clean.shape[1])
     return clean * (1 + deviation * check_random_state(random_state).standard_normal(clean.shape))

@@ -1,6 +1,5 @@
 """What an FE model must offer."""
 
-from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -48,10 +47,3 @@ class ModalModel(FEModel, Protocol):
 
     def modes(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Frequencies, and shapes (n_samples, n_dof, n_modes) of unit modal mass."""
-
-
-class DamageableModel(FEModel, Protocol):
-    """An FE model that damage can be put into."""
-
-    def damaged(self, damage: Mapping[str, float]) -> FEModel:
-        """The model with each group's stiffness times (1 - severity)."""

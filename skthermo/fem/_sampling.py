@@ -9,8 +9,10 @@ from scipy.stats import qmc
 from sklearn.utils import Bunch, check_random_state
 
 from skthermo._threads import single_blas_thread
+from skthermo.fem._affine import AffineModel
 from skthermo.fem._protocol import FEModel
-from skthermo.fem._terms import rows_per_chunk
+from skthermo.fem._terms import ROWS_PER_CHUNK
+from skthermo.fem._theta import check_theta
 
 Array = NDArray[np.float64]
 RandomState = int | np.random.RandomState | None
@@ -105,17 +107,24 @@ def sample(
     return Bunch(theta=theta, frequencies=solve(model, theta, n_jobs=n_jobs))
 
 
-def solve(model: FEModel, theta: Array, *, n_jobs: int | None = None) -> Array:
-    """Frequencies (n_samples, n_modes) of many rows, in chunks; a row of theta with NaN gives NaN."""
-    frequencies = np.full((len(theta), model.n_modes), np.nan)
-    known = np.flatnonzero(~np.isnan(theta).any(axis=1))
-    if known.size and effective_n_jobs(n_jobs) == 1:
-        frequencies[known] = model.frequencies(theta[known])
-    elif known.size:
-        size = rows_per_chunk(getattr(model, "n_dof", 1))
-        chunks = [theta[known[i : i + size]] for i in range(0, len(known), size)]
-        parallel = Parallel(n_jobs=n_jobs, prefer=getattr(model, "_joblib_prefer", None))
-        frequencies[known] = np.concatenate(parallel(delayed(_solve_chunk)(model, c) for c in chunks))
+def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None) -> Array:
+    """Frequencies (n_samples, n_modes) of many rows; a row of theta with NaN gives NaN.
+
+    Rows are cut into the same chunks whatever ``n_jobs`` is, by `AffineModel` itself if one job is all.
+    """
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    frequencies = np.full((len(rows), model.n_modes), np.nan)
+    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    if not known.size:
+        return frequencies
+    if isinstance(model, AffineModel) and effective_n_jobs(n_jobs) == 1:
+        frequencies[known] = model.frequencies(rows[known])
+        return frequencies
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    chunks = [rows[known[i : i + size]] for i in range(0, len(known), size)]
+    prefer = "threads" if isinstance(model, AffineModel) else None  # LAPACK works outside Python's lock
+    solved = Parallel(n_jobs=n_jobs, prefer=prefer)(delayed(_solve_chunk)(model, chunk) for chunk in chunks)
+    frequencies[known] = np.concatenate(solved)
     return frequencies
 
 

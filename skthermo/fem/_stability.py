@@ -26,7 +26,7 @@ def check_supported(stiffness: NDArray[np.float64], names: Sequence[str]) -> Non
         _refuse([name for name, stiff in zip(names, diagonal, strict=True) if stiff <= 0])
     scale = 1 / np.sqrt(diagonal)
     eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
-    if eigenvalues[0] <= 10 * len(stiffness) * np.finfo(float).eps:
+    if eigenvalues[0] <= 50 * np.finfo(float).eps * eigenvalues[-1]:
         motion = np.abs(scale * vectors[:, 0])
         largest = np.argsort(-motion, kind="stable")
         _refuse([names[i] for i in largest if motion[i] > 0.5 * motion[largest[0]]])

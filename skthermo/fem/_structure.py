@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from skthermo.fem._affine import AffineModel
 from skthermo.fem._assembly import STIFFNESS, TermAssembler
 from skthermo.fem._elements import TRANSLATIONS, Dof, Element, check_element
-from skthermo.fem._stability import check_supported
 
 Array = NDArray[np.float64]
 Binding = tuple[str, str]
@@ -69,7 +68,9 @@ class Structure:
         self._members = dict(members)
         for name, element in self._members.items():
             check_element(name, element, self._coordinates)
-        self._groups = {group: frozenset(names) for group, names in (groups or {}).items()}
+        self._groups = {
+            group: frozenset([names] if isinstance(names, str) else names) for group, names in (groups or {}).items()
+        }
         self._check_groups()
         self.dofs = self._free_dofs(supports)
 
@@ -126,8 +127,6 @@ class Structure:
             stiffness.add(element.stiffness(coordinates), dofs, bound, damage)
             inertial = {p: prop for p, prop in bound.items() if prop != STIFFNESS}
             mass.add(element.mass(coordinates), dofs, inertial)
-        names = [f"node {node!r} along {direction}" for node, direction in self.dofs]
-        check_supported(stiffness.total().toarray(), names)
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
@@ -135,12 +134,15 @@ class Structure:
             parameter_names=tuple(bindings),
             groups={group: terms for group in damageable if (terms := stiffness.positions(group))},
             track=track,
+            dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
         )
 
     def _read_parameters(self, parameters) -> dict[str, Binding]:
         if isinstance(parameters, str):
             parameters = [parameters]
         if not isinstance(parameters, Mapping):
+            if len(set(parameters)) < len(parameters):
+                raise ValueError(f"parameters are {list(parameters)}; expected each group once")
             parameters = {group: group for group in parameters}
         bindings = {}
         for name, target in parameters.items():
@@ -180,18 +182,18 @@ class Structure:
         for node in self._coordinates:
             if node not in connected:
                 raise ValueError(f"node {node!r} is disconnected: no member ends there")
-        for node, fixed in supports.items():
+        fixed = set()
+        for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
-            for direction in fixed:
+            for direction in along:
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected {directions}")
-        return [
-            (node, direction)
-            for node in self._coordinates
-            for direction in directions
-            if (node, direction) in used and direction not in supports.get(node, ())
-        ]
+                fixed.add((node, direction))
+        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used - fixed]
+        if not free:
+            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
+        return free
 
     def __repr__(self) -> str:
         return (

@@ -1,11 +1,12 @@
 """Matrices that are affine in products of the parameters."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+ROWS_PER_CHUNK = 256
+CHUNK_BYTES = 2**25
 
 
 class AffineTerms:
@@ -65,8 +66,3 @@ class AffineTerms:
     def congruent(self, basis: Array) -> "AffineTerms":
         """Each matrix A_t as basis' A_t basis; the coefficients stay."""
         return AffineTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
-
-
-def rows_per_chunk(n_dof: int, *, chunk_bytes: int = 2**25, most: int = 256) -> int:
-    """How many samples of dense matrices are solved at once, so that memory stays bounded."""
-    return max(1, min(most, math.floor(chunk_bytes / (8 * n_dof**2))))

@@ -11,7 +11,7 @@ def nominal_theta(n_parameters: int) -> NDArray[np.float64]:
     return np.ones((1, n_parameters))
 
 
-def check_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.float64]:
+def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: bool = False) -> NDArray[np.float64]:
     """Rows of finite, positive multipliers, one column for each parameter.
 
     Parameters
@@ -21,6 +21,8 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.
         in their order; a vector is one row.
     parameter_names : sequence of str
         The parameters.
+    allow_nan : bool, default=False
+        Whether NaN may stand for what is not known.
 
     Returns
     -------
@@ -41,7 +43,7 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.
             f"theta has shape {values.shape}; expected (n_samples, {len(names)}), "
             f"a column for each of the parameters {names}"
         )
-    wrong = ~(np.isfinite(rows) & (rows > 0))
+    wrong = ~(np.isfinite(rows) & (rows > 0)) & ~(allow_nan & np.isnan(rows))
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         raise ValueError(

@@ -9,6 +9,9 @@ from scipy.optimize import linear_sum_assignment
 if TYPE_CHECKING:
     from skthermo.fem._protocol import ModalModel
 
+SAME_MODE = 0.5
+"""MAC above which no other mode can be more like the reference, since shapes are orthogonal."""
+
 
 def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     """Modal assurance criterion of every pair of mode shapes.
@@ -63,7 +66,7 @@ def pair_modes(likeness: NDArray[np.float64]) -> NDArray[np.intp]:
         Candidate of each reference mode; no candidate serves twice.
     """
     best = likeness.argmax(axis=2)
-    clear = np.take_along_axis(likeness, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > 0.5
+    clear = np.take_along_axis(likeness, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > SAME_MODE
     distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
     for sample in np.flatnonzero(~(clear & distinct)):
         best[sample] = linear_sum_assignment(likeness[sample], maximize=True)[1]
@@ -71,10 +74,16 @@ def pair_modes(likeness: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def share_reordered(model: "ModalModel", theta: NDArray[np.float64]) -> float:
-    """Share of the rows of theta at which the model's modes change their nominal order."""
-    nominal = model.modes(np.ones((1, theta.shape[1])))[1][0]
-    likeness = np.stack([mac(nominal, shapes) for shapes in model.modes(theta)[1]])
-    return float((pair_modes(likeness) != np.arange(nominal.shape[1])).any(axis=1).mean())
+    """Share of the rows of theta at which some column is not its nominal mode any more."""
+    shapes = model.modes(theta)[1]
+    if hasattr(model, "likeness"):
+        likeness = model.likeness(shapes)
+    else:
+        nominal = model.modes(np.ones((1, theta.shape[1])))[1][0]
+        likeness = np.stack([mac(nominal, phi) for phi in shapes])
+    swapped = pair_modes(likeness) != np.arange(likeness.shape[1])
+    replaced = np.diagonal(likeness, axis1=1, axis2=2) < SAME_MODE
+    return float((swapped | replaced).any(axis=1).mean())
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:
