@@ -8,13 +8,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, _fit_context, clone
 from sklearn.utils import check_array, check_random_state
-from sklearn.utils._param_validation import HasMethods, Interval, Options, StrOptions
+from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, validate_data
 
 __all__ = [
     "HasMethods",
     "Interval",
-    "Options",
     "StrOptions",
     "_check_feature_names_in",
     "_fit_context",
@@ -29,13 +28,18 @@ __all__ = [
     "is_model",
     "like",
     "seed_parts",
+    "seeded",
     "validate_data",
 ]
 
 
+PREFIXES = {"temperature": "T", "frequency": "f"}
+
+
 def is_model(candidate: Any) -> bool:
     """Whether an object is an FE model, judged by what it can do."""
-    return hasattr(candidate, "frequencies") and hasattr(candidate, "parameter_names")
+    wanted = ("parameter_names", "n_modes", "frequencies")
+    return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in wanted)
 
 
 def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
@@ -67,7 +71,7 @@ def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
         Names the column.
     """
     values = np.asarray(X, dtype=float)
-    for name, column in zip(column_names(X, what[0].upper()), values.T, strict=True):
+    for name, column in zip(column_names(X, PREFIXES[what]), values.T, strict=True):
         present = column[~np.isnan(column)]
         if not present.size:
             raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
@@ -100,11 +104,18 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
 
 
-def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState) -> None:
-    """Seed every ``random_state`` of an estimator and its parts that is None.
+def seeded(random_state: Any) -> np.random.RandomState | None:
+    """A RandomState, or None, with which parts draw from numpy's global state."""
+    return None if random_state is None else check_random_state(random_state)
+
+
+def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | None) -> None:
+    """Seed every ``random_state`` of an estimator and its parts that is None; None seeds nothing.
 
     A seed is drawn for the others too, so that seeding one part leaves the rest as they were.
     """
+    if random_state is None:
+        return
     parameters = estimator.get_params(deep=True)
     seeds = {}
     for name in sorted(parameters):
@@ -125,8 +136,3 @@ def clone_sharing_models(estimator: BaseEstimator) -> BaseEstimator:
         if hasattr(estimator, name):
             setattr(twin, name, clone(getattr(estimator, name), safe=False))
     return twin
-
-
-def random_state_or_none(random_state: Any) -> np.random.RandomState | None:
-    """None stays None (parts then draw from numpy's global state), else a RandomState."""
-    return None if random_state is None else check_random_state(random_state)

@@ -84,8 +84,7 @@ def test_documented_parameters_are_the_signatures(name, function, documented):
 @pytest.mark.parametrize(("name", "function", "documented"), CALLABLES, ids=[c[0] for c in CALLABLES])
 def test_every_public_callable_is_typed(name, function, documented):
     if name in PROTOCOLS:
-        assert typing.get_type_hints(documented) or documented.__mro__[1] is not object
-        return
+        return  # its members are properties and methods, which are checked on the classes that follow it
     hints = typing.get_type_hints(function, include_extras=True)
     parameters = [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
     untyped = [p.name for p in parameters if p.name not in hints]
@@ -99,7 +98,7 @@ DEFAULTS = [(name, thing) for name, thing in public_objects() if inspect.isfunct
 @pytest.mark.parametrize(("name", "thing"), DEFAULTS, ids=[d[0] for d in DEFAULTS])
 def test_docstrings_follow_numpydoc_and_show_an_example(name, thing):
     if name in PROTOCOLS:
-        assert "Attributes" in inspect.getdoc(thing) or "damage" in inspect.getdoc(thing)
+        assert "Attributes" in inspect.getdoc(thing)
         return
     report = validate(name)
     errors = [(code, message) for code, message in report["errors"] if code not in NOT_ASKED]

@@ -82,6 +82,8 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     labels = np.full(len(measured), "all") if scenarios is None else np.asarray(scenarios)
     if labels.shape != (len(measured),):
         raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
+    if AVERAGE in labels:
+        raise ValueError(f"a scenario is called {AVERAGE!r}; expected another name: the row of averages has it")
     table = pd.DataFrame(
         {label: mape(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
         index=column_names(y_true, "f"),

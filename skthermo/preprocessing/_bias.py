@@ -95,7 +95,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if self.method == "scale":
             for what, values in (("mean", self.mean_), ("reference", self.reference_)):
                 if (values == 0).any():
-                    raise ValueError(f"the {what} of mode {np.flatnonzero(values == 0)[0]} is zero; cannot scale")
+                    name = self.get_feature_names_out()[values == 0][0]
+                    raise ValueError(f"the {what} of mode {name!r} is zero; expected one to scale by")
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

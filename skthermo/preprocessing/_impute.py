@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
-from skthermo._validation import _check_feature_names_in, check_is_fitted, column_names, like
+from skthermo._validation import _check_feature_names_in, _num_samples, check_is_fitted, like
 
 
 class KNNGapImputer(KNNImputer):
@@ -90,11 +90,11 @@ class KNNGapImputer(KNNImputer):
             If a column holds no value at all, unless ``keep_empty_features``.
         """
         super().fit(X, y)
-        empty = np.flatnonzero(~self._valid_mask)
-        if empty.size and not self.keep_empty_features:
-            names = [column_names(X, "x")[i] for i in empty]
+        kept = set(super().get_feature_names_out())
+        empty = [name for name in _check_feature_names_in(self, None) if name not in kept]
+        if empty and not self.keep_empty_features:
             raise ValueError(
-                f"the columns {names} are missing in all {self._fit_X.shape[0]} rows; expected values to "
+                f"the columns {empty} are missing in all {_num_samples(X)} rows; expected values to "
                 "impute from: leave them out, or keep_empty_features=True fills them with zeros"
             )
         return self
@@ -127,5 +127,6 @@ class KNNGapImputer(KNNImputer):
         ndarray of str
         """
         check_is_fitted(self)
-        names = _check_feature_names_in(self, input_features)
-        return self._concatenate_indicator_feature_names_out(names, names)
+        names = list(_check_feature_names_in(self, input_features))
+        indicators = [name for name in super().get_feature_names_out(input_features) if name not in names]
+        return np.array(names + indicators, dtype=object)

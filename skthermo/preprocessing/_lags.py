@@ -45,6 +45,8 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Lags in the order of each sensor's columns.
     freq_ : Timedelta or None
         Length of one lag; None where rows are consecutive.
+    tolerance_ : Timedelta or None
+        How much older a record may be; None where rows are consecutive.
     n_features_in_ : int
         Number of sensors.
     feature_names_in_ : ndarray of str
@@ -132,7 +134,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             self.tolerance_ = (
                 STALE_AFTER * self.freq_ if self.tolerance is None else _duration(self.tolerance, "tolerance")
             )
-            self._history = (stamps, values)
+            self._history = (stamps, values.copy())
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

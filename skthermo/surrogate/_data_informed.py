@@ -1,5 +1,6 @@
 """The whole chain: temperatures and frequencies in, a thermal FE model out."""
 
+import warnings
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
@@ -8,12 +9,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.preprocessing import FunctionTransformer
-from sklearn.utils import check_random_state
 
 from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
+    _num_samples,
     check_array,
     check_columns,
     check_is_fitted,
@@ -23,6 +24,7 @@ from skthermo._validation import (
     is_model,
     like,
     seed_parts,
+    seeded,
     validate_data,
 )
 from skthermo.fem import FEModel, add_noise
@@ -167,11 +169,21 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters; NaN where M2 has no complete input.
+            Multipliers of the nominal parameters; NaN where M2 has no complete input, and, with a warning,
+            where a mapper of your own gives what is not finite and positive.
         """
         check_is_fitted(self)
         validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        theta = np.asarray(self.mapper_.predict(X)).reshape(len(X), -1)
+        theta = np.array(self.mapper_.predict(X), dtype=float).reshape(_num_samples(X), -1)
+        impossible = (np.isinf(theta) | (theta <= 0)).any(axis=1)
+        if impossible.any():
+            warnings.warn(
+                f"the mapper gave parameters that are not finite and positive in {impossible.sum()} of {len(theta)} "
+                "rows: these are NaN",
+                UserWarning,
+                stacklevel=2,
+            )
+            theta[impossible] = np.nan
         return like(X, theta, self.model.parameter_names)
 
     def predict(self, X: ArrayLike) -> Table:
@@ -248,7 +260,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
 
     def _frequencies(self, model: FEModel, X: ArrayLike) -> Table:
         theta = np.asarray(self.predict_parameters(X))
-        simulated = solve(model, theta, n_jobs=getattr(self.inverse_, "n_jobs", None))
+        simulated = solve(model, theta)
         return like(X, np.asarray(self.aligner_.inverse_transform(simulated)), self._mode_names)
 
     def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
@@ -274,13 +286,13 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         self.inverse_, self.mapper_ = clone(inverse), clone(mapper)
         self.aligner_ = FunctionTransformer() if self.aligner == "passthrough" else clone(self.aligner)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
-        if isinstance(self.inverse_, InverseSurrogate) and self.inverse_.model is None:
-            self.inverse_.set_params(model=self.model)
-        if self.random_state is not None:
-            random = check_random_state(self.random_state)
-            for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
-                if part is not None:
-                    seed_parts(part, random)
+        for part in (self.inverse_, *self.inverse_.get_params().values()):
+            if isinstance(part, InverseSurrogate) and part.model is None:
+                part.set_params(model=self.model)
+        random_state = seeded(self.random_state)
+        for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
+            if part is not None:
+                seed_parts(part, random_state)
 
     def _imputed(self, T: Any, F: Any) -> Any:
         side_by_side = np.hstack([np.asarray(T), np.asarray(F)])

@@ -2,7 +2,6 @@
 
 import warnings
 from numbers import Integral, Real
-from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
-from sklearn.utils.validation import check_memory
 
 from skthermo._validation import (
     HasMethods,
@@ -22,10 +20,11 @@ from skthermo._validation import (
     like,
     validate_data,
 )
-from skthermo.fem import FEModel, add_noise, sample
+from skthermo.fem import FEModel, add_noise
 from skthermo.fem._sampling import solve
 from skthermo.fem._theta import check_theta
 from skthermo.fem._tracking import share_reordered
+from skthermo.surrogate._memory import remembered_sample
 from skthermo.surrogate._regression import MultiplierRegressor
 
 ORDER_CHECKS = 100
@@ -54,7 +53,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         amplify that noise, at the price of estimates drawn towards the middle of the box.
     memory : str or joblib.Memory, optional
         Where simulations are kept, so that a search over other settings does not repeat them.
-        Clear it when the program behind a model of your own changes.
+        Processes that want the same simulations wait for the first one. Clear it when the program behind
+        a model of your own changes.
     n_jobs : int, optional
         Jobs over which simulations are spread.
     random_state : int, RandomState or None, default=None
@@ -65,7 +65,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     regressor_ : regressor
         Fitted; between standardised frequencies and standardised log parameters.
     samples_ : Bunch
-        ``theta`` and noise-free ``frequencies`` learned from, where they were simulated.
+        ``theta`` and ``frequencies`` learned from, before noise.
     n_features_in_ : int
         Number of modes.
     feature_names_in_ : ndarray of str
@@ -158,8 +158,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         else:
             frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
             if self.model is not None:
-                check_theta(theta[~np.isnan(theta).any(axis=1)], self.model.parameter_names)
+                check_theta(theta, self.model.parameter_names, allow_nan=True)
                 self._parameter_names = list(self.model.parameter_names)
+            self.samples_ = Bunch(theta=theta, frequencies=frequencies)
         self._n_parameters = theta.shape[1]
         self._learn(frequencies, theta, None if self.random_state is None else random)
         return self
@@ -179,7 +180,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         """
         return like(X, self._predict_array(X), self.get_feature_names_out())
 
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]:
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Frequencies of parameters, by the FE model.
 
         Parameters
@@ -189,18 +190,20 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
 
         Returns
         -------
-        ndarray of shape (n_samples, n_modes)
-            In Hz; NaN in rows with NaN.
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz; NaN in rows with NaN. A frame, whose columns must be the model's parameters, gives a
+            frame on its own index.
 
         Raises
         ------
         ValueError
-            If the estimator has no model.
+            If the estimator has no model, or the parameters are not the model's.
         """
         check_is_fitted(self)
         if self.model is None:
             raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
-        return solve(self.model, np.asarray(X, dtype=float), n_jobs=self.n_jobs)
+        modes = getattr(self, "feature_names_in_", [f"f{i + 1}" for i in range(self.model.n_modes)])
+        return like(X, solve(self.model, X, n_jobs=self.n_jobs), modes)
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the parameters.
@@ -223,12 +226,10 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if not is_model(self.model):
             raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
         model = self.model
-        if X is None:
-            self.n_features_in_ = model.n_modes
-        else:
-            n_modes = validate_data(self, X, ensure_all_finite="allow-nan").shape[1]
-            if n_modes != model.n_modes:
-                raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
+        names_only = np.ones((1, model.n_modes)) if X is None else X
+        n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
+        if n_modes != model.n_modes:
+            raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
         n_parameters = len(model.parameter_names)
         if n_parameters > model.n_modes:
             warnings.warn(
@@ -236,22 +237,13 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 UserWarning,
                 stacklevel=4,
             )
-        drawn = self._sample(random.randint(np.iinfo(np.int32).max))
+        seed = random.randint(np.iinfo(np.int32).max)
+        drawn = remembered_sample(self.memory, model, self.bounds, self.n_samples, n_jobs=self.n_jobs, seed=seed)
         self._warn_of_swaps(drawn.theta)
-        self.samples_ = Bunch(theta=drawn.theta, frequencies=drawn.frequencies)
+        self.samples_ = drawn
         self._parameter_names = list(model.parameter_names)
         self._y_is_vector = False
         return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
-
-    def _sample(self, seed: int) -> Bunch:
-        remembered = check_memory(self.memory).cache(sample, ignore=["n_jobs"])
-        try:
-            return remembered(self.model, self.bounds, self.n_samples, n_jobs=self.n_jobs, random_state=seed)
-        except PicklingError as error:
-            raise ValueError(
-                f"memory cannot recognise {self.model!r}; expected one that can be pickled, without lambdas or "
-                "functions defined within functions, or memory=None"
-            ) from error
 
     def _warn_of_swaps(self, theta: NDArray[np.float64]) -> None:
         if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):

@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
-from sklearn.utils import check_random_state
 
-from skthermo._validation import HasMethods, _fit_context, check_columns, like
+from skthermo._validation import HasMethods, _fit_context, check_columns, like, seeded
 from skthermo.surrogate._regression import MultiplierRegressor
 
 
@@ -89,6 +88,5 @@ class TemperatureMapper(MultiplierRegressor):
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         check_columns(like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
         self._n_parameters = theta.shape[1]
-        random_state = None if self.random_state is None else check_random_state(self.random_state)
-        self._learn(T, theta, random_state)
+        self._learn(T, theta, seeded(self.random_state))
         return self

@@ -78,8 +78,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         target = y[complete]
         regressor = default_network() if self.regressor is None else clone(self.regressor)
         regression = standardised_regression(regressor, log=bool((target > 0).all()))
-        if random_state is not None:
-            seed_parts(regression, random_state)
+        seed_parts(regression, random_state)
         with single_blas_thread():
             self._regression = regression.fit(X[complete], target[:, 0] if target.shape[1] == 1 else target)
         self.regressor_ = self._regression.regressor_[-1]

@@ -1,4 +1,4 @@
-"""Tables 2 and 3 of the paper over many seeds, against what two stages should reach.
+"""Tables 2 and 3 of the paper over many seeds, beside their targets.
 
     python tests/benchmarks/truss_tables.py
 
@@ -18,7 +18,7 @@ SEEDS_40 = pd.DataFrame(
         "std": [1.3, 6.7, 2.9, 0, 3.5, 7.3, 1.4, 6.7, 0],
     },
     index=["SH-0", "SB-10", "SB-20", "SB-30", "ST-10", "ST-20", "ST-30", "SD-10", "SD-20"],
-)  # thermo-mechanical rates of 40 seeds by an independent program, in percent
+)  # thermo-mechanical reference rates over 40 seeds, in percent
 
 
 def load_study():
@@ -29,7 +29,7 @@ def load_study():
 
 
 def summary(study, mapes, rates):
-    """The four numbers that are asked for."""
+    """What is measured, by target."""
     reference = rates["thermo"].groupby("scenario").mean().loc[SEEDS_40.index]
     distance = (reference - SEEDS_40["mean"]).abs() / SEEDS_40["std"].where(SEEDS_40["std"] > 0, 1.0)
     gaps = rates["informed"] - rates["thermo"]

@@ -38,6 +38,8 @@ def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
         ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'"),
         ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
         ({"groups": {"tie": []}}, "group 'tie' holds no member"),
+        ({"groups": {"tie": "ax"}}, "group 'tie' holds .'ax'."),
+        ({"supports": dict.fromkeys(NODES, "xy")}, "the supports fix every node in every direction"),
     ],
 )
 def test_structure_names_what_is_wrong(changes, message):
@@ -59,6 +61,7 @@ def test_mechanism_names_the_node_that_moves():
     [
         ({"parameters": ["deck"]}, "parameter 'deck': unknown group 'deck'; expected one of .'rest', 'tie'."),
         ({"parameters": {"k": ("k", "tie")}}, "parameter 'k' is the property 'k' of group 'tie'"),
+        ({"parameters": ["tie", "tie"]}, "expected each group once"),
         ({"parameters": ["tie"], "groups": ["deck"]}, "groups: unknown group 'deck'"),
         ({"parameters": ["tie"], "n_modes": 4}, "n_modes is 4, but 3 degrees of freedom"),
         ({"parameters": ["tie"], "n_modes": 0}, "n_modes is 0; expected a positive integer"),

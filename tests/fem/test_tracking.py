@@ -63,6 +63,20 @@ def test_share_of_reordered_samples():
     assert share_reordered(crossing(), np.array([[1.0, 1, 1, 1], [9, 1, 1, 1]])) == 0.5
 
 
+def test_an_intruder_counts_as_reordered():
+    assert share_reordered(crossing(), np.array([[1.0, 1, 1, 1], [1, 1, 1, 0.1]])) == 0.5
+
+
+def test_modes_are_followed_where_mass_changes():
+    """Three masses on springs of their own, the first nine times as heavy: its mode is the lowest still."""
+    springs = {("k",): np.diag((2 * np.pi * np.array([1.0, 2.0, 3.0])) ** 2)}
+    masses = {(name,): np.diag(row) for name, row in zip("abc", np.eye(3), strict=True)}
+    model = AffineModel(springs, masses, n_modes=3, track=True, parameter_names=["k", *"abc"])
+    theta = np.array([[1.0, 9.0, 1.0, 1.0], [1.0, 1.0, 16.0, 0.04], [1.0, 0.01, 1.0, 25.0]])
+    np.testing.assert_allclose(model.frequencies(theta), [1, 2, 3] / np.sqrt(theta[:, 1:]), rtol=1e-12)
+    np.testing.assert_allclose(model.likeness(model.modes(theta)[1]), np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12)
+
+
 def test_no_candidate_serves_two_modes():
     likeness = np.array([[[0.9, 0.1, 0.0], [0.8, 0.15, 0.05]]])
     np.testing.assert_array_equal(pair_modes(likeness), [[0, 1]])

@@ -70,7 +70,7 @@ def test_reference_may_be_a_model_or_nothing():
         (BiasAligner([4.0, np.nan, 9.0]), F, "reference"),
         (BiasAligner(make_truss()), F, r"has shape \(6,\)"),
         (BiasAligner(), F.assign(f3=np.nan), "frequency column 'f3' is NaN in all 80 rows"),
-        (BiasAligner(method="scale"), F * [1, 1, 0], "the mean of mode 2 is zero"),
+        (BiasAligner(method="scale"), F * [1, 1, 0], "the mean of mode 'f3' is zero"),
         (BiasAligner(method="ratio"), F, "method"),
     ],
 )

@@ -71,6 +71,13 @@ def test_records_of_fit_are_the_history_of_transform():
     assert np.isnan(lags.transform(T.iloc[[29]])["T1_lag1"]).all()  # nine hours old
 
 
+def test_history_is_a_copy():
+    values = np.arange(6.0)[:, np.newaxis]
+    lags = LagFeatures(2, freq="1h").fit(pd.DataFrame(values, index=HOURS[:6], columns=["T1"], copy=False))
+    values[:] = 99
+    assert lags.transform(T[["T1"]].iloc[[6]])["T1_lag1"].item() == 5
+
+
 def test_a_new_value_at_a_known_stamp_replaces_the_old_one():
     lags = LagFeatures(2, freq="1h").fit(T)
     corrected = T.iloc[[4, 5]] + 100

@@ -6,6 +6,7 @@ import joblib
 import numpy as np
 import pandas as pd
 import pytest
+from joblib.externals.loky import get_reusable_executor
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
@@ -203,6 +204,74 @@ def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
     ]
     np.testing.assert_array_equal(*(search.cv_results_["mean_test_score"] for search in searches))
     np.testing.assert_array_equal(*(search.predict(T) for search in searches))
+
+
+LOGGED_MODEL = """
+import numpy as np
+
+class Logged:
+    parameter_names = ("k",)
+    n_modes = 1
+
+    def __init__(self, log):
+        self.log = log
+
+    def frequencies(self, theta):
+        with open(self.log, "a") as file:
+            file.write(f"{len(theta)}\\n")
+        return np.sqrt(theta)
+"""
+
+
+def test_processes_that_search_together_simulate_once(tmp_path, monkeypatch):
+    (tmp_path / "logged_model.py").write_text(LOGGED_MODEL.replace("\\\\n", "\\n"))
+    monkeypatch.syspath_prepend(tmp_path)
+    get_reusable_executor().shutdown()  # its workers do not know the new path
+    from logged_model import Logged
+
+    model = Logged(tmp_path / "solved.txt")
+    air = np.linspace(0, 30, 60)[:, np.newaxis]
+    measured = np.sqrt(1 - 0.005 * air)
+    simulated = InverseSurrogate(model, LinearRegression(), n_samples=77, memory=str(tmp_path / "memory"))
+    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
+    search = GridSearchCV(estimator, {"inverse__noise": [0.0, 0.001, 0.002, 0.003]}, cv=KFold(3), n_jobs=2)
+    search.fit(air, measured)
+    solved = model.log.read_text().split()
+    assert solved.count("77") == 1
+    assert len(solved) > 12  # predictions go through the model too
+
+
+def test_large_models_are_recognised_in_worker_processes(tmp_path):
+    n = 380
+    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
+    model = AffineModel({("k",): chain_of_springs}, np.eye(n), n_modes=1)
+    air = np.linspace(0, 30, 12)[:, np.newaxis]
+    measured = model.frequencies(1 - 0.005 * air)
+    simulated = InverseSurrogate(model, LinearRegression(), n_samples=20, memory=str(tmp_path))
+    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
+    for n_jobs in (1, 2):
+        cross_val_score(estimator, air, measured, cv=2, n_jobs=n_jobs)
+    assert len(list(tmp_path.rglob("output.pkl"))) == 1
+
+
+def test_impossible_parameters_are_nan_with_a_warning():
+    class Wild(TemperatureMapper):
+        def predict(self, X):
+            theta = np.array(super().predict(X))
+            theta[[2, 5], 0] = [-1.0, np.inf]
+            return theta
+
+    model = chain(mapper=Wild(LinearRegression())).fit(T, F)
+    with pytest.warns(UserWarning, match="not finite and positive in 2 of 365 rows"):
+        predicted = model.predict(T)
+    np.testing.assert_array_equal(np.flatnonzero(predicted.isna().all(axis=1)), [2, 5])
+
+
+def test_an_inverse_within_a_pipeline_gets_the_model_too():
+    nested = make_pipeline(inverse().set_params(model=None))
+    fitted = chain(inverse=nested).fit(T, F)
+    assert fitted.inverse_[0].model is TRUSS
+    np.testing.assert_array_equal(fitted.predict(T), FITTED.predict(T))
 
 
 def test_same_seed_same_bits():

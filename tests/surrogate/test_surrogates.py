@@ -46,6 +46,20 @@ def test_inverse_transform_is_the_fe_model():
     theta = np.vstack([HELD_OUT.theta, np.full(4, np.nan)])
     np.testing.assert_array_equal(inverse.inverse_transform(theta)[:-1], TRUSS.frequencies(HELD_OUT.theta))
     assert np.isnan(inverse.inverse_transform(theta)[-1]).all()
+    frame = pd.DataFrame(theta, columns=TRUSS.parameter_names, index=np.arange(201) + 5)
+    assert inverse.inverse_transform(frame).index.equals(frame.index)
+    with pytest.raises(ValueError, match="theta has the columns"):
+        inverse.inverse_transform(frame[frame.columns[::-1]])
+    with pytest.raises(ValueError, match=r"row 200, parameter 'bottom' is -1\.0"):
+        inverse.inverse_transform(frame.fillna(-1.0))
+
+
+def test_refitting_forgets_what_the_last_fit_saw():
+    F = pd.DataFrame(HELD_OUT.frequencies, columns=[f"f{i}" for i in range(6)])
+    inverse = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, random_state=0).fit(F)
+    assert not hasattr(inverse.fit(), "feature_names_in_")
+    inverse.fit(F, HELD_OUT.theta)
+    np.testing.assert_array_equal(inverse.samples_.theta, HELD_OUT.theta)
 
 
 def test_noise_in_training_damps_the_noise_of_estimates():
