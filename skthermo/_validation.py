@@ -19,6 +19,7 @@ __all__ = [
     "_fit_context",
     "_num_samples",
     "as_columns",
+    "as_floats",
     "check_array",
     "check_is_fitted",
     "check_columns",
@@ -49,9 +50,16 @@ def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
     return pd.DataFrame(values, index=X.index, columns=list(columns), copy=False)
 
 
+def as_floats(values: ArrayLike) -> NDArray[np.float64]:
+    """An array of floats; what a nullable pandas column misses becomes NaN."""
+    if isinstance(values, pd.DataFrame | pd.Series):
+        return values.to_numpy(dtype=float, na_value=np.nan)
+    return np.asarray(values, dtype=float)
+
+
 def as_columns(values: ArrayLike) -> NDArray[np.float64]:
     """A table of floats; a vector becomes its only column."""
-    array = np.asarray(values, dtype=float)
+    array = as_floats(values)
     return array[:, np.newaxis] if array.ndim == 1 else array
 
 
@@ -70,15 +78,14 @@ def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
     ValueError
         Names the column.
     """
-    values = np.asarray(X, dtype=float)
-    for name, column in zip(column_names(X, PREFIXES[what]), values.T, strict=True):
+    for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
         present = column[~np.isnan(column)]
         if not present.size:
             raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
         if varying and len(column) > 1 and np.ptp(present) == 0:
             raise ValueError(
                 f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
-                "expected one that varies: leave the sensor out"
+                "expected one that varies: leave it out"
             )
 
 
@@ -96,12 +103,11 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
         )
     if not isinstance(X, pd.DataFrame) or not isinstance(y, pd.DataFrame | pd.Series) or X.index.equals(y.index):
         return
-    where = f"{X.index.dtype} and {y.index.dtype}"
     for row, (left, right) in enumerate(zip(X.index, y.index, strict=True)):
         if left != right:
-            where = f"row {row}: {left} and {right}"
-            break
-    raise ValueError(f"{names[0]} and {names[1]} have different indices ({where}); expected the same")
+            raise ValueError(
+                f"{names[0]} and {names[1]} have different indices (row {row}: {left} and {right}); expected the same"
+            )
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:
@@ -112,7 +118,8 @@ def seeded(random_state: Any) -> np.random.RandomState | None:
 def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | None) -> None:
     """Seed every ``random_state`` of an estimator and its parts that is None; None seeds nothing.
 
-    A seed is drawn for the others too, so that seeding one part leaves the rest as they were.
+    What stands inside a part with a seed of its own is that part's to seed. A seed is drawn for every part, so
+    that seeding one leaves the rest as they were.
     """
     if random_state is None:
         return
@@ -121,7 +128,9 @@ def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | N
     for name in sorted(parameters):
         if name == "random_state" or name.endswith("__random_state"):
             seed = random_state.randint(np.iinfo(np.int32).max)
-            if parameters[name] is None:
+            *parts, _ = name.split("__")
+            owners = ("__".join([*parts[:depth], "random_state"]) for depth in range(len(parts) + 1))
+            if all(parameters.get(owner) is None for owner in owners):
                 seeds[name] = seed
     estimator.set_params(**seeds)
 

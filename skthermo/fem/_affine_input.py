@@ -42,6 +42,8 @@ def _read_key(key, what: str) -> Key:
 
 def _read_matrix(matrix, what: str, n_dof: int | None) -> Array:
     array = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{what} is complex; expected a real matrix")
     if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.size:
         raise ValueError(f"{what} has shape {array.shape}; expected a square matrix")
     if n_dof is not None and len(array) != n_dof:
@@ -66,15 +68,21 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
         if not names:
             raise ValueError("no term names a parameter; expected at least one, such as ('E_deck',)")
         return names
-    names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"parameter_names is {names}; expected one or more different names")
+    names = check_different(parameter_names)
     unknown = [name for name in mentioned if name not in names]
     if unknown:
         raise ValueError(f"terms name {unknown}; expected only the parameters {list(names)}")
     idle = [name for name in names if name not in mentioned]
     if idle:
         raise ValueError(f"no term names the parameters {idle}; the terms name {list(mentioned)}")
+    return names
+
+
+def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
+    """Names of parameters, each once."""
+    names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"parameter_names is {names}; expected one or more different names")
     return names
 
 
@@ -112,10 +120,16 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
     return damage
 
 
+def check_n_modes(n_modes: int) -> int:
+    """A positive number of modes."""
+    if not isinstance(n_modes, Integral) or isinstance(n_modes, bool) or n_modes < 1:
+        raise ValueError(f"n_modes is {n_modes!r}; expected a positive integer")
+    return n_modes
+
+
 def count_modes(mass: Array, *, at_least: int) -> int:
     """How many modes of finite frequency a mass matrix allows."""
-    if not isinstance(at_least, Integral) or isinstance(at_least, bool) or at_least < 1:
-        raise ValueError(f"n_modes is {at_least!r}; expected a positive integer")
+    check_n_modes(at_least)
     eigenvalues = np.linalg.eigvalsh(mass)
     tolerance = 10 * len(mass) * np.finfo(float).eps * abs(eigenvalues[-1])
     if eigenvalues[0] < -tolerance:

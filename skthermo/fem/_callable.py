@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo.fem._affine_input import check_different, check_n_modes
 from skthermo.fem._theta import check_theta
 
 
@@ -23,6 +24,11 @@ class CallableModel:
         Number of frequencies returned.
     vectorized : bool, default=False
         Whether the function takes many rows at once.
+
+    Raises
+    ------
+    ValueError
+        If a name repeats or ``n_modes`` is not a positive integer.
 
     Examples
     --------
@@ -43,8 +49,8 @@ class CallableModel:
         vectorized: bool = False,
     ):
         self.function = function
-        self.parameter_names = tuple(parameter_names)
-        self.n_modes = n_modes
+        self.parameter_names = check_different(parameter_names)
+        self.n_modes = check_n_modes(n_modes)
         self.vectorized = vectorized
 
     def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:

@@ -196,6 +196,8 @@ class PointMass(_Sheet):
 
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array]) -> None:
     """Refuse an element with unknown nodes, no length, or a property that is not positive."""
+    if not hasattr(element, "nodes"):
+        raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
     for node in element.nodes:
         if node not in coordinates:
             raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")

@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils import check_random_state
 
+from skthermo._validation import as_floats
+
 
 def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     """Relative standard deviation of every mode, (n_modes,).
@@ -57,7 +59,7 @@ def add_noise(
     >>> noisy.std(axis=0).round(2)
     array([0.  , 0.04])
     """
-    clean = np.asarray(frequencies, dtype=float)
+    clean = as_floats(frequencies)
     if clean.ndim != 2:
         raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
     deviation = check_noise(noise, clean.shape[1])

@@ -1,5 +1,6 @@
 """Monte Carlo sampling of FE models."""
 
+from numbers import Integral
 from typing import Literal
 
 import numpy as np
@@ -100,8 +101,8 @@ def sample(
     ((100, 4), (100, 6))
     """
     lowest, highest = check_bounds(bounds, model.parameter_names).T
-    if n_samples < 1:
-        raise ValueError(f"n_samples is {n_samples}; expected a positive number")
+    if not isinstance(n_samples, Integral) or n_samples < 1:
+        raise ValueError(f"n_samples is {n_samples!r}; expected a positive integer")
     unit = _unit_cube(method, n_samples, len(lowest), check_random_state(random_state))
     theta = lowest + (highest - lowest) * unit
     return Bunch(theta=theta, frequencies=solve(model, theta, n_jobs=n_jobs))

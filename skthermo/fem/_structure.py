@@ -146,6 +146,8 @@ class Structure:
             parameters = {group: group for group in parameters}
         bindings = {}
         for name, target in parameters.items():
+            if not isinstance(target, str) and len(target) != 2:
+                raise ValueError(f"parameter {name!r} is {target!r}; expected a group or (property, group)")
             prop, group = (STIFFNESS, target) if isinstance(target, str) else target
             members = self._groups[self._known(group, f"parameter {name!r}")]
             known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
@@ -186,7 +188,7 @@ class Structure:
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
-            for direction in along:
+            for direction in along or ():
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected {directions}")
                 fixed.add((node, direction))
@@ -207,10 +209,13 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
         raise ValueError("nodes is empty; expected a mapping of node to coordinates")
     coordinates: dict[Hashable, Array] = {}
     places: dict[tuple[float, ...], Hashable] = {}
-    first = np.asarray(next(iter(nodes.values())))
+    first = np.shape(next(iter(nodes.values())))
     for node, place in nodes.items():
-        xyz = np.asarray(place, dtype=float)
-        if xyz.shape not in ((2,), (3,)) or xyz.shape != first.shape or not np.isfinite(xyz).all():
+        try:
+            xyz = np.asarray(place, dtype=float)
+        except (TypeError, ValueError):
+            xyz = np.empty(0)
+        if xyz.shape not in ((2,), (3,)) or xyz.shape != first or not np.isfinite(xyz).all():
             raise ValueError(
                 f"node {node!r} has the coordinates {place!r}; expected two or three finite numbers, "
                 "as many as the first node has"

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._validation import as_floats
+
 
 def nominal_theta(n_parameters: int) -> NDArray[np.float64]:
     """One row of ones: every parameter at its nominal value."""
@@ -36,7 +38,7 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
     names = list(parameter_names)
     if hasattr(theta, "columns") and list(theta.columns) != names:
         raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
-    values = np.asarray(theta, dtype=float)
+    values = as_floats(theta)
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(

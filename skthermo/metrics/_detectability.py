@@ -1,7 +1,9 @@
 """How often alarms are false, how often damage is found, and how small it may be."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from skthermo._validation import as_floats
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
@@ -69,17 +71,17 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     Parameters
     ----------
     severities : array-like of shape (n_severities,)
-        Tested severities in any order, such as 0.1, 0.2, 0.3.
+        Tested severities in any order, such as 0.1, 0.2, 0.3; of strengthening, -0.1, -0.2, -0.3.
     pod : array-like of shape (n_severities,)
-        Probability of detection at each, between 0 and 1.
+        Probability of detection at each, between 0 and 1; NaN counts as not detected.
     level : float, default=0.9
         POD that counts as reliable.
 
     Returns
     -------
     float
-        The smallest severity at which, and at every larger one, the POD reaches the level;
-        NaN if it does not at the largest. Nothing is interpolated between tested severities.
+        The severity of smallest magnitude at which, and at every larger one, the POD reaches the
+        level; NaN if it does not at the largest. Nothing is interpolated between tested severities.
 
     Raises
     ------
@@ -92,21 +94,21 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     >>> minimum_detectable_damage([0.1, 0.2, 0.3], [0.26, 0.95, 1.0])
     0.2
     """
-    s, p = np.asarray(severities, dtype=float), np.asarray(pod, dtype=float)
+    s, p = as_floats(severities), as_floats(pod)
     if s.ndim != 1 or s.shape != p.shape or not s.size:
         raise ValueError(f"severities have shape {s.shape} and pod {p.shape}; expected two vectors of one length")
     if np.isnan(s).any() or len(np.unique(s)) < len(s):
         raise ValueError(f"severities are {s.tolist()}; expected different numbers")
     for name, values in (("pod", p), ("level", np.asarray(level))):
-        if not ((values >= 0) & (values <= 1)).all():
+        if ((values < 0) | (values > 1)).any():
             raise ValueError(f"{name} is {values.tolist()}; expected probabilities between 0 and 1, not percent")
-    descending = np.argsort(-s)
+    descending = np.argsort(-np.abs(s))
     reliable = np.logical_and.accumulate(p[descending] >= level)
-    return float(s[descending][reliable].min()) if reliable.any() else float("nan")
+    return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
 def _share_above(damage_index: ArrayLike, threshold: float) -> float:
-    index: NDArray[np.float64] = np.asarray(damage_index, dtype=float)
+    index = as_floats(damage_index)
     if index.ndim != 1:
         raise ValueError(f"damage_index has shape {index.shape}; expected a vector (n_samples,)")
     if not np.isfinite(threshold):

@@ -11,6 +11,7 @@ from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
+    as_floats,
     check_array,
     check_columns,
     check_is_fitted,
@@ -130,7 +131,10 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         ndarray or DataFrame of shape (n_samples, n_modes)
         """
         check_is_fitted(self)
-        F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+        if isinstance(X, pd.DataFrame) and hasattr(self, "feature_names_in_"):
+            F = self._validated(X, reset=False)
+        else:  # as a model gives them, without names
+            F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
         if self.method == "scale":
@@ -144,9 +148,9 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if self.reference is None:
             return np.full(n_modes, 1.0 if self.method == "scale" else 0.0)
         if is_model(self.reference):
-            reference = self.reference.frequencies(np.ones((1, len(self.reference.parameter_names))))[0]
+            reference = as_floats(self.reference.frequencies(np.ones((1, len(self.reference.parameter_names)))))[0]
         else:
-            reference = np.asarray(self.reference, dtype=float)
+            reference = as_floats(self.reference)
         if reference.shape != (n_modes,) or not np.isfinite(reference).all():
             raise ValueError(
                 f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "

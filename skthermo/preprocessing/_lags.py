@@ -1,6 +1,7 @@
 """Temperatures of the hours before, as columns."""
 
 from collections.abc import Sequence
+from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal
 
@@ -31,11 +32,12 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     lags : int or sequence of int, default=24
         Number of columns for each sensor, the current value included: 24 gives the values at
         t, t-1, ..., t-23. Or an explicit list of lags, such as ``[0, 1, 24]``.
-    freq : str or Timedelta, optional
+    freq : str or timedelta, optional
         Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most
         frequent step between the records of `fit`.
-    tolerance : str or Timedelta, optional
-        How much older than t - k freq the record taken for lag k may be. By default 6 freq.
+    tolerance : str or timedelta, optional
+        How much older than t - k freq the record taken for lag k may be; "0h" wants the very stamp. By
+        default 6 freq.
     padding : {"edge", "nan"}, default="edge"
         What stands before the first record: its own values, or NaN.
 
@@ -78,8 +80,8 @@ class LagFeatures(TransformerMixin, BaseEstimator):
 
     _parameter_constraints: dict = {
         "lags": [Interval(Integral, 1, None, closed="left"), "array-like"],
-        "freq": [str, pd.Timedelta, pd.offsets.BaseOffset, None],
-        "tolerance": [str, pd.Timedelta, pd.offsets.BaseOffset, None],
+        "freq": [str, timedelta, np.timedelta64, pd.offsets.BaseOffset, None],
+        "tolerance": [str, timedelta, np.timedelta64, pd.offsets.BaseOffset, None],
         "padding": [StrOptions({"edge", "nan"})],
     }
 
@@ -87,8 +89,8 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         self,
         lags: int | Sequence[int] = 24,
         *,
-        freq: str | pd.Timedelta | None = None,
-        tolerance: str | pd.Timedelta | None = None,
+        freq: str | timedelta | None = None,
+        tolerance: str | timedelta | None = None,
         padding: Literal["edge", "nan"] = "edge",
     ):
         self.lags = lags
@@ -277,8 +279,9 @@ def _duration(value: Any, name: str) -> pd.Timedelta:
     numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
     try:
         duration = pd.Timedelta(numbered).as_unit("ns")
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration such as '1h'") from error
-    if not duration.value > 0:
-        raise ValueError(f"{name} is {value!r}; expected a positive duration such as '1h'")
+    without_unit = isinstance(value, str) and not any(letter.isalpha() for letter in value)
+    if without_unit or duration.value < 0 or (name == "freq" and duration.value == 0):
+        raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
     return duration

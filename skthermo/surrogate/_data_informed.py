@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
-    _num_samples,
+    as_columns,
+    as_floats,
     check_array,
     check_columns,
     check_is_fitted,
@@ -32,6 +32,10 @@ from skthermo.fem._sampling import solve
 from skthermo.metrics._errors import complete_r2
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._regression import identity
+
+POSSIBLE = (1e-6, 1e6)
+"""Multipliers outside which a model's matrices lose all digits."""
 
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
@@ -153,8 +157,10 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             F = self._imputed(T, F)
         aligned = self.aligner_.fit(F).transform(F)
         self.inverse_.fit(aligned)
-        theta = np.asarray(self.inverse_.transform(aligned))
-        self.parameters_ = like(T, theta, self.model.parameter_names)
+        theta = as_floats(self.inverse_.transform(aligned))
+        if theta.shape[1] != len(self._parameter_names):
+            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self._parameter_names}")
+        self.parameters_ = like(T, theta, self._parameter_names)
         self.mapper_.fit(T, self.parameters_)
         return self
 
@@ -170,21 +176,22 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters; NaN where M2 has no complete input, and, with a warning,
-            where a mapper of your own gives what is not finite and positive.
+            where it gives what no structure has (less than 1e-6 or more than 1e6).
         """
         check_is_fitted(self)
         validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        theta = np.array(self.mapper_.predict(X), dtype=float).reshape(_num_samples(X), -1)
-        impossible = (np.isinf(theta) | (theta <= 0)).any(axis=1)
+        theta = as_columns(self.mapper_.predict(X)).copy()
+        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
         if impossible.any():
+            row = np.flatnonzero(impossible)[0]
             warnings.warn(
-                f"the mapper gave parameters that are not finite and positive in {impossible.sum()} of {len(theta)} "
-                "rows: these are NaN",
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
                 UserWarning,
                 stacklevel=2,
             )
             theta[impossible] = np.nan
-        return like(X, theta, self.model.parameter_names)
+        return like(X, theta, self._parameter_names)
 
     def predict(self, X: ArrayLike) -> Table:
         """Frequencies of the healthy structure at given temperatures.
@@ -259,9 +266,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         return complete_r2(y, self.predict(X))
 
     def _frequencies(self, model: FEModel, X: ArrayLike) -> Table:
-        theta = np.asarray(self.predict_parameters(X))
-        simulated = solve(model, theta)
-        return like(X, np.asarray(self.aligner_.inverse_transform(simulated)), self._mode_names)
+        simulated = solve(model, as_floats(self.predict_parameters(X)))
+        return like(X, as_floats(self.aligner_.inverse_transform(simulated)), self._mode_names)
 
     def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies, checked; frames stay frames."""
@@ -278,26 +284,32 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         check_columns(T, "temperature", varying=True)
         check_columns(F, "frequency")
         self._mode_names = column_names(F, "f")
+        self._parameter_names = list(self.model.parameter_names)
         return T, F
 
     def _prepare_parts(self) -> None:
         inverse = InverseSurrogate() if self.inverse is None else self.inverse
         mapper = TemperatureMapper() if self.mapper is None else self.mapper
         self.inverse_, self.mapper_ = clone(inverse), clone(mapper)
-        self.aligner_ = FunctionTransformer() if self.aligner == "passthrough" else clone(self.aligner)
+        self.aligner_ = identity() if self.aligner == "passthrough" else clone(self.aligner)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
         for part in (self.inverse_, *self.inverse_.get_params().values()):
             if isinstance(part, InverseSurrogate) and part.model is None:
                 part.set_params(model=self.model)
+            if isinstance(part, InverseSurrogate) and list(part.model.parameter_names) != self._parameter_names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; "
+                    f"expected {self._parameter_names}, as {self.model!r} has"
+                )
         random_state = seeded(self.random_state)
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
 
     def _imputed(self, T: Any, F: Any) -> Any:
-        side_by_side = np.hstack([np.asarray(T), np.asarray(F)])
-        completed = np.asarray(self.imputer_.fit_transform(side_by_side))
-        return like(F, completed[:, -F.shape[1] :], self._mode_names)
+        n_sensors, n_modes = T.shape[1], F.shape[1]
+        completed = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
+        return like(F, completed[:, n_sensors : n_sensors + n_modes], self._mode_names)
 
     def __sklearn_clone__(self) -> "DataInformedFEM":
         return clone_sharing_models(self)

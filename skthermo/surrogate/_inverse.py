@@ -27,7 +27,7 @@ from skthermo.fem._tracking import share_reordered
 from skthermo.surrogate._memory import remembered_sample
 from skthermo.surrogate._regression import MultiplierRegressor
 
-ORDER_CHECKS = 100
+ORDER_CHECKS = 256
 
 
 class InverseSurrogate(TransformerMixin, MultiplierRegressor):

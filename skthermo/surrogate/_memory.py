@@ -37,8 +37,8 @@ def remembered_sample(
         identity = joblib.hash(model, coerce_mmap=True)
     except PicklingError as error:
         raise ValueError(
-            f"memory cannot recognise {model!r}; expected one that can be pickled, with functions from a module that "
-            "can be imported (no lambda, no function of a notebook or of another function), or memory=None"
+            f"memory cannot recognise {model!r}; expected one that can be pickled, with functions and classes from a "
+            "module that can be imported (no lambda, nothing from a script, a notebook or a function), or memory=None"
         ) from error
     with _locked(Path(memory.location), identity):
         return memory.cache(_sample, ignore=["model", "n_jobs"])(identity, model, bounds, n_samples, n_jobs, seed)

@@ -92,7 +92,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             )
         inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
         targets = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
-        check_same_rows(X, y, names)
+        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
+        check_same_rows(X, targets if plain_rows else y, names)
         self._y_is_vector = targets.ndim == 1
         self._parameter_names = column_names(y, "") if isinstance(y, pd.DataFrame) else None
         return inputs, as_columns(targets)
@@ -103,7 +104,9 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self._n_parameters), np.nan)
         if complete.any():
-            theta[complete] = as_columns(self._regression.predict(inputs[complete]))
+            # Far outside what was learned, exp overflows to inf: whoever goes on with theta must see that.
+            with np.errstate(over="ignore"):
+                theta[complete] = as_columns(self._regression.predict(inputs[complete]))
         return theta
 
     def __sklearn_clone__(self) -> "MultiplierRegressor":
@@ -118,9 +121,14 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
 
 def standardised_regression(regressor: BaseEstimator, *, log: bool) -> TransformedTargetRegressor:
     """Standardised inputs to standardised targets, or their logarithms, which keeps them positive."""
-    logarithm = FunctionTransformer(np.log, np.exp, check_inverse=False) if log else FunctionTransformer()
+    logarithm = FunctionTransformer(np.log, np.exp, check_inverse=False) if log else identity()
     return TransformedTargetRegressor(
-        make_pipeline(StandardScaler(), regressor),
-        transformer=make_pipeline(logarithm, StandardScaler()),
+        make_pipeline(StandardScaler().set_output(transform="default"), regressor),
+        transformer=make_pipeline(logarithm, StandardScaler()).set_output(transform="default"),
         check_inverse=False,
     )
+
+
+def identity() -> FunctionTransformer:
+    """Leaves arrays arrays and frames frames."""
+    return FunctionTransformer().set_output(transform="default")

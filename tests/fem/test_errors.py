@@ -34,6 +34,8 @@ def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
         ({"members": MEMBERS | {"s": Spring("c", "x", float("nan"))}}, "member 's' has k = nan"),
         ({"members": MEMBERS | {"s": Spring("c", "z", 1.0)}}, "member 's' acts along 'z' of node 'c'"),
         ({"members": MEMBERS | {"m": PointMass("c", -2.0)}}, "member 'm' has m = -2.0"),
+        ({"members": MEMBERS | {"ab": ("a", "b")}}, "member 'ab' is .* expected an element such as Bar"),
+        ({"nodes": NODES | {"c": "xy"}}, "node 'c' has the coordinates 'xy'"),
         ({"supports": {"q": "x"}}, "supports name node 'q'"),
         ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'"),
         ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
@@ -60,6 +62,7 @@ def test_mechanism_names_the_node_that_moves():
     ("arguments", "message"),
     [
         ({"parameters": ["deck"]}, "parameter 'deck': unknown group 'deck'; expected one of .'rest', 'tie'."),
+        ({"parameters": {"A": ("A",)}}, r"parameter 'A' is \('A',\); expected a group or \(property, group\)"),
         ({"parameters": {"k": ("k", "tie")}}, "parameter 'k' is the property 'k' of group 'tie'"),
         ({"parameters": ["tie", "tie"]}, "expected each group once"),
         ({"parameters": ["tie"], "groups": ["deck"]}, "groups: unknown group 'deck'"),
@@ -124,6 +127,7 @@ I2 = np.eye(2)
         ({"stiffness": {("k",): I2, ("h",): np.eye(3)}}, r"term \('h',\) has shape \(3, 3\); expected \(2, 2\)"),
         ({"stiffness": {("k",): [[1, 0.5], [0, 1]]}}, r"is not symmetric: entries \(0, 1\)"),
         ({"stiffness": {("k",): [[1, np.inf], [np.inf, 1]]}}, "not finite"),
+        ({"stiffness": {("k",): I2 * 1j}}, r"stiffness term \('k',\) is complex"),
         ({"stiffness": {3: I2}}, "stiffness has the key 3"),
         ({"stiffness": {(): I2}}, "no term names a parameter"),
         ({"stiffness": {("k",): np.diag([1.0, 0.0])}}, "mechanism: degree of freedom 1 can move"),
@@ -152,6 +156,7 @@ def test_affine_model_names_what_is_wrong(arguments, message):
         ({"bounds": [[0.0, 1.2]] * 4}, "bounds of parameter 'bottom'"),
         ({"bounds": [[0.8, np.nan]] * 4}, "bounds of parameter 'bottom'"),
         ({"n_samples": 0}, "n_samples is 0"),
+        ({"n_samples": 10.0}, "n_samples is 10.0; expected a positive integer"),
         ({"method": "grid"}, "method is 'grid'; expected one of"),
     ],
 )
@@ -164,6 +169,20 @@ def test_callable_model_names_the_shape_it_got():
     model = CallableModel(lambda row: row[:2], ["a", "b", "c"], 3)
     with pytest.raises(ValueError, match=r"function returned shape \(2,\); expected \(3,\) for one row"):
         model.frequencies([[1.0, 2.0, 3.0]])
+
+
+@pytest.mark.parametrize(
+    ("names", "n_modes", "message"),
+    [
+        (["a", "a"], 1, "expected one or more different names"),
+        ([], 1, "different names"),
+        (["a"], 1.5, "n_modes is 1.5"),
+    ],
+)
+def test_callable_model_checks_what_it_is_made_of(names, n_modes, message):
+    with pytest.raises(ValueError, match=message):
+        CallableModel(np.sqrt, names, n_modes)
+    assert CallableModel(np.sqrt, "stiffness", 1).parameter_names == ("stiffness",)
 
 
 def test_dense_and_sparse_matrices_and_plain_keys_are_one_model():

@@ -46,11 +46,13 @@ def test_nothing_to_count_is_nan_and_bad_input_is_named():
         ([0.9, 0.95, 1.0], 0.1),
         ([0.95, 0.5, 1.0], 0.3),  # found by luck at 0.1, missed at 0.2
         ([0.1, 0.2, 0.3], np.nan),
+        ([0.95, np.nan, 1.0], 0.3),
     ],
 )
 def test_minimum_detectable_damage(pod, expected):
     np.testing.assert_equal(minimum_detectable_damage([0.1, 0.2, 0.3], pod), expected)
     np.testing.assert_equal(minimum_detectable_damage([0.3, 0.1, 0.2], np.take(pod, [2, 0, 1])), expected)
+    np.testing.assert_equal(minimum_detectable_damage([-0.1, -0.2, -0.3], pod), -expected)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +61,7 @@ def test_minimum_detectable_damage(pod, expected):
         ([0.1, 0.2], [0.5], 0.9, "severities have shape"),
         ([0.1, 0.1], [0.5, 0.6], 0.9, "expected different numbers"),
         ([0.1, 0.2], [50, 60], 0.9, "not percent"),
-        ([0.1, 0.2], [0.5, np.nan], 0.9, "pod is"),
+        ([0.1, 0.2], [0.5, 1.1], 0.9, "pod is"),
         ([0.1, 0.2], [0.5, 0.6], 90, "level is 90"),
     ],
 )

@@ -81,4 +81,6 @@ def test_aligner_names_what_is_wrong(aligner, X, message):
 
 def test_aligner_wants_as_many_modes_back():
     with pytest.raises(ValueError, match="X has 2 features; expected 3 modes"):
-        BiasAligner().fit(F).inverse_transform(F[["f1", "f2"]])
+        BiasAligner().fit(F).inverse_transform(F[["f1", "f2"]].to_numpy())
+    with pytest.raises(ValueError, match="feature names"):
+        BiasAligner().fit(F).inverse_transform(F[["f2", "f1", "f3"]])

@@ -1,5 +1,7 @@
 """Lagged temperatures, by row and by time."""
 
+from datetime import timedelta
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -100,6 +102,12 @@ def test_gaps_are_bridged_up_to_the_tolerance():
     assert lags["4h"].loc[after, "T1_lag1"] == 9
 
 
+def test_durations_come_in_every_form():
+    expected = LagFeatures(3, freq="1h", tolerance="0h").fit_transform(T)
+    for hour in ("h", "60min", timedelta(hours=1), np.timedelta64(1, "h"), pd.Timedelta("1h"), pd.offsets.Hour()):
+        pd.testing.assert_frame_equal(LagFeatures(3, freq=hour, tolerance="0h").fit_transform(T), expected)
+
+
 def test_missing_values_are_carried_along():
     holed = T.copy()
     holed.iloc[7, 0] = np.nan
@@ -142,6 +150,8 @@ def test_set_output_and_single_precision():
         ({"tolerance": "1h"}, T.to_numpy(), "tolerance is '1h', but X has no DatetimeIndex"),
         ({"freq": "soon"}, T, "freq is 'soon'; expected a duration"),
         ({"freq": "-1h"}, T, "freq is '-1h'; expected a positive duration"),
+        ({"freq": "24"}, T, "freq is '24'; expected a positive duration with its unit"),
+        ({"freq": "0h"}, T, "freq is '0h'; expected a positive duration"),
         ({"lags": [0, 0]}, T, r"lags is \[0, 0\]; expected"),
         ({"lags": [-1]}, T, r"lags is \[-1\]"),
         ({"lags": []}, T, r"lags is \[\]"),

@@ -7,8 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from joblib.externals.loky import get_reusable_executor
+from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
+from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score, cross_validate
@@ -16,6 +18,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets._truss import truss_structure
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
@@ -207,6 +210,7 @@ def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
 
 
 LOGGED_MODEL = """
+import time
 import numpy as np
 
 class Logged:
@@ -217,6 +221,7 @@ class Logged:
         self.log = log
 
     def frequencies(self, theta):
+        time.sleep(0.3 * (len(theta) == 77))  # long enough for the other process to come along
         with open(self.log, "a") as file:
             file.write(f"{len(theta)}\\n")
         return np.sqrt(theta)
@@ -262,9 +267,61 @@ def test_impossible_parameters_are_nan_with_a_warning():
             return theta
 
     model = chain(mapper=Wild(LinearRegression())).fit(T, F)
-    with pytest.warns(UserWarning, match="not finite and positive in 2 of 365 rows"):
+    with pytest.warns(UserWarning, match=r"in 2 of 365 rows, row 2 the first, .* outside 1e-06 to 1e\+06"):
         predicted = model.predict(T)
     np.testing.assert_array_equal(np.flatnonzero(predicted.isna().all(axis=1)), [2, 5])
+
+
+def test_a_broken_sensor_costs_its_rows_and_no_others():
+    broken = LATER.temperatures.copy()
+    broken.iloc[3, 0] = -99999.0
+    model = chain(mapper=TemperatureMapper(LinearRegression())).fit(T, F)
+    with pytest.warns(UserWarning, match="in 1 of 365 rows, row 3 the first"):
+        predicted = model.predict(broken)
+    np.testing.assert_array_equal(np.flatnonzero(predicted.isna().any(axis=1)), [3])
+
+
+def test_an_inverse_of_another_models_parameters_is_refused():
+    other = truss_structure().assemble(TRUSS.parameter_names[::-1])
+    with pytest.raises(ValueError, match=r"the inverse's model has the parameters \['vertical', "):
+        chain(inverse=inverse().set_params(model=other)).fit(T, F)
+
+
+def test_imputers_that_append_indicators_serve_too():
+    holed_T, holed_F = gappy()
+    plain, marked = (
+        chain(imputer=KNNGapImputer(add_indicator=mark), mapper=mapper(lags=1)).fit(holed_T, holed_F)
+        for mark in (False, True)
+    )
+    pd.testing.assert_frame_equal(marked.parameters_, plain.parameters_)
+
+
+def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
+    trees = ExtraTreesRegressor(3)
+    parts = {
+        "inverse": InverseSurrogate(TRUSS, trees, bounds=0.2, n_samples=50, random_state=1),
+        "mapper": TemperatureMapper(trees, random_state=2),
+    }
+    first, second = (chain(**parts, random_state=seed).fit(T, F).predict(T) for seed in (0, 9))
+    pd.testing.assert_frame_equal(first, second)
+
+
+def test_nullable_frames_are_frames():
+    holed_T, holed_F = gappy()
+    nullable = holed_F.astype("Float64")
+    model = chain(mapper=mapper(lags=1)).fit(holed_T.astype("Float64"), nullable)
+    reference = chain(mapper=mapper(lags=1)).fit(holed_T, holed_F)
+    assert model.score(holed_T, nullable) == pytest.approx(reference.score(holed_T, holed_F))
+    assert frequency_scorer(model, holed_T, nullable) == frequency_scorer(model, holed_T, holed_F)
+    np.testing.assert_array_equal(mape(nullable, holed_F), 0)
+
+
+def test_pandas_output_everywhere_changes_no_value():
+    transformer = make_pipeline(BiasAligner(TRUSS), inverse())
+    words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
+    with config_context(transform_output="pandas"):
+        np.testing.assert_allclose(words.fit(T, F).predict(T), FITTED.predict(T), rtol=1e-12)
+        pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), FITTED.predict(T))
 
 
 def test_an_inverse_within_a_pipeline_gets_the_model_too():
