@@ -103,7 +103,7 @@ def plot_folds(table):
     fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
     for name, colour, marker in (("contiguous folds", BLUE, "o"), ("random folds", ORANGE, "s")):
         ax.plot(table.index, table[name], marker=marker, color=colour, label=name)
-    ax.set(xlabel="lags (hours, the current one included)", ylabel="MAPE of frequencies (%)", ylim=(0, None))
+    ax.set(xlabel="lags (hours, the current one included)", ylabel="MAPE of frequencies (%)")
     ax.set_xticks(table.index)
     ax.legend()
     return fig

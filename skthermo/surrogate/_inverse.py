@@ -252,7 +252,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         share = share_reordered(self.model, checked)
         if share:
             warnings.warn(
-                f"modes change their order in {share:.0%} of {len(checked)} samples of the box, and the model sorts "
+                f"modes change their order in {share:.1%} of {len(checked)} samples of the box, and the model sorts "
                 "them: expected narrower bounds, or a model with track=True",
                 UserWarning,
                 stacklevel=5,

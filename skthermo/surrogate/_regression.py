@@ -104,7 +104,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self._n_parameters), np.nan)
         if complete.any():
-            # Far outside what was learned, exp overflows to inf: whoever goes on with theta must see that.
+            # Far outside what was learned exp overflows to inf, which is what it should say.
             with np.errstate(over="ignore"):
                 theta[complete] = as_columns(self._regression.predict(inputs[complete]))
         return theta

@@ -120,7 +120,7 @@ def crossing(track):
 
 
 def test_modes_that_change_order_warn_with_their_share_unless_tracked(recwarn):
-    with pytest.warns(UserWarning, match=r"modes change their order in \d+% of 100 samples"):
+    with pytest.warns(UserWarning, match=r"modes change their order in \d+\.\d% of 100 samples"):
         InverseSurrogate(crossing(False), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()
     recwarn.clear()
     InverseSurrogate(crossing(True), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()

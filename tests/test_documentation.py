@@ -1,0 +1,37 @@
+"""Code in README and the user guide runs, and the figures that README shows are there."""
+
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.rst"))]
+
+
+def python_blocks(page):
+    text = page.read_text()
+    if page.suffix == ".md":
+        return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    indented = re.findall(r"\.\. code-block:: python\n\n((?:    .*\n|\n)+)", text)
+    return [textwrap.dedent(block) for block in indented]
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if python_blocks(p)], ids=lambda p: p.name)
+def test_a_pages_code_runs_from_top_to_bottom(page, capsys):
+    namespace = {}
+    for block in python_blocks(page):
+        exec(compile(block, page.name, "exec"), namespace)
+    printed = capsys.readouterr().out
+    assert "print(" not in page.read_text() or 0 <= float(printed) <= 1
+
+
+def test_the_guide_shows_code():
+    assert sum(len(python_blocks(page)) for page in PAGES) >= 5
+
+
+def test_images_of_readme_exist():
+    images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
+    assert images
+    assert all((ROOT / image).is_file() for image in images)
