@@ -94,13 +94,14 @@ class FlexibilityForm:
         return FlexibilityForm(self._stiffness.scaled(factors), self._mass)
 
 
-def _positive(eigenvalues: Array, theta: Array) -> Array:
+def _positive(eigenvalues: NDArray[np.floating], theta: Array) -> Array:
+    """Eigenvalues of stable structures, or an error that says which theta is not one."""
     if not (eigenvalues[:, :1] > 0).all():
         row = theta[np.argmin(eigenvalues[:, 0])]
         raise ValueError(
             f"the stiffness at theta = {row.tolist()} is not positive definite; expected a stable structure"
         )
-    return eigenvalues
+    return np.asarray(eigenvalues, dtype=float)
 
 
 def dense_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
