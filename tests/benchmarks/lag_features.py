@@ -6,22 +6,12 @@ Medians of several rounds in one run. Peak memory is what one call allocates bey
 """
 
 import argparse
-import statistics
-import time
-import tracemalloc
 
 import numpy as np
 import pandas as pd
+from measure import median_seconds, peak_megabytes
 
 from skthermo.preprocessing import LagFeatures
-
-
-def peak_megabytes(function):
-    tracemalloc.start()
-    function()
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak / 1e6
 
 
 def main():
@@ -45,19 +35,13 @@ def main():
         "LagFeatures, frame": lambda: LagFeatures(lags).fit_transform(plain),
         "LagFeatures, by time": lambda: LagFeatures(lags, freq="1h").fit_transform(stamped),
     }
-    seconds = {name: [] for name in ways}
-    for _ in range(options.rounds):
-        for name, way in ways.items():
-            start = time.perf_counter()
-            way()
-            seconds[name].append(time.perf_counter() - start)
-    reference = statistics.median(seconds["pandas shift and concat"])
+    medians = median_seconds(ways, options.rounds)
+    reference = medians["pandas shift and concat"]
     output = values.nbytes * lags / 1e6
     print(f"{options.rows} x {options.sensors}, {lags} lags ({output:.0f} MB out), median of {options.rounds} rounds")
     print(f"{'':40s} seconds   over pandas   peak MB")
     for name, way in ways.items():
-        median = statistics.median(seconds[name])
-        print(f"{name:40s} {median:7.3f}   {median / reference:11.2f}   {peak_megabytes(way):7.1f}")
+        print(f"{name:40s} {medians[name]:7.3f}   {medians[name] / reference:11.2f}   {peak_megabytes(way):7.1f}")
 
 
 if __name__ == "__main__":

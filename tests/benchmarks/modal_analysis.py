@@ -8,11 +8,9 @@ memory is what one call allocates beyond its input.
 
 import argparse
 import os
-import statistics
-import time
-import tracemalloc
 
 import scipy.linalg
+from measure import median_seconds, peak_megabytes
 from threadpoolctl import threadpool_limits
 
 from skthermo.datasets import make_truss
@@ -25,14 +23,6 @@ def loop(model, theta, **options):
     for coefficients in terms.coefficients(theta):
         stiffness = sum(c * matrix for c, matrix in zip(coefficients, terms.matrices, strict=True))
         scipy.linalg.eigh(stiffness, mass, **options)
-
-
-def peak_megabytes(function):
-    tracemalloc.start()
-    function()
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak / 1e6
 
 
 def main():
@@ -51,20 +41,13 @@ def main():
             model, theta, eigvals_only=True, subset_by_index=[0, 5]
         ),
     }
-    seconds = {name: [] for name in ways}
     with threadpool_limits(1):
-        for _ in range(options.rounds):
-            for name, way in ways.items():
-                start = time.perf_counter()
-                way()
-                seconds[name].append(time.perf_counter() - start)
-    medians = {name: statistics.median(values) for name, values in seconds.items()}
+        medians = median_seconds(ways, options.rounds)
     batch = medians["batch, one thread"]
     print(f"{options.samples} truss solves, {os.cpu_count()} cores, median of {options.rounds} rounds")
     print(f"{'':60s} seconds   over batch   peak MB")
     for name, median in medians.items():
-        memory = peak_megabytes(ways[name])
-        print(f"{name:60s} {median:7.3f}   {median / batch:10.2f}   {memory:7.1f}")
+        print(f"{name:60s} {median:7.3f}   {median / batch:10.2f}   {peak_megabytes(ways[name]):7.1f}")
     fastest_loop = min(seconds for name, seconds in medians.items() if name.startswith("loop"))
     print(f"fastest loop over sample, n_jobs=2: {fastest_loop / medians['sample, n_jobs=2']:.2f}")
 
