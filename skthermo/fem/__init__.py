@@ -1,6 +1,7 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
 from skthermo.fem._affine import AffineModel
+from skthermo.fem._beam import Beam
 from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._noise import add_noise
@@ -12,6 +13,7 @@ from skthermo.fem._tracking import mac
 __all__ = [
     "AffineModel",
     "Bar",
+    "Beam",
     "CallableModel",
     "FEModel",
     "PointMass",

@@ -10,6 +10,9 @@ from skthermo.fem._elements import ByProperties, Dof
 STIFFNESS = "stiffness"
 """The whole stiffness of a group, whatever properties its members have."""
 
+MASS = "mass"
+"""The whole mass of a group."""
+
 Key = tuple[str, ...]
 
 
@@ -41,7 +44,7 @@ class TermAssembler:
             key = tuple(
                 parameter
                 for parameter, prop in bound.items()
-                for _ in range(1 if prop == STIFFNESS else properties.count(prop))
+                for _ in range(1 if prop in (STIFFNESS, MASS) else properties.count(prop))
             )
             block = matrix[np.ix_(free, free)]
             self._entries.setdefault((key, damage), []).append((block, *grid))

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]
 
-TRANSLATIONS = "xyz"
+TRANSLATIONS = ("x", "y", "z")
+ROTATIONS = ("rx", "ry", "rz")
 
 
 class Element(Protocol):
@@ -33,6 +34,9 @@ class Element(Protocol):
     def properties(self) -> Iterator[tuple[str, float, bool]]:
         """Name, value and whether zero is allowed, of every physical property."""
 
+    def ends(self, coordinates: Array) -> Array:
+        """Where the element itself begins and ends, given its nodes."""
+
     def stiffness(self, coordinates: Array) -> ByProperties:
         """Stiffness matrices in N/m by the product of properties that multiplies each."""
 
@@ -40,8 +44,8 @@ class Element(Protocol):
         """Mass matrices in kg by the product of properties that multiplies each."""
 
 
-class _Sheet:
-    """Names and values of an element's physical properties."""
+class Sheet:
+    """What elements share: names and values of their physical properties."""
 
     _properties: tuple[str, ...]
     _may_be_zero: tuple[str, ...] = ()
@@ -50,9 +54,13 @@ class _Sheet:
         for name in self._properties:
             yield name, getattr(self, name), name in self._may_be_zero
 
+    def ends(self, coordinates: Array) -> Array:
+        """Where the element itself begins and ends, given its nodes."""
+        return coordinates
+
 
 @dataclass(frozen=True)
-class Bar(_Sheet):
+class Bar(Sheet):
     """Straight bar that carries axial force only, in 2-D or 3-D.
 
     Parameters
@@ -110,7 +118,7 @@ class Bar(_Sheet):
 
 
 @dataclass(frozen=True)
-class Spring(_Sheet):
+class Spring(Sheet):
     """Spring between a node and the ground.
 
     Parameters
@@ -118,9 +126,9 @@ class Spring(_Sheet):
     node : hashable
         Name of its node.
     direction : str
-        "x", "y" or "z".
+        "x", "y" or "z", or, against rotation about an axis, "rx", "ry" or "rz".
     k : float
-        Stiffness in N/m.
+        Stiffness in N/m, or N m/rad against rotation.
 
     Examples
     --------
@@ -154,7 +162,7 @@ class Spring(_Sheet):
 
 
 @dataclass(frozen=True)
-class PointMass(_Sheet):
+class PointMass(Sheet):
     """Mass lumped at a node, the same in every direction.
 
     Parameters
@@ -202,9 +210,10 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         if node not in coordinates:
             raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")
     if len(element.nodes) == 2:
-        start, end = element.nodes
-        if np.array_equal(coordinates[start], coordinates[end]):
-            raise ValueError(f"member {name!r} from node {start!r} to node {end!r} has zero length")
+        first, last = element.nodes
+        start, end = element.ends(np.array([coordinates[first], coordinates[last]]))
+        if np.array_equal(start, end):
+            raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
         if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo.fem._affine import AffineModel
-from skthermo.fem._assembly import STIFFNESS, TermAssembler
-from skthermo.fem._elements import TRANSLATIONS, Dof, Element, check_element
+from skthermo.fem._assembly import MASS, STIFFNESS, TermAssembler
+from skthermo.fem._elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element
 
 Array = NDArray[np.float64]
 Binding = tuple[str, str]
@@ -21,9 +21,9 @@ class Structure:
     nodes : mapping of node to coordinates
         (x, y) or (x, y, z) in m.
     members : mapping of member to element
-        `Bar`, `Spring` and `PointMass` objects.
+        `Bar`, `Beam`, `Spring` and `PointMass` objects.
     supports : mapping of node to directions
-        Fixed directions of a node, such as "xy" or ("x", "y").
+        Fixed directions of a node, such as "xy", ("x", "y") or "xyz rx ry rz".
     groups : mapping of group to members, optional
         Named groups; a member may be in several, or in none.
 
@@ -98,8 +98,8 @@ class Structure:
         ----------
         parameters : sequence of str, or mapping of str to group or (property, group)
             What theta multiplies. A group's name stands for the whole stiffness of the group;
-            ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "density", "k", "m") of
-            its members, in stiffness and mass.
+            ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "I_yy", "k", "m", ...) of
+            its members, in stiffness and mass; ``("mass", group)`` for the whole mass.
         groups : sequence of str, optional
             Groups that can be damaged. By default all of the structure's groups.
         n_modes : int, default=6
@@ -124,9 +124,8 @@ class Structure:
             dofs = element.dofs(self.dimension)
             bound = {p: prop for p, (prop, group) in bindings.items() if name in self._groups[group]}
             damage = frozenset(group for group in damageable if name in self._groups[group])
-            stiffness.add(element.stiffness(coordinates), dofs, bound, damage)
-            inertial = {p: prop for p, prop in bound.items() if prop != STIFFNESS}
-            mass.add(element.mass(coordinates), dofs, inertial)
+            stiffness.add(element.stiffness(coordinates), dofs, {p: d for p, d in bound.items() if d != MASS}, damage)
+            mass.add(element.mass(coordinates), dofs, {p: d for p, d in bound.items() if d != STIFFNESS})
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
@@ -151,10 +150,10 @@ class Structure:
             prop, group = (STIFFNESS, target) if isinstance(target, str) else target
             members = self._groups[self._known(group, f"parameter {name!r}")]
             known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
-            if prop not in known | {STIFFNESS}:
+            if prop not in known | {STIFFNESS, MASS}:
                 raise ValueError(
                     f"parameter {name!r} is the property {prop!r} of group {group!r}; "
-                    f"expected {STIFFNESS!r} or one of {sorted(known)}"
+                    f"expected {STIFFNESS!r}, {MASS!r} or one of {sorted(known)}"
                 )
             bindings[name] = (prop, group)
         return bindings
@@ -171,15 +170,15 @@ class Structure:
                 raise ValueError(f"group {group!r} holds {unknown or 'no member'}; expected names of members")
 
     def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
-        directions = tuple(TRANSLATIONS[: self.dimension])
+        directions = TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
         used: set[Dof] = set()
         for name, element in self._members.items():
-            used.update(element.dofs(self.dimension))
             for node, direction in element.dofs(self.dimension):
                 if direction not in directions:
                     raise ValueError(
-                        f"member {name!r} acts along {direction!r} of node {node!r}; expected {directions}"
+                        f"member {name!r} acts along {direction!r} of node {node!r}; expected one of {directions}"
                     )
+                used.add((node, direction))
         connected = {node for element in self._members.values() for node in element.nodes}
         for node in self._coordinates:
             if node not in connected:
@@ -188,9 +187,9 @@ class Structure:
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
-            for direction in along or ():
+            for direction in _read_directions(along):
                 if direction not in directions:
-                    raise ValueError(f"support of node {node!r} along {direction!r}; expected {directions}")
+                    raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
                 fixed.add((node, direction))
         free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used - fixed]
         if not free:
@@ -202,6 +201,14 @@ class Structure:
             f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
             f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
         )
+
+
+def _read_directions(along: Collection[str]) -> list[str]:
+    """Directions one by one: ("x", "ry") is such a list; "xyz rx ry" names five."""
+    if not isinstance(along, str):
+        return list(along or ())
+    words = along.split()
+    return [d for word in words for d in (word if set(word) <= set(TRANSLATIONS) else [word])]
 
 
 def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:

@@ -37,7 +37,7 @@ def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
         ({"members": MEMBERS | {"ab": ("a", "b")}}, "member 'ab' is .* expected an element such as Bar"),
         ({"nodes": NODES | {"c": "xy"}}, "node 'c' has the coordinates 'xy'"),
         ({"supports": {"q": "x"}}, "supports name node 'q'"),
-        ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'"),
+        ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'; expected some of"),
         ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
         ({"groups": {"tie": []}}, "group 'tie' holds no member"),
         ({"groups": {"tie": "ax"}}, "group 'tie' holds .'ax'."),

@@ -1,0 +1,251 @@
+"""Beams against closed forms, laws and an independent program."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from skthermo.fem import Beam, PointMass, Spring, Structure
+
+SECTION = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
+LENGTH = 4.0
+CLAMPED = "xyz rx ry rz"
+# Roots of the frequency equations of a uniform beam, beta L (Blevins, Formulas for Natural Frequency and Mode Shape).
+CANTILEVER = np.array([1.8751040687, 4.6940911330, 7.8547574382])
+FIXED = np.array([4.7300407449, 7.8532046241, 10.9956078380])
+PINNED = np.pi * np.arange(1, 4)
+
+
+def line(n_elements, supports, first=(), last=(), direction=(1.0, 0.0, 0.0), **options):
+    """Beams in a row, of which the first and last may be released."""
+    points = LENGTH * np.linspace(0, 1, n_elements + 1)[:, np.newaxis] * np.asarray(direction)
+    beams = {}
+    for i in range(n_elements):
+        ends = {"release_start": first if i == 0 else (), "release_end": last if i == n_elements - 1 else ()}
+        beams[f"beam {i}"] = Beam(i, i + 1, **(SECTION | ends | options))
+    at = {0: supports[0], n_elements: supports[1]}
+    return Structure(dict(enumerate(points)), beams, at, {"all": list(beams)})
+
+
+def frequencies(structure, n_modes):
+    return structure.assemble(["all"], n_modes=n_modes).frequencies([[1.0]])[0]
+
+
+def bending(roots, inertia):
+    return roots**2 / (2 * np.pi * LENGTH**2) * np.sqrt(SECTION["E"] * inertia / (SECTION["density"] * SECTION["A"]))
+
+
+CASES = {
+    "cantilever": (CANTILEVER, (CLAMPED, "")),
+    "clamped": (FIXED, (CLAMPED, CLAMPED)),
+    "simply supported": (PINNED, ("xyz rx", "yz")),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bending_about_both_axes(case):
+    roots, supports = CASES[case]
+    expected = np.sort(np.concatenate([bending(roots, SECTION[i])[:2] for i in ("I_yy", "I_zz")]))[:3]
+    np.testing.assert_allclose(frequencies(line(24, supports), 3), expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bending_converges_at_fourth_order(case):
+    roots, supports = CASES[case]
+    exact = bending(roots, SECTION["I_zz"])[0]
+    sizes = np.array([4, 8, 16])
+    errors = np.array([frequencies(line(n, supports), 1)[0] / exact - 1 for n in sizes])
+    assert (errors > 0).all()
+    np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(1 / sizes)), 4.0, atol=0.1)
+
+
+def test_torsion_and_tension():
+    """Held against bending, a shaft of polar inertia I_p twists, and a rod stretches, as the wave equation says."""
+    shaft = line(40, (CLAMPED, "yz ry rz"), I_p=7e-5)
+    twist = np.sqrt(SECTION["G"] * SECTION["J"] / (SECTION["density"] * 7e-5)) / (4 * LENGTH)
+    stretch = np.sqrt(SECTION["E"] / SECTION["density"]) / (4 * LENGTH)
+    model = Structure(
+        {0: (0, 0, 0), 1: (LENGTH, 0, 0)},
+        {"beam": Beam(0, 1, **SECTION, I_p=7e-5)},
+        {0: CLAMPED, 1: "yz ry rz"},
+        {"all": ["beam"]},
+    ).assemble(["all"], n_modes=2)
+    np.testing.assert_allclose(model.frequencies([[1.0]])[0], np.array([twist, stretch]) * 4 * np.sqrt(3) / (2 * np.pi))
+    fine = frequencies(shaft, 20)
+    for exact in (twist, stretch):
+        assert np.abs(fine / exact - 1).min() < 1e-3
+
+
+def test_lumped_mass_is_half_at_either_end():
+    model = line(1, (CLAMPED, "xy rx ry rz"), lumped=True)
+    stiffness = 12 * SECTION["E"] * SECTION["I_yy"] / LENGTH**3
+    mass = SECTION["density"] * SECTION["A"] * LENGTH / 2
+    np.testing.assert_allclose(frequencies(model, 1), np.sqrt(stiffness / mass) / (2 * np.pi), rtol=1e-12)
+
+
+def test_lumped_cantilever_converges_from_below():
+    coarse, fine = (frequencies(line(n, (CLAMPED, ""), lumped=True), 1)[0] for n in (8, 32))
+    exact = bending(CANTILEVER, SECTION["I_zz"])[0]
+    assert coarse < fine < exact
+    assert fine > 0.999 * exact
+
+
+def test_ends_released_from_clamped_nodes_are_simply_supported():
+    released = line(16, (CLAMPED, CLAMPED), first=("ry", "rz"), last=("ry", "rz"))
+    supported = line(16, ("xyz rx", "xyz rx"))
+    np.testing.assert_allclose(frequencies(released, 4), frequencies(supported, 4), rtol=1e-3)
+    np.testing.assert_allclose(
+        frequencies(line(64, (CLAMPED, CLAMPED), first=("ry", "rz"), last=("ry", "rz")), 4),
+        frequencies(line(64, ("xyz rx", "xyz rx")), 4),
+        rtol=1e-5,
+    )
+
+
+def test_a_beam_released_in_all_bending_is_a_bar():
+    beam = Beam(0, 1, **SECTION, release_start=("rx", "ry", "rz"), release_end=("ry", "rz"))
+    matrices = beam.stiffness(np.array([[0, 0, 0], [LENGTH, 0, 0.0]]))
+    np.testing.assert_allclose(
+        matrices["E", "A"][[0, 0], [0, 6]], SECTION["E"] * SECTION["A"] / LENGTH * np.array([1, -1])
+    )
+    for properties in (("G", "J"), ("E", "I_yy"), ("E", "I_zz")):
+        np.testing.assert_allclose(matrices[properties], 0, atol=1e-6)
+
+
+def rigid_motions(points):
+    """Six rigid motions of two nodes: translations, and rotations about the origin."""
+    motions = np.zeros((12, 6))
+    for k, point in enumerate(points):
+        motions[6 * k : 6 * k + 3, :3] = motions[6 * k + 3 : 6 * k + 6, 3:] = np.eye(3)
+        motions[6 * k : 6 * k + 3, 3:] = np.cross(np.eye(3), point).T
+    return motions
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rigid_motion_strains_nothing_and_carries_the_mass(seed):
+    rng = np.random.default_rng(seed)
+    points, arms = rng.normal(size=(2, 3)), rng.normal(size=(2, 3))
+    beam = Beam(0, 1, **SECTION, orientation=tuple(rng.normal(size=3)), offset_start=arms[0], offset_end=arms[1])
+    rigid = rigid_motions(points)
+    for matrix in beam.stiffness(points).values():
+        np.testing.assert_allclose(matrix @ rigid, 0, atol=1e-9 * np.abs(matrix).max())
+        np.testing.assert_allclose(matrix, matrix.T, atol=1e-9 * np.abs(matrix).max())
+    mass = rigid.T @ sum(beam.mass(points).values()) @ rigid
+    ends = points + arms
+    total = SECTION["density"] * SECTION["A"] * np.linalg.norm(ends[1] - ends[0])
+    np.testing.assert_allclose(mass[:3, :3], total * np.eye(3), atol=1e-9 * total)
+    centre = ends.mean(axis=0)
+    np.testing.assert_allclose(mass[:3, 3:], total * np.cross(np.eye(3), centre).T, atol=1e-9 * total * 10)
+
+
+def test_a_rigid_arm_is_a_very_stiff_beam():
+    arm = (0.0, 0.3, -0.5)
+    offset = Structure(
+        {0: (0, 0, 0), 1: (LENGTH, 0, 0)},
+        {"beam": Beam(0, 1, **SECTION, offset_end=arm), "tip": PointMass(1, 80.0)},
+        {0: CLAMPED},
+        {"all": ["beam"]},
+    )
+    stiff = {name: 1e5 * SECTION[name] for name in ("A", "I_yy", "I_zz", "J")} | {"E": SECTION["E"], "G": SECTION["G"]}
+    linked = Structure(
+        {0: (0, 0, 0), 1: (LENGTH, 0, 0), 2: np.add((LENGTH, 0, 0), arm)},
+        {"beam": Beam(0, 2, **SECTION), "arm": Beam(1, 2, **stiff), "tip": PointMass(1, 80.0)},
+        {0: CLAMPED},
+        {"all": ["beam"]},
+    )
+    np.testing.assert_allclose(frequencies(offset, 4), frequencies(linked, 4), rtol=1e-4)
+
+
+def portal(rotation=None):
+    """A frame in space with releases, arms, springs and a tank."""
+    turn = Rotation.identity() if rotation is None else rotation
+    points = {"a": (0, 0, 0), "b": (0, 0, 3), "c": (5, 1, 3), "d": (5, 1, 0)}
+    up = tuple(turn.apply([0.3, 0.2, 1.0]))
+    across = tuple(turn.apply([1.0, 0.5, 0.1]))
+    column = SECTION | {"orientation": across}
+    return Structure(
+        {name: turn.apply(point) for name, point in points.items()},
+        {
+            "left": Beam("a", "b", **column),
+            "beam": Beam(
+                "b", "c", **SECTION, orientation=up, release_end=("ry",), offset_start=turn.apply([0.2, 0, 0.1])
+            ),
+            "right": Beam("c", "d", **column, release_end=("rz",)),
+            "tank": PointMass("c", 300.0),
+        },
+        {"a": CLAMPED, "d": CLAMPED},
+        {"beam": ["beam"], "columns": ["left", "right"], "tank": ["tank"]},
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_frames_do_not_know_where_north_is(seed):
+    turned = portal(Rotation.random(random_state=seed)).assemble(["beam", "columns"])
+    theta = [[0.9, 1.2]]
+    np.testing.assert_allclose(
+        turned.frequencies(theta), portal().assemble(["beam", "columns"]).frequencies(theta), rtol=1e-8
+    )
+
+
+def every_parameter():
+    nodes = {"a": (0, 0, 0), "b": (0, 0, 3), "c": (5, 1, 3)}
+    members = {
+        "column": Beam("a", "b", **SECTION),
+        "beam": Beam("b", "c", **SECTION),
+        "rocking": Spring("a", "ry", 4e7),
+        "bearing": Spring("c", "z", 2e7),
+    }
+    groups = {"frame": ["column", "beam"], "soil": ["rocking"], "bearing": ["bearing"], "beam": ["beam"]}
+    parameters = {name: (name, "frame") for name in ("E", "G", "A", "I_yy", "I_zz", "J", "mass")}
+    parameters |= {"soil": ("k", "soil"), "bearing": "bearing", "density": ("density", "beam")}
+    return Structure(nodes, members, {"a": "xyz rx rz", "c": "y"}, groups).assemble(parameters, n_modes=5)
+
+
+def test_jacobian_of_every_property_equals_central_differences():
+    model = every_parameter()
+    theta = np.random.default_rng(0).uniform(0.8, 1.2, (3, len(model.parameter_names)))
+    step = 1e-5
+    differences = np.stack(
+        [
+            (model.frequencies(theta + step * e) - model.frequencies(theta - step * e)) / (2 * step)
+            for e in np.eye(theta.shape[1])
+        ],
+        axis=2,
+    )
+    scale = model.frequencies(theta)[:, :, np.newaxis]
+    np.testing.assert_allclose(model.jacobian(theta) / scale, differences / scale, atol=1e-6)
+
+
+def test_frequencies_are_homogeneous_in_stiffness_and_in_mass():
+    model = every_parameter()
+    theta = np.random.default_rng(1).uniform(0.8, 1.2, (3, len(model.parameter_names)))
+    relative = model.jacobian(theta) * theta[:, np.newaxis] / model.frequencies(theta)[:, :, np.newaxis]
+    share = dict(zip(model.parameter_names, np.moveaxis(relative, 2, 0), strict=True))
+    np.testing.assert_allclose(share["E"] + share["G"] + share["soil"] + share["bearing"], 0.5, rtol=1e-8)
+    np.testing.assert_allclose(share["mass"], -0.5, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"orientation": (1, 0, 0)}, r"orientation \(1, 0, 0\) is along the beam"),
+        ({"I_yy": -1.0}, "member 'beam' has I_yy = -1.0; expected a positive number"),
+        ({"J": 0.0}, "member 'beam' has J = 0.0"),
+        ({"offset_end": (-LENGTH, 0, 0)}, "member 'beam' from node 0 to node 1 has zero length"),
+    ],
+)
+def test_bad_beams_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        Structure(
+            {0: (0, 0, 0), 1: (LENGTH, 0, 0)},
+            {"beam": Beam(0, 1, **(SECTION | options))},
+            {0: CLAMPED},
+            {"g": ["beam"]},
+        ).assemble(["g"], n_modes=1)
+
+
+def test_bad_releases_and_dimensions_are_named():
+    with pytest.raises(ValueError, match=r"release_end names \['theta'\]"):
+        Beam(0, 1, **SECTION, release_end=("theta",))
+    with pytest.raises(ValueError, match="beam from node 0 to node 1: expected three coordinates"):
+        Structure({0: (0, 0), 1: (1, 0)}, {"beam": Beam(0, 1, **SECTION)}, {0: "xy"}, {"g": ["beam"]})
+    with pytest.raises(ValueError, match="node 1 along rx"):
+        line(1, (CLAMPED, ""), last=("rx",)).assemble(["all"], n_modes=1)
