@@ -2,5 +2,6 @@
 
 from skthermo.datasets._campaign import make_truss_campaign, steel_modulus
 from skthermo.datasets._truss import make_truss
+from skthermo.datasets._z24 import load_z24
 
-__all__ = ["make_truss", "make_truss_campaign", "steel_modulus"]
+__all__ = ["load_z24", "make_truss", "make_truss_campaign", "steel_modulus"]

@@ -1,0 +1,179 @@
+"""Monitoring of the Z24 bridge."""
+
+import csv
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.utils import Bunch
+
+from skthermo.datasets._matlab import read_matrices
+
+EPOCH = pd.Timestamp("1997-11-11")
+MODES = ["f1", "f2", "f3", "f4"]
+SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
+STATES = ("undamaged", "damaged")
+UNKNOWN = "unknown"
+Matrices = dict[str, NDArray[np.float64] | None]
+POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
+
+
+def load_z24(path: str | PathLike) -> Bunch:
+    """Read the monitoring of the Z24 highway bridge, with its progressive damage.
+
+    Z24 in Switzerland was a post-tensioned concrete box girder of 14 + 30 + 14 m, monitored for a
+    year, damaged step by step in its last month, and demolished in 1998 (KU Leuven). The data are not
+    part of this package: their use is non-commercial.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A CSV file with the columns ``record``, ``f1``..``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
+        ``TS``, ``Tair`` and ``state`` ("undamaged" or "damaged"), or the MATLAB v5 file in which the data
+        circulate: ``data`` (n x 4), ``Z24_TP``, ``Z24_TWN``, ... (n x 1) and, optionally, ``idx``
+        (mask over the hours) and ``nc`` (number of undamaged rows).
+
+    Returns
+    -------
+    Bunch
+        temperatures : DataFrame of shape (n_records, 7)
+            In degrees Celsius: pavement (TP), web (TWN, TWC), deck (TDS, TDT), soffit (TS) and air.
+        frequencies : DataFrame of shape (n_records, 4)
+            ``f1``..``f4`` in Hz.
+        state : Series of shape (n_records,)
+            "undamaged", "damaged", or "unknown" where a MATLAB file has no ``nc``.
+
+        All in file order, no row dropped, on one DatetimeIndex.
+
+    Raises
+    ------
+    ValueError
+        Names the file, and the field and row, of what is missing, repeated, not a number, or impossible
+        (frequencies outside 0.1 to 100 Hz, temperatures outside -60 to 80 C).
+
+    Notes
+    -----
+    Records are counted by hours; hours without an identified record are missing. Stamps are the counter
+    added to 1997-11-11 00:00, the day on which monitoring began; the hour of the first record is not
+    documented, so that times of day are nominal. What exactly the letters of a sensor's name mean is not
+    documented either. Without ``idx``, rows of a MATLAB file are taken as consecutive hours.
+
+    References
+    ----------
+    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
+    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import load_z24
+    >>> load_z24("no_such_folder/z24.csv")
+    Traceback (most recent call last):
+    ...
+    FileNotFoundError: no_such_folder/z24.csv is not a file; expected the Z24 data as CSV or MATLAB v5 file
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise FileNotFoundError(f"{file} is not a file; expected the Z24 data as CSV or MATLAB v5 file")
+    with open(file, "rb") as stream:
+        is_matlab = file.suffix.lower() == ".mat" or stream.read(6) == b"MATLAB"
+    table, state = _read_matlab(file) if is_matlab else _read_csv(file)
+    for name in table:
+        kind = "record" if name == "record" else "frequency" if name in MODES else "temperature"
+        _check_values(table[name].to_numpy(), *POSSIBLE[kind], f"{file}: field {name!r}")
+    record = table["record"].to_numpy()
+    if np.isnan(record).any() or (record % 1 != 0).any():
+        row = np.flatnonzero(np.isnan(record) | (record % 1 != 0))[0]
+        raise ValueError(f"{file}: field 'record', row {row} is {record[row]}; expected a whole number of hours")
+    index = pd.DatetimeIndex(EPOCH + pd.to_timedelta(record, unit="h"), name="time")
+    if index.has_duplicates:
+        row = np.flatnonzero(index.duplicated())[0]
+        raise ValueError(f"{file}: field 'record', row {row} repeats {record[row]:.0f}; expected each hour once")
+    table = table.set_index(index)
+    return Bunch(
+        temperatures=table[SENSORS], frequencies=table[MODES], state=pd.Series(state, index=index, name="state")
+    )
+
+
+def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
+    try:
+        with open(file, newline="", encoding="utf-8-sig") as stream:
+            header, *rows = list(csv.reader(stream)) or [[]]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{file}: not a readable CSV file ({error})") from error
+    wanted = ["record", *MODES, *SENSORS, "state"]
+    missing = [name for name in wanted if header.count(name) != 1]
+    if missing:
+        raise ValueError(f"{file}: the header has the fields {header[:20]}; expected {missing} once each")
+    if not rows:
+        raise ValueError(f"{file}: no rows below the header; expected records")
+    for number, row in enumerate(rows):
+        if len(row) != len(header):
+            raise ValueError(f"{file}: row {number} has {len(row)} fields; expected {len(header)}: is it cut off?")
+    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
+    for number, state in enumerate(columns["state"]):
+        if state not in STATES:
+            raise ValueError(f"{file}: field 'state', row {number} is {state!r}; expected one of {STATES}")
+    numeric = {name: _numbers(columns[name], f"{file}: field {name!r}") for name in wanted[:-1]}
+    return pd.DataFrame(numeric), list(columns["state"])
+
+
+def _numbers(texts: tuple[str, ...], what: str) -> NDArray[np.float64]:
+    """Floats, an empty text being a gap."""
+    values = np.full(len(texts), np.nan)
+    for row, text in enumerate(texts):
+        try:
+            values[row] = float(text) if text.strip() else np.nan
+        except ValueError as error:
+            raise ValueError(f"{what}, row {row} is {text!r}; expected a number or nothing") from error
+    return values
+
+
+def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
+    content = read_matrices(file)
+    data = _matlab_field(content, "data", file)
+    if data.ndim != 2 or data.shape[1] != len(MODES) or not len(data):
+        raise ValueError(f"{file}: field 'data' has shape {data.shape}; expected (n, {len(MODES)})")
+    columns: dict[str, NDArray] = {"record": _matlab_hours(content, len(data), file)}
+    columns |= dict(zip(MODES, data.T, strict=True))
+    for sensor in SENSORS:
+        values = _matlab_field(content, f"Z24_{sensor}", file)
+        if values.size != len(data):
+            raise ValueError(f"{file}: field 'Z24_{sensor}' has shape {values.shape}; expected ({len(data)}, 1)")
+        columns[sensor] = values.ravel()
+    if "nc" not in content:
+        return pd.DataFrame(columns), [UNKNOWN] * len(data)
+    n_undamaged = _matlab_field(content, "nc", file)
+    if n_undamaged.size != 1 or not 0 <= n_undamaged.item() <= len(data) or n_undamaged.item() % 1:
+        raise ValueError(f"{file}: field 'nc' is {n_undamaged.tolist()}; expected a number of rows up to {len(data)}")
+    count = int(n_undamaged.item())
+    return pd.DataFrame(columns), [STATES[0]] * count + [STATES[1]] * (len(data) - count)
+
+
+def _matlab_hours(content: Matrices, n_records: int, file: Path) -> NDArray[np.float64]:
+    if "idx" not in content:
+        return np.arange(float(n_records))
+    mask = _matlab_field(content, "idx", file).ravel()
+    if not np.isin(mask, (0, 1)).all() or mask.sum() != n_records:
+        raise ValueError(
+            f"{file}: field 'idx' marks {np.count_nonzero(mask == 1)} of {mask.size} hours; "
+            f"expected a mask of zeros and ones that marks the {n_records} rows of 'data'"
+        )
+    return np.flatnonzero(mask).astype(float)
+
+
+def _matlab_field(content: Matrices, name: str, file: Path) -> NDArray[np.float64]:
+    if name not in content:
+        raise ValueError(f"{file}: no field {name!r}; found {sorted(content)}")
+    matrix = content[name]
+    if matrix is None:
+        raise ValueError(f"{file}: field {name!r} is not a matrix of real numbers")
+    return matrix
+
+
+def _check_values(values: NDArray[np.float64], lowest: float, highest: float, what: str) -> None:
+    wrong = np.isinf(values) | (values < lowest) | (values > highest)
+    if wrong.any():
+        row = np.flatnonzero(wrong)[0]
+        raise ValueError(f"{what}, row {row} is {values[row]}; expected {lowest:g} to {highest:g}")
