@@ -6,7 +6,7 @@ import pytest
 from sklearn.impute import KNNImputer
 
 from skthermo.datasets import make_truss
-from skthermo.preprocessing import BiasAligner, KNNGapImputer
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, _nearest
 
 RNG = np.random.default_rng(0)
 HOURS = pd.date_range("2025-01-01", periods=80, freq="h")
@@ -23,6 +23,81 @@ def test_imputer_gives_scikit_learns_values_on_a_frame_of_its_own(weights):
     assert list(filled.columns) == list(GAPPY.columns)
     present = GAPPY.notna()
     pd.testing.assert_frame_equal(filled[present], GAPPY[present])
+
+
+@pytest.fixture
+def trees(monkeypatch):
+    """Trees even for few rows and small pools."""
+    monkeypatch.setattr(_nearest, "FEW_PAIRS", 0)
+    monkeypatch.setattr(_nearest, "PAIRS_PER_POOL", 0.0)
+    monkeypatch.setattr(_nearest, "SMALL_POOL", 3)
+
+
+def imputed_by_definition(donors, row, column, n_neighbors, weigh):
+    """One value, from all distances, directly."""
+    shared = ~np.isnan(donors) & ~np.isnan(row)
+    squares = np.where(shared, donors - row, 0) ** 2
+    usable = shared.any(axis=1) & ~np.isnan(donors[:, column])
+    distances = np.sqrt(squares.sum(axis=1)[usable] * len(row) / shared.sum(axis=1)[usable])
+    nearest = np.argsort(distances)[:n_neighbors]
+    return np.average(donors[usable, column][nearest], weights=weigh(distances[nearest]))
+
+
+def scattered(share):
+    rng = np.random.default_rng(1)
+    full = rng.normal(size=(500, 5)) @ rng.normal(size=(5, 5))
+    new = np.where(rng.random((60, 5)) < share, np.nan, full[:60] + 0.1)
+    return np.where(rng.random(full.shape) < share, np.nan, full), new[~np.isnan(new).all(axis=1)]
+
+
+@pytest.mark.usefixtures("trees")
+@pytest.mark.parametrize("share", [0.1, 0.5])
+@pytest.mark.parametrize("n_neighbors", [1, 10, 300])
+def test_trees_give_scikit_learns_values(share, n_neighbors):
+    gappy, new = scattered(share)
+    ours, theirs = (imputer(n_neighbors=n_neighbors).fit(gappy) for imputer in (KNNGapImputer, KNNImputer))
+    np.testing.assert_allclose(ours.transform(gappy), theirs.transform(gappy), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(ours.transform(new), theirs.transform(new), rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.usefixtures("trees")
+@pytest.mark.parametrize("share", [0.1, 0.5])
+@pytest.mark.parametrize(
+    ("weights", "weigh"),
+    [("uniform", np.ones_like), ("distance", np.reciprocal), (lambda d: np.exp(-d), lambda d: np.exp(-d))],
+    ids=["uniform", "distance", "callable"],
+)
+def test_trees_give_the_weighted_mean_of_the_nearest(weights, weigh, share):
+    gappy, new = scattered(share)
+    filled = KNNGapImputer(weights=weights).fit(gappy).transform(new)
+    for row, column in np.argwhere(np.isnan(new)):
+        expected = imputed_by_definition(gappy, new[row], column, 10, weigh)
+        assert filled[row, column] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+
+
+@pytest.mark.usefixtures("trees")
+def test_trees_serve_rows_without_any_value_indicators_and_empty_columns():
+    holed = GAPPY.copy()
+    holed.iloc[5] = np.nan
+    filled = KNNGapImputer().fit_transform(holed)
+    np.testing.assert_allclose(filled.iloc[5], holed.mean(), rtol=1e-12)
+    for options in ({"add_indicator": True}, {"keep_empty_features": True}):
+        data = holed.assign(f4=np.nan) if "keep_empty_features" in options else holed
+        ours, theirs = (
+            KNNGapImputer(**options).fit_transform(data),
+            KNNImputer(n_neighbors=10, **options).fit_transform(data),
+        )
+        np.testing.assert_allclose(ours, theirs, rtol=1e-10)
+    single = KNNGapImputer().fit_transform(holed.astype(np.float32))
+    assert (single.dtypes == np.float32).all()
+
+
+def test_trees_are_for_many_rows_of_few_patterns():
+    rng = np.random.default_rng(0)
+    few_patterns, many_patterns = (np.where(rng.random((9000, p)) < 0.1, np.nan, 1.0) for p in (6, 20))
+    assert _nearest.Donors(few_patterns).are_worth_trees(np.isnan(few_patterns))
+    assert not _nearest.Donors(few_patterns[:2000]).are_worth_trees(np.isnan(few_patterns[:2000]))
+    assert not _nearest.Donors(many_patterns).are_worth_trees(np.isnan(many_patterns))
 
 
 def test_imputer_keeps_arrays_and_single_precision():
