@@ -4,7 +4,8 @@ Among donors that share the same observed columns with a receiver, the NaN-aware
 an ordinary one in those columns, times the square root of (all columns / shared columns).
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
 SMALL_POOL = 256  # below it, all distances are faster than a tree
-CHUNK = 4096
+BLOCK = 512  # receivers that are asked together
 FEW_PAIRS = 10_000_000  # below it, so they are for the whole data
 PAIRS_PER_POOL = 2000  # about as many distances as one more pool costs
 
@@ -59,10 +60,12 @@ class Donors:
         rows = np.zeros((len(receivers), n_neighbors), dtype=np.intp)
         for shared, members in self._pools(observed, column):
             stretch = np.sqrt(len(shared) / shared.sum())
-            within = distances[:, -1].max() / stretch
-            pool = self.values[np.ix_(members, shared)]
-            found, at = _search(pool, receivers[:, shared], min(n_neighbors, len(pool)), within)
-            _merge(distances, rows, found * stretch, members[at])
+            search = _searcher(self.values[np.ix_(members, shared)], n_neighbors)
+            points = receivers[:, shared]
+            # Receivers that need only look nearby are asked together, so that their bound is tight.
+            for block in np.array_split(np.argsort(distances[:, -1]), math.ceil(len(points) / BLOCK)):
+                found, at = search(points[block], distances[block[-1], -1] / stretch)
+                _merge(distances, rows, block, found * stretch, members[at])
         return distances, rows
 
     def _pools(self, observed: Mask, column: int) -> Iterator[tuple[Mask, Rows]]:
@@ -76,25 +79,31 @@ class Donors:
         yield from sorted(joined, key=lambda pool: -len(pool[1]))
 
 
-def _search(pool: Array, points: Array, k: int, within: float) -> tuple[Array, Rows]:
-    """The k nearest of a pool; infinite distance and position 0 where fewer lie within a distance."""
-    if len(pool) > SMALL_POOL:
-        # The bound itself must count as inside, so that it is widened by rounding.
-        distances, at = cKDTree(pool).query(points, k=k, distance_upper_bound=within * (1 + 1e-9) + 1e-300)
-        distances, at = distances.reshape(len(points), k), at.reshape(len(points), k)
-        return distances, np.where(np.isinf(distances), 0, at)
-    parts = []
-    for i in range(0, len(points), CHUNK):
-        all_distances = cdist(points[i : i + CHUNK], pool)
-        at = np.argpartition(all_distances, k - 1, axis=1)[:, :k]
-        parts.append((np.take_along_axis(all_distances, at, axis=1), at))
-    distances, at = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return distances, at
+def _searcher(pool: Array, n_neighbors: int) -> Callable[[Array, float], tuple[Array, Rows]]:
+    """Search of a pool: distances and positions of the nearest, infinite and 0 beyond a distance."""
+    k = min(n_neighbors, len(pool))
+    if len(pool) <= SMALL_POOL:
+        return lambda points, within: _smallest(cdist(points, pool), k)
+    tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)  # most of the time goes into building
+
+    def search(points: Array, within: float) -> tuple[Array, Rows]:
+        # What is just as far away as the bound counts as inside, rounding allowed for.
+        found, at = tree.query(points, k=[*range(1, k + 1)], distance_upper_bound=within * (1 + 1e-9) + 1e-300)
+        return found, np.where(np.isinf(found), 0, at)
+
+    return search
 
 
-def _merge(distances: Array, rows: Rows, found: Array, found_rows: Rows) -> None:
-    """Keep the nearest of both, ascending, in the first two arrays."""
-    both = np.hstack([distances, found])
+def _smallest(distances: Array, k: int) -> tuple[Array, Rows]:
+    at = np.argpartition(distances, k - 1, axis=1)[:, :k]
+    return np.take_along_axis(distances, at, axis=1), at
+
+
+def _merge(distances: Array, rows: Rows, block: Rows, found: Array, found_rows: Rows) -> None:
+    """Keep the nearest of both, ascending, in a block of the first two arrays."""
+    closer = (found < distances[block, -1:]).any(axis=1)
+    block, found, found_rows = block[closer], found[closer], found_rows[closer]
+    both = np.hstack([distances[block], found])
     nearest = np.argsort(both, axis=1, kind="stable")[:, : distances.shape[1]]
-    distances[:] = np.take_along_axis(both, nearest, axis=1)
-    rows[:] = np.take_along_axis(np.hstack([rows, found_rows]), nearest, axis=1)
+    distances[block] = np.take_along_axis(both, nearest, axis=1)
+    rows[block] = np.take_along_axis(np.hstack([rows[block], found_rows]), nearest, axis=1)
