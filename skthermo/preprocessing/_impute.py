@@ -121,8 +121,7 @@ class KNNGapImputer(KNNImputer):
             )
         self._donors = None
         if self.metric == "nan_euclidean" and isinstance(self.missing_values, float) and np.isnan(self.missing_values):
-            values = check_array(X, dtype=np.float64, ensure_all_finite="allow-nan")
-            self._donors = Donors(values)
+            self._donors = Donors(check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True))
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

@@ -92,6 +92,15 @@ def test_trees_serve_rows_without_any_value_indicators_and_empty_columns():
     assert (single.dtypes == np.float32).all()
 
 
+@pytest.mark.usefixtures("trees")
+def test_donors_are_a_copy():
+    values = GAPPY.to_numpy(copy=True)
+    imputer = KNNGapImputer().fit(values)
+    expected = imputer.transform(GAPPY.to_numpy())
+    values[:] = 99.0
+    np.testing.assert_array_equal(imputer.transform(GAPPY.to_numpy()), expected)
+
+
 def test_trees_are_for_many_rows_of_few_patterns():
     rng = np.random.default_rng(0)
     few_patterns, many_patterns = (np.where(rng.random((9000, p)) < 0.1, np.nan, 1.0) for p in (6, 20))
