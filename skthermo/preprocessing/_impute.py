@@ -45,6 +45,10 @@ class KNNGapImputer(KNNImputer):
     keep_empty_features : bool, default=False
         True fills a column without any value with zeros instead of refusing it.
 
+    See Also
+    --------
+    sklearn.impute.KNNImputer : The parameters in full.
+
     Notes
     -----
     Values are those of ``KNNImputer``. It computes the distance of every pair of rows, which grows with the
@@ -53,10 +57,6 @@ class KNNGapImputer(KNNImputer):
     left to it. Where several rows are exactly as far away as the last neighbour, either may choose any; and
     distances are computed directly here, by an expansion there that loses digits of very small ones, which
     ``weights="distance"`` can show in the ninth digit.
-
-    See Also
-    --------
-    sklearn.impute.KNNImputer : The parameters in full.
 
     Examples
     --------
