@@ -10,7 +10,6 @@ from scipy.stats import qmc
 from sklearn.utils import Bunch, check_random_state
 
 from skthermo._threads import single_blas_thread
-from skthermo.fem._affine import AffineModel
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import ROWS_PER_CHUNK
 from skthermo.fem._theta import check_theta
@@ -111,20 +110,22 @@ def sample(
 def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None) -> Array:
     """Frequencies (n_samples, n_modes) of many rows; a row of theta with NaN gives NaN.
 
-    Rows are cut into the same chunks whatever ``n_jobs`` is, by `AffineModel` itself if one job is all.
+    Rows are cut into the same chunks whatever ``n_jobs`` is. A model that states its ``rows_per_chunk`` cuts
+    them itself if one job is all, and works outside Python's lock, so that threads serve it.
     """
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
     if not known.size:
         return frequencies
-    if isinstance(model, AffineModel) and effective_n_jobs(n_jobs) == 1:
+    stated_size = getattr(model, "rows_per_chunk", None)
+    if stated_size and effective_n_jobs(n_jobs) == 1:
         frequencies[known] = model.frequencies(rows[known])
         return frequencies
-    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    size = stated_size or ROWS_PER_CHUNK
     chunks = [rows[known[i : i + size]] for i in range(0, len(known), size)]
-    prefer = "threads" if isinstance(model, AffineModel) else None  # LAPACK works outside Python's lock
-    solved = Parallel(n_jobs=n_jobs, prefer=prefer)(delayed(_solve_chunk)(model, chunk) for chunk in chunks)
+    parallel = Parallel(n_jobs=n_jobs, prefer="threads" if stated_size else None)
+    solved = parallel(delayed(_solve_chunk)(model, chunk) for chunk in chunks)
     frequencies[known] = np.concatenate(solved)
     return frequencies
 

@@ -280,7 +280,9 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         F = like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
         check_same_rows(X, y, ("temperatures", "frequencies"))
         if F.shape[1] != self.model.n_modes:
-            raise ValueError(f"frequencies have {F.shape[1]} columns; expected the modes of {self.model!r}")
+            raise ValueError(
+                f"frequencies have {F.shape[1]} columns; expected the {self.model.n_modes} modes of {self.model!r}"
+            )
         check_columns(T, "temperature", varying=True)
         check_columns(F, "frequency")
         self._mode_names = column_names(F, "f")

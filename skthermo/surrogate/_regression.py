@@ -43,8 +43,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Positive if those learned from were; NaN in rows where an input is missing. A frame on X's index where X and
-            the multipliers learned from were frames.
+            Positive if those learned from were; NaN in rows where an input is missing. A frame on X's
+            index where X and the multipliers learned from were frames.
         """
         theta = self._predict_array(X)
         if self._y_is_vector:

@@ -372,7 +372,7 @@ def test_large_models_work_in_worker_processes():
     [
         (T, F.iloc[:100], "temperatures has 365 rows and frequencies 100"),
         (T, F.shift(freq="1D"), "temperatures and frequencies have different indices"),
-        (T, F[["f1", "f2"]], "frequencies have 2 columns; expected the modes of AffineModel"),
+        (T, F[["f1", "f2"]], "frequencies have 2 columns; expected the 6 modes of AffineModel"),
         (T.assign(T2=20.0), F, "temperature column 'T2' is constant"),
         (T.assign(T2=np.nan), F, "temperature column 'T2' is NaN in all 365 rows"),
         (T, F.assign(f3=np.nan), "frequency column 'f3' is NaN in all 365 rows"),
