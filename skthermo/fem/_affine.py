@@ -5,23 +5,32 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csc_array
 
 from skthermo._threads import map_on_blas_threads
 from skthermo.fem._affine_input import (
+    are_sparse,
     check_groups,
+    check_n_modes,
     check_names,
     check_severities,
-    count_modes,
     exponents_of,
     read_terms,
 )
-from skthermo.fem._eigen import dense_form, hertz
-from skthermo.fem._stability import check_supported
-from skthermo.fem._terms import CHUNK_BYTES, ROWS_PER_CHUNK, AffineTerms
-from skthermo.fem._theta import check_theta, nominal_theta
-from skthermo.fem._tracking import pair_modes
+from skthermo.fem._eigen import eigen_form, hertz
+from skthermo.fem._stability import check_supported, count_modes
+from skthermo.fem._terms import CHUNK_BYTES, ROWS_PER_CHUNK, AffineTerms, DenseTerms, SparseTerms
+from skthermo.fem._theta import check_theta, nominal_theta, warn_of_failures
+from skthermo.fem._tracking import may_be_missed, pair_modes, repeated
 
 Array = NDArray[np.float64]
+
+GUARD_MODES = 4
+"""Modes above the tracked ones that are looked at first, since an intruder pushes a mode up."""
+
+MOST_CANDIDATES = 8
+"""How many times as many candidates as modes are looked at before a mode counts as dissolved."""
+
 Terms = Mapping[tuple[str, ...], ArrayLike] | Sequence[tuple[tuple[str, ...], ArrayLike]]
 
 
@@ -66,9 +75,11 @@ class AffineModel:
 
     Notes
     -----
-    Eigenproblems are dense and solved in batches: with a constant mass that is factored once,
-    else (mass that depends on theta or is singular, or a wide spectrum) through the flexibility
-    L^-1 M L^-T with K = L L'. Batches run on as many threads as BLAS may use.
+    Up to 200 degrees of freedom eigenproblems are dense and solved in batches: with a constant mass that
+    is factored once, else (mass that depends on theta or is singular, or a wide spectrum) through the
+    flexibility L^-1 M L^-T with K = L L'. Larger ones are sparse and solved one by one by Lanczos
+    iterations on K^-1 M, from a seeded start. All run on as many threads as BLAS may use. Where the
+    stiffness is not positive definite, frequencies are NaN and a warning says at which theta.
 
     Examples
     --------
@@ -100,22 +111,25 @@ class AffineModel:
         dof_names: Sequence[str] | None = None,
     ):
         stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
-        mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=len(stiffness_matrices[0]))
+        mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
         self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
-        self._stiffness = AffineTerms(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
-        self._mass = AffineTerms(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         self._track = bool(track)
-        self._n_modes = n_modes
+        self._n_modes = check_n_modes(n_modes)
 
+        terms: type[AffineTerms] = SparseTerms if are_sparse(stiffness_matrices + mass_matrices) else DenseTerms
+        self._stiffness = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
+        self._mass = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         nominal = nominal_theta(len(self._parameter_names))
         dofs = dof_names or [f"degree of freedom {i}" for i in range(self.n_dof)]
         check_supported(self._stiffness.assemble(nominal)[0], dofs)
-        self._nominal_mass = self._mass.assemble(nominal)[0]
-        self._n_candidates = min(2 * n_modes, count_modes(self._nominal_mass, at_least=n_modes))
-        self._form = dense_form(self._stiffness, self._mass)
-        self._nominal_shapes = self._form.modes(nominal, n_modes)[1][0]
-        for array in (self._nominal_mass, self._nominal_shapes):
+        available = count_modes(self._mass.assemble(nominal)[0], at_least=n_modes)
+        self._most_candidates = min(available, MOST_CANDIDATES * n_modes)
+        self._form = eigen_form(self._stiffness, self._mass)
+        eigenvalues, shapes = self._form.modes(nominal, n_modes)
+        self._together = repeated(eigenvalues[0])
+        self._weighted_shapes = self._mass.product(nominal, shapes)[0]
+        for array in (self._together, self._weighted_shapes):
             array.flags.writeable = False
 
     @property
@@ -141,7 +155,13 @@ class AffineModel:
     @property
     def rows_per_chunk(self) -> int:
         """How many samples are solved at once, so that memory stays bounded."""
-        return max(1, min(ROWS_PER_CHUNK, CHUNK_BYTES // (8 * self.n_dof**2)))
+        numbers = max(self._stiffness.n_entries, 2 * self.n_dof * self.n_modes)
+        return max(1, min(ROWS_PER_CHUNK, CHUNK_BYTES // (8 * numbers)))
+
+    @property
+    def prefer(self) -> str:
+        """What joblib had better spread samples over: sparse solves hold Python's lock, dense ones do not."""
+        return "threads" if isinstance(self._stiffness, DenseTerms) else "processes"
 
     @property
     def groups(self) -> dict[str, tuple[int, ...]]:
@@ -215,23 +235,27 @@ class AffineModel:
         ndarray of shape (n_samples, n_modes, n_candidates)
             Between 0 and 1.
         """
-        weighted = self._nominal_mass @ shapes
-        return (self._nominal_shapes.T @ weighted) ** 2 / np.einsum("sim,sim->sm", shapes, weighted)[:, np.newaxis]
+        masses = (
+            self._mass.quadratic_forms(shapes) @ self._mass.coefficients(nominal_theta(len(self._parameter_names)))[0]
+        )
+        return (self._weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
-    def matrices(self, theta: ArrayLike) -> tuple[Array, Array]:
-        """Stiffness and mass.
+    def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
+        """Stiffness and mass at one theta.
 
         Parameters
         ----------
-        theta : array-like of shape (n_samples, n_parameters)
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
             Multipliers of the nominal parameters.
 
         Returns
         -------
-        stiffness, mass : ndarray of shape (n_samples, n_dof, n_dof)
+        stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
         """
-        theta = check_theta(theta, self.parameter_names)
-        return self._stiffness.assemble(theta), self._mass.assemble(theta)
+        row = check_theta(theta, self.parameter_names)
+        if len(row) != 1:
+            raise ValueError(f"theta has {len(row)} rows; expected one, since matrices of many take much memory")
+        return csc_array(self._stiffness.assemble(row)[0]), csc_array(self._mass.assemble(row)[0])
 
     def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
         """A new model with less stiffness (or more) in some groups; mass stays.
@@ -275,15 +299,23 @@ class AffineModel:
         return (hertz(self._form.eigenvalues(theta, self.n_modes)),)
 
     def _modes(self, theta: Array) -> tuple[Array, Array]:
-        if not self.track:
-            eigenvalues, shapes = self._form.modes(theta, self.n_modes)
-            return hertz(eigenvalues), shapes
-        eigenvalues, shapes = self._form.modes(theta, self._n_candidates)
-        order = pair_modes(self.likeness(shapes))
-        return (
-            np.take_along_axis(hertz(eigenvalues), order, axis=1),
-            np.take_along_axis(shapes, order[:, np.newaxis], axis=2),
-        )
+        if self.track:
+            return self._tracked(theta, min(self.n_modes + GUARD_MODES, self._most_candidates))
+        eigenvalues, shapes = self._form.modes(theta, self.n_modes)
+        return hertz(eigenvalues), shapes
+
+    def _tracked(self, theta: Array, n_candidates: int) -> tuple[Array, Array]:
+        """Nominal modes among the lowest candidates, and among more where these leave a doubt."""
+        eigenvalues, candidates = self._form.modes(theta, n_candidates)
+        likeness = self.likeness(candidates)
+        order = pair_modes(likeness, self._together)
+        frequencies = np.take_along_axis(hertz(eigenvalues), order, axis=1)
+        shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
+        doubtful = may_be_missed(likeness, order, self._together)
+        if n_candidates < self._most_candidates and doubtful.any():
+            more = min(2 * n_candidates, self._most_candidates)
+            frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], more)
+        return frequencies, shapes
 
     def _jacobian(self, theta: Array) -> tuple[Array]:
         frequencies, shapes = self._modes(theta)
@@ -297,4 +329,6 @@ class AffineModel:
         rows = check_theta(theta, self.parameter_names)
         size = self.rows_per_chunk
         parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
-        return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+        results = tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+        warn_of_failures(rows, results[0])
+        return results

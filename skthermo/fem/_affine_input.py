@@ -7,12 +7,19 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from skthermo.fem._terms import Matrix
+
 Key = tuple[str, ...]
 
+DENSE_DOFS = 200
+"""Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
 
-def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], Array]:
-    """Keys and stacked matrices (n_terms, n_dof, n_dof), copied, symmetric and dense."""
+DENSE_SHARE = 0.3
+"""Share of entries that are not zero from which on a matrix counts as dense."""
+
+
+def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:
+    """Keys and matrices, copied and symmetric, each dense or sparse as it came."""
     if isinstance(terms, Mapping):
         pairs = list(terms.items())
     elif isinstance(terms, Sequence) and all(_is_pair(term) for term in terms):
@@ -25,8 +32,8 @@ def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], A
     matrices = []
     for key, (_, matrix) in zip(keys, pairs, strict=True):
         matrices.append(_read_matrix(matrix, f"{what} term {key}", n_dof))
-        n_dof = len(matrices[0])
-    return keys, np.stack(matrices)
+        n_dof = matrices[0].shape[0]
+    return keys, matrices
 
 
 def _is_pair(term) -> bool:
@@ -40,24 +47,32 @@ def _read_key(key, what: str) -> Key:
     return names
 
 
-def _read_matrix(matrix, what: str, n_dof: int | None) -> Array:
-    array = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
+    array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else np.asarray(matrix)
     if np.iscomplexobj(array):
         raise ValueError(f"{what} is complex; expected a real matrix")
-    if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.size:
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.shape[0]:
         raise ValueError(f"{what} has shape {array.shape}; expected a square matrix")
-    if n_dof is not None and len(array) != n_dof:
+    if n_dof is not None and array.shape[0] != n_dof:
         raise ValueError(f"{what} has shape {array.shape}; expected ({n_dof}, {n_dof}) like the first term")
     array = array.astype(float)
-    if not np.isfinite(array).all():
+    if not np.isfinite(array.data if scipy.sparse.issparse(array) else array).all():
         raise ValueError(f"{what} holds values that are not finite")
-    if np.abs(array - array.T).max() > 1e-8 * np.abs(array).max():
-        row, column = np.unravel_index(np.abs(array - array.T).argmax(), array.shape)
+    skew = abs(array - array.T)
+    if skew.max() > 1e-8 * abs(array).max():
+        row, column = np.unravel_index(int(skew.argmax()), array.shape)
         raise ValueError(
             f"{what} is not symmetric: entries ({row}, {column}) and ({column}, {row}) are "
             f"{array[row, column]} and {array[column, row]}"
         )
     return (array + array.T) / 2
+
+
+def are_sparse(matrices: Sequence[Matrix]) -> bool:
+    """Whether shift-invert solves the sum of the matrices sooner than dense batches do."""
+    n_dof = matrices[0].shape[0]
+    entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
+    return n_dof > DENSE_DOFS and entries < DENSE_SHARE * n_dof**2
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
@@ -125,22 +140,6 @@ def check_n_modes(n_modes: int) -> int:
     if not isinstance(n_modes, Integral) or isinstance(n_modes, bool) or n_modes < 1:
         raise ValueError(f"n_modes is {n_modes!r}; expected a positive integer")
     return n_modes
-
-
-def count_modes(mass: Array, *, at_least: int) -> int:
-    """How many modes of finite frequency a mass matrix allows."""
-    check_n_modes(at_least)
-    eigenvalues = np.linalg.eigvalsh(mass)
-    tolerance = 10 * len(mass) * np.finfo(float).eps * abs(eigenvalues[-1])
-    if eigenvalues[0] < -tolerance:
-        raise ValueError(f"the nominal mass has the negative eigenvalue {eigenvalues[0]:.3g}; expected none below zero")
-    count = int((eigenvalues > tolerance).sum())
-    if count < at_least:
-        raise ValueError(
-            f"n_modes is {at_least}, but {len(mass)} degrees of freedom, {len(mass) - count} of them "
-            f"massless, have only {count} modes"
-        )
-    return count
 
 
 def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:

@@ -1,6 +1,7 @@
-"""Batches of dense generalised eigenproblems K phi = lambda M phi.
+"""Generalised eigenproblems K phi = lambda M phi of many theta.
 
-Two forms of the same problem. Both scale mode shapes to unit modal mass.
+Forms of the same problem, two of them dense and in batches. All scale mode shapes to unit modal mass, and
+give NaN where the stiffness is not positive definite.
 """
 
 from typing import Protocol
@@ -9,7 +10,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo.fem._terms import AffineTerms
+from skthermo.fem._shift_invert import ShiftInvertForm
+from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
 
 Array = NDArray[np.float64]
@@ -37,23 +39,22 @@ class StandardForm:
     The mass is factored once and every stiffness term transformed once.
     """
 
-    def __init__(self, stiffness: AffineTerms, basis: Array):
+    def __init__(self, stiffness: DenseTerms, basis: Array):
         self._basis = basis
         self._stiffness = stiffness
 
     @classmethod
-    def from_mass(cls, stiffness: AffineTerms, mass: Array) -> "StandardForm":
+    def from_mass(cls, stiffness: DenseTerms, mass: Array) -> "StandardForm":
         lower = np.linalg.cholesky(mass)
         basis = scipy.linalg.solve_triangular(lower, np.eye(len(mass)), lower=True).T
         return cls(stiffness.congruent(basis), basis)
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        eigenvalues = np.linalg.eigvalsh(self._stiffness.assemble(theta))
-        return _positive(eigenvalues[:, :n_modes], theta)
+        return _stable_only(np.linalg.eigvalsh(self._stiffness.assemble(theta)))[:, :n_modes]
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
         eigenvalues, shapes = np.linalg.eigh(self._stiffness.assemble(theta))
-        return _positive(eigenvalues[:, :n_modes], theta), self._basis @ shapes[:, :, :n_modes]
+        return _stable_only(eigenvalues)[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
 
     def scaled(self, factors: Array) -> "StandardForm":
         return StandardForm(self._stiffness.scaled(factors), self._basis)
@@ -66,45 +67,57 @@ class FlexibilityForm:
     digits of the lowest modes where the spectrum of stiffness is wide.
     """
 
-    def __init__(self, stiffness: AffineTerms, mass: AffineTerms):
+    def __init__(self, stiffness: DenseTerms, mass: DenseTerms):
         self._stiffness = stiffness
         self._mass = mass
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        flexibility, _ = self._flexibility(theta)
-        return 1 / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes]
+        flexibility, _, stable = self._flexibility(theta)
+        return stable / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes]
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        flexibility, back = self._flexibility(theta)
+        flexibility, back, stable = self._flexibility(theta)
         inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
-        eigenvalues = 1 / inverse_eigenvalues[:, ::-1][:, :n_modes]
+        eigenvalues = stable / inverse_eigenvalues[:, ::-1][:, :n_modes]
         return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
 
-    def _flexibility(self, theta: Array) -> tuple[Array, Array]:
-        stiffness = self._stiffness.assemble(theta)
-        try:
-            inverse = np.linalg.inv(np.linalg.cholesky(stiffness))
-        except np.linalg.LinAlgError:
-            _positive(np.linalg.eigvalsh(stiffness), theta)
-            raise
+    def _flexibility(self, theta: Array) -> tuple[Array, Array, Array]:
+        """B, L^-T, and a column of ones with NaN where the stiffness has no L."""
+        lower, stable = _cholesky(self._stiffness.assemble(theta))
+        inverse: Array = np.asarray(np.linalg.inv(lower), dtype=float)
         transposed = inverse.swapaxes(1, 2)
-        return inverse @ self._mass.assemble(theta) @ transposed, transposed
+        return inverse @ self._mass.assemble(theta) @ transposed, transposed, stable
 
     def scaled(self, factors: Array) -> "FlexibilityForm":
         return FlexibilityForm(self._stiffness.scaled(factors), self._mass)
 
 
-def _positive(eigenvalues: NDArray[np.floating], theta: Array) -> Array:
-    """Eigenvalues of stable structures, or an error that says which theta is not one."""
-    if not (eigenvalues[:, :1] > 0).all():
-        row = theta[np.argmin(eigenvalues[:, 0])]
-        raise ValueError(
-            f"the stiffness at theta = {row.tolist()} is not positive definite; expected a stable structure"
-        )
-    return np.asarray(eigenvalues, dtype=float)
+def _stable_only(eigenvalues: NDArray[np.floating]) -> Array:
+    """Eigenvalues in ascending order; rows whose lowest is not positive become NaN."""
+    return np.where(eigenvalues[:, :1] > 0, eigenvalues, np.nan)
 
 
-def dense_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
+def _cholesky(matrices: Array) -> tuple[Array, Array]:
+    """Lower factors and ones; the identity and NaN where a matrix is not positive definite."""
+    try:
+        return np.asarray(np.linalg.cholesky(matrices), dtype=float), np.ones((len(matrices), 1))
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.eye(matrices.shape[1])[np.newaxis], np.full((1, 1), np.nan)
+        factors, stable = zip(*(_cholesky(matrix[np.newaxis]) for matrix in matrices), strict=True)
+        return np.concatenate(factors), np.concatenate(stable)
+
+
+def eigen_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
+    """Batches for dense terms, shift-invert for sparse ones."""
+    if isinstance(stiffness, DenseTerms) and isinstance(mass, DenseTerms):
+        return dense_form(stiffness, mass)
+    if isinstance(stiffness, SparseTerms) and isinstance(mass, SparseTerms):
+        return ShiftInvertForm(stiffness, mass)
+    raise TypeError("stiffness and mass must both be dense or both sparse")
+
+
+def dense_form(stiffness: DenseTerms, mass: DenseTerms) -> EigenForm:
     """The standard form where it is accurate (and fastest), else the flexibility form."""
     if mass.is_constant:
         nominal = nominal_theta(stiffness.exponents.shape[1])

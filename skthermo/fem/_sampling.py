@@ -12,7 +12,7 @@ from sklearn.utils import Bunch, check_random_state
 from skthermo._threads import single_blas_thread
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import ROWS_PER_CHUNK
-from skthermo.fem._theta import check_theta
+from skthermo.fem._theta import check_theta, warn_of_failures
 
 Array = NDArray[np.float64]
 RandomState = int | np.random.RandomState | None
@@ -111,7 +111,7 @@ def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None) -> Arr
     """Frequencies (n_samples, n_modes) of many rows; a row of theta with NaN gives NaN.
 
     Rows are cut into the same chunks whatever ``n_jobs`` is. A model that states its ``rows_per_chunk`` cuts
-    them itself if one job is all, and works outside Python's lock, so that threads serve it.
+    them itself if one job is all, and may state what joblib should ``prefer``.
     """
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
@@ -124,9 +124,10 @@ def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None) -> Arr
         return frequencies
     size = stated_size or ROWS_PER_CHUNK
     chunks = [rows[known[i : i + size]] for i in range(0, len(known), size)]
-    parallel = Parallel(n_jobs=n_jobs, prefer="threads" if stated_size else None)
+    parallel = Parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
     solved = parallel(delayed(_solve_chunk)(model, chunk) for chunk in chunks)
     frequencies[known] = np.concatenate(solved)
+    warn_of_failures(rows[known], frequencies[known])  # which workers said where nobody hears it
     return frequencies
 
 

@@ -1,18 +1,24 @@
-"""Structures that can move without straining anything."""
+"""Structures that can move without straining anything, and masses that are none."""
 
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse.linalg
 from numpy.typing import NDArray
 
+from skthermo.fem._shift_invert import factorise, seeded_start
+from skthermo.fem._terms import Matrix
 
-def check_supported(stiffness: NDArray[np.float64], names: Sequence[str]) -> None:
+Array = NDArray[np.float64]
+
+
+def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
     """Refuse a stiffness matrix that leaves a motion free.
 
     Parameters
     ----------
-    stiffness : ndarray of shape (n_dof, n_dof)
-        Nominal stiffness.
+    stiffness : matrix of shape (n_dof, n_dof)
+        Nominal stiffness, dense or sparse.
     names : sequence of str
         What each degree of freedom is called in the error.
 
@@ -25,11 +31,69 @@ def check_supported(stiffness: NDArray[np.float64], names: Sequence[str]) -> Non
     if (diagonal <= 0).any():
         _refuse([name for name, stiff in zip(names, diagonal, strict=True) if stiff <= 0])
     scale = 1 / np.sqrt(diagonal)
-    eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
-    if eigenvalues[0] <= 50 * np.finfo(float).eps * eigenvalues[-1]:
-        motion = np.abs(scale * vectors[:, 0])
+    if isinstance(stiffness, np.ndarray):
+        eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
+        lowest, vector, highest = eigenvalues[0], vectors[:, 0], eigenvalues[-1]
+    else:
+        scaled = _scaled(stiffness, scale)
+        lowest, vector = _lowest(scaled)
+        highest = abs(scaled).sum(axis=0).max()
+    if lowest <= 50 * np.finfo(float).eps * highest:
+        motion = np.abs(scale * vector)
         largest = np.argsort(-motion, kind="stable")
         _refuse([names[i] for i in largest if motion[i] > 0.5 * motion[largest[0]]])
+
+
+def count_modes(mass: Matrix, *, at_least: int) -> int:
+    """How many modes of finite frequency a mass matrix allows.
+
+    Of a sparse matrix, as many as it has degrees of freedom with mass.
+
+    Raises
+    ------
+    ValueError
+        If these are fewer than ``at_least``, or the mass has a negative eigenvalue.
+    """
+    diagonal = mass.diagonal()
+    if isinstance(mass, np.ndarray):
+        eigenvalues = np.linalg.eigvalsh(mass)
+        tolerance = 10 * len(mass) * np.finfo(float).eps * abs(eigenvalues[-1])
+        negative, count = eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
+    else:
+        massive = diagonal > 0
+        scale = 1 / np.sqrt(np.where(massive, diagonal, 1.0))
+        shifted = _scaled(mass, scale) + SMALL_SHIFT * scipy.sparse.eye_array(len(diagonal), format="csc")
+        negative, count = factorise(shifted) is None, int(massive.sum())
+    if negative:
+        raise ValueError("the nominal mass has a negative eigenvalue; expected none below zero")
+    if count < at_least:
+        raise ValueError(
+            f"n_modes is {at_least}, but {len(diagonal)} degrees of freedom, {len(diagonal) - count} of them "
+            f"massless, have only {count} modes"
+        )
+    return count
+
+
+SMALL_SHIFT = 1e-10
+"""Makes a semidefinite matrix of unit diagonal definite."""
+
+
+def _scaled(matrix: scipy.sparse.csc_array, scale: Array) -> scipy.sparse.csc_array:
+    """Rows and columns multiplied."""
+    diagonal = scipy.sparse.diags_array(scale, format="csc")
+    return diagonal @ matrix @ diagonal
+
+
+def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
+    """Lowest eigenvalue and its vector, by a shift that lies below it."""
+    identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
+    shift = SMALL_SHIFT
+    while (factors := factorise(matrix + shift * identity)) is None:
+        shift *= 10
+    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factors.solve, dtype=float)
+    start = seeded_start(matrix.shape[0])
+    eigenvalue, vector = scipy.sparse.linalg.eigsh(matrix, 1, sigma=-shift, OPinv=inverse, v0=start)
+    return float(eigenvalue[0]), vector[:, 0]
 
 
 def _refuse(free: list[str]) -> None:

@@ -1,37 +1,36 @@
 """Matrices that are affine in products of the parameters."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TypeAlias
+
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Matrix: TypeAlias = Array | scipy.sparse.csc_array
 
 ROWS_PER_CHUNK = 256
 CHUNK_BYTES = 2**25
 
 
-class AffineTerms:
+class AffineTerms(ABC):
     """The sum over t of ``factor_t * prod_p(theta_p ** exponent_tp) * matrix_t``.
 
     Parameters
     ----------
-    matrices : ndarray of shape (n_terms, n, n)
-        Symmetric matrices.
     exponents : ndarray of shape (n_terms, n_parameters)
         How often each parameter multiplies each term; a row of zeros is the constant part.
     factors : ndarray of shape (n_terms,), optional
         Fixed multipliers, such as what damage leaves of a term. One by default.
     """
 
-    def __init__(self, matrices: Array, exponents: NDArray[np.int64], factors: Array | None = None):
-        self.matrices = matrices
-        self.exponents = exponents
-        self.factors = np.ones(len(matrices)) if factors is None else factors
-        for array in (self.matrices, self.exponents, self.factors):
-            array.flags.writeable = False
+    n_dof: int
 
-    @property
-    def n_dof(self) -> int:
-        return self.matrices.shape[1]
+    def __init__(self, exponents: NDArray[np.int64], factors: Array | None = None):
+        self.exponents = exponents
+        self.factors = np.ones(len(exponents)) if factors is None else factors
 
     @property
     def is_constant(self) -> bool:
@@ -45,24 +44,135 @@ class AffineTerms:
         """Derivative of ``coefficients``, (n_samples, n_terms, n_parameters)."""
         return self.coefficients(theta)[:, :, np.newaxis] * self.exponents / theta[:, np.newaxis]
 
-    def assemble(self, theta: Array) -> Array:
-        """The summed matrices, (n_samples, n, n)."""
-        flat = self.matrices.reshape(len(self.matrices), -1)
-        return (self.coefficients(theta) @ flat).reshape(-1, self.n_dof, self.n_dof)
-
-    def quadratic_forms(self, shapes: Array) -> Array:
-        """phi' A_t phi of every shape and term, (n_samples, n_modes, n_terms)."""
-        forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
-        return np.stack(forms, axis=2)
-
     def gradients(self, theta: Array, shapes: Array) -> Array:
         """phi' (dA / d theta_p) phi, (n_samples, n_modes, n_parameters)."""
         return self.quadratic_forms(shapes) @ self.coefficient_gradients(theta)
 
+    @classmethod
+    @abstractmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
+        """Terms with a factor of one."""
+
+    @abstractmethod
+    def assemble(self, theta: Array) -> Array | list[scipy.sparse.csc_array]:
+        """The summed matrix of every row of theta."""
+
+    def product(self, theta: Array, vectors: Array) -> Array:
+        """The summed matrix of every row times its vectors, (n_samples, n, n_vectors)."""
+        pairs = zip(self.assemble(theta), vectors, strict=True)
+        return np.stack([matrix @ columns for matrix, columns in pairs])
+
+    @property
+    @abstractmethod
+    def n_entries(self) -> int:
+        """Numbers in one summed matrix."""
+
+    @abstractmethod
+    def quadratic_forms(self, shapes: Array) -> Array:
+        """phi' A_t phi of every shape and term, (n_samples, n_modes, n_terms)."""
+
+    @abstractmethod
     def scaled(self, factors: Array) -> "AffineTerms":
         """The same matrices, each multiplied once more."""
-        return AffineTerms(self.matrices, self.exponents, self.factors * factors)
 
-    def congruent(self, basis: Array) -> "AffineTerms":
+    @abstractmethod
+    def congruent(self, basis: Array) -> "DenseTerms":
         """Each matrix A_t as basis' A_t basis; the coefficients stay."""
-        return AffineTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
+
+
+class DenseTerms(AffineTerms):
+    """Terms for batches: ``matrices`` is (n_terms, n, n)."""
+
+    def __init__(self, matrices: Array, exponents: NDArray[np.int64], factors: Array | None = None):
+        super().__init__(exponents, factors)
+        self.matrices = matrices
+        self.n_dof = matrices.shape[1]
+        _freeze(self.matrices, self.exponents, self.factors)
+
+    @classmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
+        return cls(np.stack([as_dense(matrix) for matrix in matrices]), exponents)
+
+    @property
+    def n_entries(self) -> int:
+        return self.n_dof**2
+
+    def assemble(self, theta: Array) -> Array:
+        flat = self.matrices.reshape(len(self.matrices), -1)
+        return (self.coefficients(theta) @ flat).reshape(-1, self.n_dof, self.n_dof)
+
+    def quadratic_forms(self, shapes: Array) -> Array:
+        forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
+        return np.stack(forms, axis=2)
+
+    def scaled(self, factors: Array) -> "DenseTerms":
+        return DenseTerms(self.matrices, self.exponents, self.factors * factors)
+
+    def congruent(self, basis: Array) -> "DenseTerms":
+        return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
+
+
+class SparseTerms(AffineTerms):
+    """Terms on the union of their patterns: ``entries`` is (n_union, n_terms), one column a matrix.
+
+    The union is stored as compressed sparse columns, so that a sum of terms is one product
+    with ``entries`` and has the same pattern whatever theta is.
+    """
+
+    def __init__(
+        self,
+        entries: scipy.sparse.csc_array,
+        pattern: tuple[NDArray[np.int32], NDArray[np.int32]],
+        exponents: NDArray[np.int64],
+        factors: Array | None = None,
+    ):
+        super().__init__(exponents, factors)
+        self.entries = entries
+        self.rows, self.pointers = pattern
+        self.n_dof = len(self.pointers) - 1
+        self._columns = np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
+        _freeze(entries.data, entries.indices, entries.indptr, *pattern, self.exponents, self.factors)
+
+    @classmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
+        n_dof = matrices[0].shape[0]
+        parts = [scipy.sparse.coo_array(matrix) for matrix in matrices]
+        places = np.concatenate([part.col.astype(np.int64) * n_dof + part.row for part in parts])
+        union, position = np.unique(places, return_inverse=True)
+        term = np.repeat(np.arange(len(parts)), [part.nnz for part in parts])
+        values = np.concatenate([part.data for part in parts])
+        entries = scipy.sparse.csc_array((values, (position, term)), shape=(len(union), len(parts)))
+        pointers = np.searchsorted(union, np.arange(n_dof + 1) * n_dof)
+        return cls(entries, ((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
+
+    @property
+    def n_entries(self) -> int:
+        return len(self.rows)
+
+    def assemble(self, theta: Array) -> list[scipy.sparse.csc_array]:
+        shape = (self.n_dof, self.n_dof)
+        sums = self.entries @ self.coefficients(theta).T
+        return [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in sums.T.copy()]
+
+    def quadratic_forms(self, shapes: Array) -> Array:
+        forms = [self.entries.T @ (shape[self.rows] * shape[self._columns]) for shape in shapes]
+        return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
+
+    def scaled(self, factors: Array) -> "SparseTerms":
+        return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
+
+    def congruent(self, basis: Array) -> DenseTerms:
+        shape = (self.n_dof, self.n_dof)
+        columns = (self.entries[:, [t]].toarray().ravel() for t in range(self.entries.shape[1]))
+        matrices = [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in columns]
+        return DenseTerms(np.stack([basis.T @ (matrix @ basis) for matrix in matrices]), self.exponents, self.factors)
+
+
+def as_dense(matrix: Matrix) -> Array:
+    """The same matrix as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
+def _freeze(*arrays: NDArray) -> None:
+    for array in arrays:
+        array.flags.writeable = False

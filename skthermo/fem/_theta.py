@@ -1,5 +1,6 @@
 """Rows of parameter multipliers."""
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,3 +54,16 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
             f"is {rows[row, column]} ({np.count_nonzero(wrong)} such values in all)"
         )
     return rows
+
+
+def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64]) -> None:
+    """Say how many rows have no solution, and at which theta the first of them is."""
+    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim)))
+    if failed.any():
+        first = np.flatnonzero(failed)[0]
+        warnings.warn(
+            f"{failed.sum()} of {len(theta)} samples have no modes and are NaN: the stiffness is not positive definite "
+            f"or the iteration did not converge, first at theta = {theta[first].tolist()} (row {first})",
+            UserWarning,
+            stacklevel=4,
+        )

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 SAME_MODE = 0.5
 """MAC above which no other mode can be more like the reference, since shapes are orthogonal."""
 
+REPEATED = 1e-6
+"""Relative distance of eigenvalues below which rounding decides which shapes they have."""
+
 
 def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     """Modal assurance criterion of every pair of mode shapes.
@@ -52,25 +55,50 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     return cross / np.outer(_squared_norms(a), _squared_norms(b))
 
 
-def pair_modes(likeness: NDArray[np.float64]) -> NDArray[np.intp]:
+def pair_modes(likeness: NDArray[np.float64], together: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
     """Assign to every reference mode the candidate that keeps the summed likeness highest.
 
     Parameters
     ----------
     likeness : ndarray of shape (n_samples, n_modes, n_candidates)
         MAC of reference modes and candidates.
+    together : ndarray of bool of shape (n_modes, n_modes), optional
+        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis, so that a
+        candidate is compared with the space they span, and those assigned go in ascending order.
 
     Returns
     -------
     ndarray of shape (n_samples, n_modes)
         Candidate of each reference mode; no candidate serves twice.
     """
-    best = likeness.argmax(axis=2)
-    clear = np.take_along_axis(likeness, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > SAME_MODE
+    spans = np.nan_to_num(likeness if together is None else together @ likeness)
+    best = spans.argmax(axis=2)
+    clear = np.take_along_axis(spans, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > SAME_MODE
     distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
     for sample in np.flatnonzero(~(clear & distinct)):
-        best[sample] = linear_sum_assignment(likeness[sample], maximize=True)[1]
+        best[sample] = linear_sum_assignment(spans[sample], maximize=True)[1]
+    for cluster in () if together is None else np.unique(together, axis=0):
+        best[:, cluster] = np.sort(best[:, cluster], axis=1)
     return best
+
+
+def may_be_missed(
+    likeness: NDArray[np.float64], order: NDArray[np.intp], together: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Samples in which a mode that is no candidate could be more like a reference than the one assigned.
+
+    Orthogonal candidates share at most a likeness of 1, and what they leave of it is all others can have.
+    """
+    spans = together @ likeness
+    assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
+    left = together.sum(axis=1) - spans.sum(axis=2)
+    return (assigned < left).any(axis=1)
+
+
+def repeated(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of some ascending eigenvalues are the same but for rounding, (n_modes, n_modes)."""
+    cluster = np.cumsum(np.diff(eigenvalues, prepend=0) > REPEATED * eigenvalues)
+    return cluster[:, np.newaxis] == cluster
 
 
 def share_reordered(model: "ModalModel", theta: NDArray[np.float64]) -> float:

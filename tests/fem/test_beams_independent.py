@@ -63,7 +63,7 @@ def test_stiffness_agrees_releases_and_springs_included(released, releases):
     model.analyze_linear(check_statics=False)
     whole = np.asarray(model.Ke("mass", sparse=True).todense())
     free = [6 * model.nodes[name].ID + i for name in ("b", "c") for i in range(6)]
-    stiffness = ours(**releases).matrices([[1.0]])[0][0]
+    stiffness = ours(**releases).matrices([1.0])[0].toarray()
     np.testing.assert_allclose(stiffness, whole[np.ix_(free, free)], atol=1e-9 * np.abs(stiffness).max())
 
 

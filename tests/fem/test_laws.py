@@ -31,7 +31,7 @@ def square(rotation=((1, 0), (0, 1)), shift=(0.0, 0.0), order=(0, 1, 2, 3)):
 @given(THETAS, st.floats(0.1, 10.0))
 def test_frequencies_grow_with_the_square_root_of_stiffness(theta, factor):
     stiffness, mass = TRUSS.matrices(theta)
-    scaled = AffineModel({(): stiffness[0] * 0, ("all",): stiffness[0]}, mass[0])
+    scaled = AffineModel({(): stiffness * 0, ("all",): stiffness}, mass)
     np.testing.assert_allclose(scaled.frequencies([[factor]]), np.sqrt(factor) * TRUSS.frequencies(theta), rtol=1e-10)
 
 
@@ -39,7 +39,8 @@ def test_frequencies_grow_with_the_square_root_of_stiffness(theta, factor):
 @given(THETAS)
 def test_batched_analysis_agrees_with_the_generalised_solver(theta):
     stiffness, mass = TRUSS.matrices(theta)
-    expected = np.sqrt(scipy.linalg.eigh(stiffness[0], mass[0], eigvals_only=True)[:6]) / (2 * np.pi)
+    eigenvalues = scipy.linalg.eigh(stiffness.toarray(), mass.toarray(), eigvals_only=True)
+    expected = np.sqrt(eigenvalues[:6]) / (2 * np.pi)
     np.testing.assert_allclose(TRUSS.frequencies(theta)[0], expected, rtol=1e-10)
 
 
@@ -93,7 +94,8 @@ MODELS = [TRUSS, product_model(), product_model(track=True), massless_model()]
 @pytest.mark.parametrize("model", MODELS, ids=repr)
 def test_shapes_have_unit_modal_mass_and_solve_the_eigenproblem(model):
     theta = np.random.default_rng(2).uniform(0.5, 2.0, (10, len(model.parameter_names)))
-    for f, phi, stiffness, mass in zip(*model.modes(theta), *model.matrices(theta), strict=True):
+    for row, f, phi in zip(theta, *model.modes(theta), strict=True):
+        stiffness, mass = model.matrices(row)
         eigenvalues = (2 * np.pi * f) ** 2
         np.testing.assert_allclose(phi.T @ mass @ phi, np.eye(model.n_modes), atol=1e-9)
         np.testing.assert_allclose(phi.T @ stiffness @ phi, np.diag(eigenvalues), atol=1e-9 * eigenvalues.max())
@@ -129,7 +131,7 @@ def test_damage_multiplies_stiffness_and_leaves_mass():
     damaged = TRUSS.damaged({"bottom": 0.3, "top": -0.15})
     theta = np.array([[0.9, 1.1, 1.0, 1.2]])
     np.testing.assert_allclose(damaged.frequencies(theta), TRUSS.frequencies(theta * [0.7, 1.15, 1, 1]), rtol=1e-12)
-    np.testing.assert_array_equal(damaged.matrices(theta)[1], TRUSS.matrices(theta)[1])
+    assert (damaged.matrices(theta)[1] != TRUSS.matrices(theta)[1]).nnz == 0
     assert damaged.groups == TRUSS.groups
 
 
@@ -165,11 +167,16 @@ def test_wide_spectra_keep_the_lowest_modes_digits():
     np.testing.assert_allclose(model.frequencies([[1.0]]), [[np.sqrt(eigenvalue) / (2 * np.pi)]], rtol=1e-13)
 
 
-def test_indefinite_stiffness_is_named_by_both_forms():
+@pytest.mark.parametrize("track", [False, True])
+@pytest.mark.parametrize("mass", [np.eye(2), np.diag([1.0, 0.0])], ids=["standard", "flexibility"])
+def test_a_sample_without_modes_is_nan_and_the_others_stay(mass, track):
     """A compressive force whose parameter can outgrow the elastic stiffness."""
     terms = {("elastic",): np.eye(2), ("force",): np.diag([-0.5, 0.0])}
-    for mass in (np.eye(2), np.diag([1.0, 0.0])):
-        model = AffineModel(terms, mass, n_modes=1)
-        assert model.frequencies([[1.0, 1.5]]).item() > 0
-        with pytest.raises(ValueError, match=r"the stiffness at theta = \[1.0, 3.0\] is not positive definite"):
-            model.frequencies([[1.0, 1.0], [1.0, 3.0]])
+    model = AffineModel(terms, mass, n_modes=1, track=track)
+    for method in (model.frequencies, model.modes, model.jacobian):
+        with pytest.warns(UserWarning, match=r"1 of 3 samples .* first at theta = \[1.0, 3.0\] \(row 1\)"):
+            result = method([[1.0, 1.0], [1.0, 3.0], [1.0, 0.5]])
+        values = result[0] if isinstance(result, tuple) else result
+        assert np.isnan(values[1]).all()
+        assert np.isfinite(values[[0, 2]]).all()
+    np.testing.assert_allclose(model.frequencies([[1.0, 0.5]]), np.sqrt(0.75) / (2 * np.pi))

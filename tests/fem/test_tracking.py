@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo.fem import AffineModel, mac
+from skthermo.fem import AffineModel, Beam, Structure, mac
 from skthermo.fem._tracking import pair_modes, share_reordered
 
 
@@ -57,6 +57,40 @@ def test_modes_that_veer_are_followed_through_a_weak_coupling():
     first = model.frequencies(theta)[:, 0]
     assert first[-1] > model.frequencies(theta)[-1, 1]
     np.testing.assert_allclose(first, np.sqrt(30 * theta[:, 0]) / (2 * np.pi), rtol=0.02)
+
+
+def test_many_intruders_do_not_push_out_a_tracked_mode():
+    """Twelve local modes fall below the one that is asked for."""
+    stiffness = (2 * np.pi * np.arange(1.0, 14.0)) ** 2
+    local = np.arange(13) > 0
+    terms = {("own",): np.diag(stiffness * ~local), ("local",): np.diag(stiffness * local)}
+    model = AffineModel(terms, np.eye(13), n_modes=2, track=True)
+    np.testing.assert_allclose(model.frequencies([[400.0, 1.0], [1.0, 0.001]]), [[20, 2], [1, 2 * 0.001**0.5]])
+    assert np.diagonal(model.likeness(model.modes([[400.0, 1.0]])[1])[0]).min() > 0.99
+
+
+def square_mast(**options):
+    """A cantilever as stiff one way as the other: its modes come in pairs."""
+    section = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 1e-5, "I_zz": 1e-5, "J": 2e-5, "density": 7850.0}
+    beams = {i: Beam(i, i + 1, **section) for i in range(4)}
+    mast = Structure({i: (0, 0, 1.0 * i) for i in range(5)}, beams, {0: "xyz rx ry rz"}, {"mast": list(beams)})
+    return mast.assemble({"one way": ("I_yy", "mast"), "other": ("I_zz", "mast")}, n_modes=4, track=True, **options)
+
+
+def test_modes_of_a_repeated_frequency_are_followed_together():
+    """Shapes of a pair are arbitrary at the nominal state, so within the pair the lower comes first."""
+    mast = square_mast()
+    nominal = mast.frequencies([[1.0, 1.0]])[0]
+    np.testing.assert_allclose(nominal[[0, 2]], nominal[[1, 3]], rtol=1e-9)
+    for theta in ([[1.2, 0.9]], [[0.9, 1.2]]):
+        expected = nominal * np.sqrt([0.9, 1.2, 0.9, 1.2])
+        np.testing.assert_allclose(mast.frequencies(theta)[0], expected, rtol=1e-9)
+
+
+def test_a_pair_that_swaps_with_another_mode_is_followed_as_a_pair():
+    together = np.array([[True, False, False], [False, True, True], [False, True, True]])
+    likeness = np.array([[[0.02, 0.95, 0.03], [0.48, 0.02, 0.5], [0.5, 0.03, 0.47]]])
+    np.testing.assert_array_equal(pair_modes(likeness, together), [[1, 0, 2]])
 
 
 def test_share_of_reordered_samples():

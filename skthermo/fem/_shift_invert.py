@@ -1,0 +1,83 @@
+"""Sparse generalised eigenproblems K phi = lambda M phi, one theta after the other."""
+
+import numpy as np
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from skthermo.fem._terms import SparseTerms
+
+Array = NDArray[np.float64]
+
+GUARD_VECTORS = 2
+"""Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
+
+
+class ShiftInvertForm:
+    """Lanczos iteration on K^-1 M in the inner product of M, which may be singular.
+
+    The start vector is random with a fixed seed: the same theta gives the same bits, and no
+    symmetry of a structure is orthogonal to it.
+    """
+
+    def __init__(self, stiffness: SparseTerms, mass: SparseTerms):
+        self._stiffness = stiffness
+        self._mass = mass
+        self._start = seeded_start(stiffness.n_dof)
+
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        return self._each(theta, n_modes, with_shapes=False)[0]
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        return self._each(theta, n_modes, with_shapes=True)
+
+    def scaled(self, factors: Array) -> "ShiftInvertForm":
+        return ShiftInvertForm(self._stiffness.scaled(factors), self._mass)
+
+    def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
+        eigenvalues = np.full((len(theta), n_modes), np.nan)
+        shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
+        masses = self._mass.assemble(theta[:1] if self._mass.is_constant else theta)
+        for row, stiffness in enumerate(self._stiffness.assemble(theta)):
+            mass = masses[0 if self._mass.is_constant else row]
+            try:
+                found, vectors = lowest_modes(stiffness, mass, n_modes, self._start)
+            except scipy.sparse.linalg.ArpackError:
+                continue
+            eigenvalues[row] = found
+            if with_shapes:
+                shapes[row] = vectors
+        return eigenvalues, shapes
+
+
+def lowest_modes(
+    stiffness: scipy.sparse.csc_array, mass: scipy.sparse.csc_array, n_modes: int, start: Array
+) -> tuple[Array, Array]:
+    """Eigenvalues in ascending order and shapes of unit modal mass; NaN if K is not positive definite."""
+    n_dof = len(start)
+    factors = factorise(stiffness)
+    if factors is None:
+        return np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
+    inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
+    wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
+    values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
+    lowest = np.argsort(values)[:n_modes]
+    # One more application of K^-1 M takes out what massless degrees of freedom gather of rounding.
+    shapes = factors.solve(mass @ vectors[:, lowest])
+    shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
+    return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
+
+
+def factorise(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU | None:
+    """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
+    try:
+        factors = scipy.sparse.linalg.splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:  # exactly singular
+        return None
+    return factors if (factors.U.diagonal() > 0).all() else None
+
+
+def seeded_start(n_dof: int) -> Array:
+    """A vector that is neither symmetric nor different from call to call."""
+    return np.random.default_rng(0).standard_normal(n_dof)

@@ -1,0 +1,68 @@
+"""From how many degrees of freedom on is shift-invert faster than dense batches?
+
+``python tests/benchmarks/dense_or_sparse.py``, on one core with ``OMP_NUM_THREADS=1``.
+"""
+
+import argparse
+
+import numpy as np
+from measure import median_seconds
+
+from skthermo.fem import Beam, Structure
+from skthermo.fem._eigen import dense_form
+from skthermo.fem._shift_invert import ShiftInvertForm
+from skthermo.fem._terms import DenseTerms, SparseTerms
+
+SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
+
+
+def viaduct(n_elements):
+    """A straight beam clamped at both ends: 6 (n - 1) degrees of freedom."""
+    nodes = {i: (float(i), 0.0, 0.0) for i in range(n_elements + 1)}
+    beams = {i: Beam(i, i + 1, **SECTION) for i in range(n_elements)}
+    groups = {"first": list(beams)[::2], "other": list(beams)[1::2]}
+    return Structure(nodes, beams, dict.fromkeys((0, n_elements), "xyz rx ry rz"), groups)
+
+
+def grid(n):
+    """A square grillage of n x n nodes, clamped at its corners: about 6 n^2 degrees of freedom."""
+    nodes = {(i, j): (2.0 * i, 2.0 * j, 0.0) for i in range(n) for j in range(n)}
+    along = {("x", i, j): Beam((i, j), (i + 1, j), **SECTION) for i in range(n - 1) for j in range(n)}
+    across = {("y", i, j): Beam((i, j), (i, j + 1), **SECTION) for i in range(n) for j in range(n - 1)}
+    corners = {(i, j): "xyz rx ry rz" for i in (0, n - 1) for j in (0, n - 1)}
+    return Structure(nodes, along | across, corners, {"first": list(along), "other": list(across)})
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    theta = np.random.default_rng(0).uniform(0.7, 1.3, (options.samples, 2))
+    print("milliseconds a solve of 6 modes, sorted and with shapes of 10")
+    for name, structures in (
+        ("line", [viaduct(n) for n in (6, 11, 16, 21, 26, 34, 51, 67)]),
+        ("grid", [grid(n) for n in (3, 4, 5, 6, 7, 8)]),
+    ):
+        for structure in structures:
+            model = structure.assemble(["first", "other"])
+            forms = both_forms(model)
+            ways = {f"{kind} eigenvalues": lambda f=form: f.eigenvalues(theta, 6) for kind, form in forms.items()}
+            ways |= {f"{kind} modes": lambda f=form: f.modes(theta, 10) for kind, form in forms.items()}
+            seconds = median_seconds(ways, options.rounds)
+            times = ", ".join(f"{way} {1000 * s / options.samples:6.3f}" for way, s in seconds.items())
+            print(f"{name} {model.n_dof:4d} dof: {times} ({type(forms['dense']).__name__})")
+
+
+def both_forms(model):
+    """The model's eigenproblem, dense and sparse, whichever it chose."""
+    (nominal, mass), (first, _), (other, _) = (model.matrices(theta) for theta in ([1, 1], [2, 1], [1, 2]))
+    stiffness, forms = [first - nominal, other - nominal], {}
+    for name, kind, form in (("dense", DenseTerms, dense_form), ("sparse", SparseTerms, ShiftInvertForm)):
+        exponents = np.eye(2, dtype=int), np.zeros((1, 2), dtype=int)
+        forms[name] = form(kind.from_matrices(stiffness, exponents[0]), kind.from_matrices([mass], exponents[1]))
+    return forms
+
+
+if __name__ == "__main__":
+    main()

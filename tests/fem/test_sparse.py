@@ -1,0 +1,180 @@
+"""Large models: shift-invert says what dense solvers say."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg
+import scipy.sparse
+import scipy.sparse.linalg
+
+from skthermo.fem import AffineModel, Beam, PointMass, Spring, Structure
+from skthermo.fem._affine_input import DENSE_DOFS
+from skthermo.fem._shift_invert import ShiftInvertForm
+from skthermo.fem._terms import DenseTerms, SparseTerms
+
+SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
+
+
+def portal(n_elements=12, **options):
+    """A space frame of four columns, four beams and a soft foot: sparse at 12 elements a member."""
+    corners = {"sw": (0.0, 0.0), "se": (6.0, 0.0), "ne": (6.0, 4.0), "nw": (0.0, 4.0)}
+    nodes, members = {}, {}
+
+    def line(name, start, end, first, last):
+        names = [first, *((name, i) for i in range(1, n_elements)), last]
+        for i, node in enumerate(names):
+            nodes[node] = tuple(np.add(start, np.subtract(end, start) * i / n_elements))
+        members.update({(name, i): Beam(*names[i : i + 2], **SECTION) for i in range(n_elements)})
+
+    for name, (x, y) in corners.items():
+        line(f"column {name}", (x, y, 0.0), (x, y, 5.0), f"foot {name}", f"head {name}")
+    for one, other in zip(corners, [*list(corners)[1:], "sw"], strict=True):
+        line(f"beam {one}", (*corners[one], 5.0), (*corners[other], 5.0), f"head {one}", f"head {other}")
+    springs = {f"soil {d}": Spring("foot sw", d, 5e8) for d in ("x", "y", "z", "rx", "ry", "rz")}
+    supports = {f"foot {name}": "xyz rx ry rz" for name in ("se", "ne", "nw")}
+    groups = {
+        "columns": [m for m in members if m[0].startswith("column")],
+        "beams": [m for m in members if m[0].startswith("beam")],
+        "soil": list(springs),
+    }
+    structure = Structure(nodes, members | springs | {"tank": PointMass("head ne", 3000.0)}, supports, groups)
+    parameters = {"columns": "columns", "beams": ("E", "beams"), "density": ("density", "beams"), "soil": "soil"}
+    return structure.assemble(parameters, **options)
+
+
+FRAME = portal()
+THETA = np.random.default_rng(0).uniform(0.6, 1.5, (6, 4))
+
+
+def dense_frequencies(model, theta):
+    """1 / eigh(M, K), row by row: keeps the digits of the lowest modes."""
+    found = []
+    for row in theta:
+        stiffness, mass = (matrix.toarray() for matrix in model.matrices(row))
+        inverse = scipy.linalg.eigh(mass, stiffness, eigvals_only=True)[::-1][: model.n_modes]
+        found.append(1 / np.sqrt(inverse) / (2 * np.pi))
+    return np.array(found)
+
+
+def test_the_frame_is_solved_sparsely():
+    assert FRAME.n_dof > DENSE_DOFS
+    assert isinstance(FRAME._form, ShiftInvertForm)
+
+
+def test_sparse_frequencies_agree_with_a_dense_solver():
+    np.testing.assert_allclose(FRAME.frequencies(THETA), dense_frequencies(FRAME, THETA), rtol=1e-9)
+
+
+def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
+    for row, f, phi in zip(THETA, *FRAME.modes(THETA), strict=True):
+        stiffness, mass = FRAME.matrices(row)
+        eigenvalues = (2 * np.pi * f) ** 2
+        np.testing.assert_allclose(phi.T @ (mass @ phi), np.eye(6), atol=1e-8)
+        residual = stiffness @ phi - mass @ phi * eigenvalues
+        assert np.abs(residual).max() < 1e-6 * np.abs(mass @ phi * eigenvalues).max()
+
+
+@pytest.mark.parametrize("track", [False, True])
+def test_sparse_jacobian_equals_central_differences(track):
+    model, step = portal(track=track), 1e-4
+    differences = [
+        (model.frequencies(THETA + step * unit) - model.frequencies(THETA - step * unit)) / (2 * step)
+        for unit in np.eye(4)
+    ]
+    np.testing.assert_allclose(model.jacobian(THETA), np.stack(differences, axis=2), atol=1e-5)
+
+
+def test_damage_and_parameters_act_alike_on_sparse_terms():
+    damaged = FRAME.damaged({"columns": 0.3})
+    np.testing.assert_allclose(damaged.frequencies(THETA), FRAME.frequencies(THETA * [0.7, 1, 1, 1]), rtol=1e-10)
+
+
+def test_sparse_and_dense_terms_are_one_sum():
+    keys = np.array([[0, 0], [1, 0], [1, 2]])
+    random = np.random.default_rng(1)
+    matrices = [scipy.sparse.random_array((9, 9), density=0.3, rng=random).tocsc() for _ in keys]
+    matrices = [matrix + matrix.T for matrix in matrices]
+    sparse, dense = (kind.from_matrices(matrices, keys).scaled([1, 0.5, 2]) for kind in (SparseTerms, DenseTerms))
+    theta, shapes = random.uniform(0.5, 2, (4, 2)), random.standard_normal((4, 9, 3))
+    np.testing.assert_allclose([m.toarray() for m in sparse.assemble(theta)], dense.assemble(theta), atol=1e-14)
+    for law in ("gradients", "product"):
+        np.testing.assert_allclose(getattr(sparse, law)(theta, shapes), getattr(dense, law)(theta, shapes), atol=1e-12)
+    basis = random.standard_normal((9, 4))
+    reduced = sparse.congruent(basis).assemble(theta)
+    np.testing.assert_allclose(reduced, dense.congruent(basis).assemble(theta), atol=1e-12)
+
+
+def chain(n_dof):
+    return scipy.sparse.diags_array([np.full(n_dof, 2.0), *-np.ones((2, n_dof - 1))], offsets=[0, 1, -1]).tocsc()
+
+
+@pytest.mark.parametrize("copies", [2, 3, 6])
+def test_repeated_eigenvalues_are_all_found(copies):
+    """Equal chains side by side; that of one has frequencies sin(j pi / (2 n + 2)) / pi."""
+    stiffness = scipy.sparse.block_diag([chain(100)] * copies).tocsc()
+    model = AffineModel({("k",): stiffness}, scipy.sparse.eye_array(100 * copies), n_modes=2 * copies)
+    expected = np.repeat(np.sin(np.array([1, 2]) * np.pi / 202) / np.pi, copies)
+    np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-10)
+
+
+def test_the_same_theta_gives_the_same_bits_alone_and_among_others():
+    alone = np.concatenate([FRAME.frequencies([row]) for row in THETA])
+    np.testing.assert_array_equal(FRAME.frequencies(THETA), alone)
+
+
+def test_sparse_massless_degrees_of_freedom_have_no_modes():
+    mass = scipy.sparse.diags_array(np.where(np.arange(300) % 3, 0.0, 1.0))
+    model = AffineModel({("k",): chain(300)}, mass, n_modes=4)
+    np.testing.assert_allclose(model.frequencies([[2.0]]), dense_frequencies(model, [[2.0]]), rtol=1e-10)
+    with pytest.raises(ValueError, match="n_modes is 101, but 300 degrees of freedom, 200 of them massless, have only"):
+        AffineModel({("k",): chain(300)}, mass, n_modes=101)
+
+
+def test_a_large_mechanism_is_named():
+    loose = chain(400).tolil()
+    loose[0, 0] = loose[-1, -1] = 1.0
+    with pytest.raises(ValueError, match=r"mechanism: degree of freedom .* and 394 more can move"):
+        AffineModel({("k",): loose}, scipy.sparse.eye_array(400))
+    nodes = {i: (0.5 * i, 0, 0) for i in range(61)}
+    beams = {i: Beam(i, i + 1, **SECTION) for i in range(60)}
+    hinged = Structure(nodes, beams, {0: "xyz", 60: "yz"}, {"all": list(beams)})
+    with pytest.raises(ValueError, match=r"node \d+ along rx, .* can move"):
+        hinged.assemble(["all"])
+
+
+def test_large_indefinite_matrices_are_refused():
+    with pytest.raises(ValueError, match="mechanism"):
+        AffineModel({("k",): chain(300) - 0.1 * scipy.sparse.eye_array(300)}, scipy.sparse.eye_array(300))
+    with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
+        AffineModel({("k",): chain(300)}, chain(300) - 0.1 * scipy.sparse.eye_array(300))
+    skew = chain(300).tolil()
+    skew[3, 7] = 0.5
+    with pytest.raises(ValueError, match=r"not symmetric: entries \((3, 7|7, 3)\) and"):
+        AffineModel({("k",): skew}, scipy.sparse.eye_array(300))
+
+
+def test_a_large_sample_without_modes_is_nan_and_the_others_stay():
+    force = -0.001 * scipy.sparse.eye_array(300)
+    model = AffineModel({("k",): chain(300) + 0.001 * scipy.sparse.eye_array(300), ("force",): force}, np.eye(300))
+    with pytest.warns(UserWarning, match=r"1 of 2 samples .* first at theta = \[1.0, 1.5\] \(row 1\)"):
+        frequencies = model.frequencies([[1.0, 1.0], [1.0, 1.5]])
+    assert np.isfinite(frequencies[0]).all()
+    assert np.isnan(frequencies[1]).all()
+
+
+def test_the_exported_building_frame_has_its_reference_frequencies():
+    if "SKTHERMO_DATA" not in os.environ:
+        pytest.skip("SKTHERMO_DATA does not name the folder with building_frame/ConcreteBuildingFrame.mat")
+    file = Path(os.environ["SKTHERMO_DATA"]) / "building_frame" / "ConcreteBuildingFrame.mat"
+    content = scipy.io.loadmat(file)
+    names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
+    model = AffineModel({(name,): content[name] for name in names}, content["M0"])
+    assert (model.n_dof, int((content["M0"].diagonal() == 0).sum())) == (2302, 913)
+    reference = [2.28649, 5.98051, 16.22121, 17.72160, 20.53380, 22.12960]
+    frequencies = model.frequencies(np.ones((1, 14)))[0]
+    np.testing.assert_allclose(frequencies, reference, rtol=0, atol=5e-6)  # the reference's last digit
+    eigenvalues = scipy.sparse.linalg.eigsh(content["K0"], 6, content["M0"], sigma=0, return_eigenvectors=False)
+    np.testing.assert_allclose(frequencies, np.sqrt(np.sort(eigenvalues)) / (2 * np.pi), rtol=1e-8)
