@@ -6,6 +6,7 @@ from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._noise import add_noise
 from skthermo.fem._protocol import FEModel
+from skthermo.fem._reduced import ReducedModel
 from skthermo.fem._sampling import sample
 from skthermo.fem._structure import Structure
 from skthermo.fem._tracking import mac
@@ -17,6 +18,7 @@ __all__ = [
     "CallableModel",
     "FEModel",
     "PointMass",
+    "ReducedModel",
     "Spring",
     "Structure",
     "add_noise",

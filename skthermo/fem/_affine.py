@@ -24,6 +24,7 @@ from skthermo.fem._theta import check_theta, nominal_theta, warn_of_failures
 from skthermo.fem._tracking import may_be_missed, pair_modes, repeated
 
 Array = NDArray[np.float64]
+RandomState = int | np.random.RandomState | None
 
 GUARD_MODES = 4
 """Modes above the tracked ones that are looked at first, since an intruder pushes a mode up."""
@@ -155,7 +156,7 @@ class AffineModel:
     @property
     def rows_per_chunk(self) -> int:
         """How many samples are solved at once, so that memory stays bounded."""
-        numbers = max(self._stiffness.n_entries, 2 * self.n_dof * self.n_modes)
+        numbers = max(self._stiffness.n_entries, 2 * self._stiffness.n_dof * self.n_modes)
         return max(1, min(ROWS_PER_CHUNK, CHUNK_BYTES // (8 * numbers)))
 
     @property
@@ -235,10 +236,7 @@ class AffineModel:
         ndarray of shape (n_samples, n_modes, n_candidates)
             Between 0 and 1.
         """
-        masses = (
-            self._mass.quadratic_forms(shapes) @ self._mass.coefficients(nominal_theta(len(self._parameter_names)))[0]
-        )
-        return (self._weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
+        return self._likeness(shapes)
 
     def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
         """Stiffness and mass at one theta.
@@ -284,6 +282,27 @@ class AffineModel:
         twin._form = self._form.scaled(factors)
         return twin
 
+    def reduced(self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> "AffineModel":
+        """A small model that gives the same frequencies within a box, to a stated error.
+
+        Parameters
+        ----------
+        bounds : float or array-like of shape (n_parameters, 2), default=0.3
+            Box of multipliers: a half-width, or lowest and highest of each parameter.
+        tol : float, default=1e-5
+            Largest relative error of a frequency.
+        random_state : int, RandomState or None, default=None
+            Seed of the points at which the basis is made and checked.
+
+        Returns
+        -------
+        ReducedModel
+            With this model's interface.
+        """
+        from skthermo.fem._reduced import ReducedModel  # which is an AffineModel itself
+
+        return ReducedModel(self, bounds, tol=tol, random_state=random_state)
+
     def __sklearn_clone__(self) -> "AffineModel":
         return self
 
@@ -292,6 +311,11 @@ class AffineModel:
         parameters, degrees, modes = (f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts)
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
+
+    def _likeness(self, shapes: Array) -> Array:
+        nominal = nominal_theta(len(self.parameter_names))
+        masses = self._mass.quadratic_forms(shapes) @ self._mass.coefficients(nominal)[0]
+        return (self._weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
     def _frequencies(self, theta: Array) -> tuple[Array]:
         if self.track:
@@ -307,7 +331,7 @@ class AffineModel:
     def _tracked(self, theta: Array, n_candidates: int) -> tuple[Array, Array]:
         """Nominal modes among the lowest candidates, and among more where these leave a doubt."""
         eigenvalues, candidates = self._form.modes(theta, n_candidates)
-        likeness = self.likeness(candidates)
+        likeness = self._likeness(candidates)
         order = pair_modes(likeness, self._together)
         frequencies = np.take_along_axis(hertz(eigenvalues), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)

@@ -117,8 +117,8 @@ def eigen_form(stiffness: AffineTerms, mass: AffineTerms) -> EigenForm:
     raise TypeError("stiffness and mass must both be dense or both sparse")
 
 
-def dense_form(stiffness: DenseTerms, mass: DenseTerms) -> EigenForm:
-    """The standard form where it is accurate (and fastest), else the flexibility form."""
+def dense_form(stiffness: DenseTerms, mass: DenseTerms, widest: float = WIDEST_SPECTRUM) -> EigenForm:
+    """The standard form where the spectrum is narrow enough for it (the fastest), else the flexibility form."""
     if mass.is_constant:
         nominal = nominal_theta(stiffness.exponents.shape[1])
         matrix = mass.assemble(nominal)[0]
@@ -126,7 +126,7 @@ def dense_form(stiffness: DenseTerms, mass: DenseTerms) -> EigenForm:
         if lowest > len(matrix) * np.finfo(float).eps * highest:
             form = StandardForm.from_mass(stiffness, matrix)
             eigenvalues = form.eigenvalues(nominal, len(matrix))[0]
-            if eigenvalues[-1] < WIDEST_SPECTRUM * eigenvalues[0]:
+            if eigenvalues[-1] < widest * eigenvalues[0]:
                 return form
     return FlexibilityForm(stiffness, mass)
 

@@ -162,9 +162,9 @@ class SparseTerms(AffineTerms):
         return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
 
     def congruent(self, basis: Array) -> DenseTerms:
-        shape = (self.n_dof, self.n_dof)
-        columns = (self.entries[:, [t]].toarray().ravel() for t in range(self.entries.shape[1]))
-        matrices = [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in columns]
+        terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
+        places = ((term.data, (self.rows[term.row], self._columns[term.row])) for term in terms)
+        matrices = (scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places)
         return DenseTerms(np.stack([basis.T @ (matrix @ basis) for matrix in matrices]), self.exponents, self.factors)
 
 

@@ -10,42 +10,12 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
-from skthermo.fem import AffineModel, Beam, PointMass, Spring, Structure
+from skthermo.fem import AffineModel, Beam, Structure
 from skthermo.fem._affine_input import DENSE_DOFS
 from skthermo.fem._shift_invert import ShiftInvertForm
 from skthermo.fem._terms import DenseTerms, SparseTerms
+from tests.fem.frames import FRAME, SECTION, portal
 
-SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
-
-
-def portal(n_elements=12, **options):
-    """A space frame of four columns, four beams and a soft foot: sparse at 12 elements a member."""
-    corners = {"sw": (0.0, 0.0), "se": (6.0, 0.0), "ne": (6.0, 4.0), "nw": (0.0, 4.0)}
-    nodes, members = {}, {}
-
-    def line(name, start, end, first, last):
-        names = [first, *((name, i) for i in range(1, n_elements)), last]
-        for i, node in enumerate(names):
-            nodes[node] = tuple(np.add(start, np.subtract(end, start) * i / n_elements))
-        members.update({(name, i): Beam(*names[i : i + 2], **SECTION) for i in range(n_elements)})
-
-    for name, (x, y) in corners.items():
-        line(f"column {name}", (x, y, 0.0), (x, y, 5.0), f"foot {name}", f"head {name}")
-    for one, other in zip(corners, [*list(corners)[1:], "sw"], strict=True):
-        line(f"beam {one}", (*corners[one], 5.0), (*corners[other], 5.0), f"head {one}", f"head {other}")
-    springs = {f"soil {d}": Spring("foot sw", d, 5e8) for d in ("x", "y", "z", "rx", "ry", "rz")}
-    supports = {f"foot {name}": "xyz rx ry rz" for name in ("se", "ne", "nw")}
-    groups = {
-        "columns": [m for m in members if m[0].startswith("column")],
-        "beams": [m for m in members if m[0].startswith("beam")],
-        "soil": list(springs),
-    }
-    structure = Structure(nodes, members | springs | {"tank": PointMass("head ne", 3000.0)}, supports, groups)
-    parameters = {"columns": "columns", "beams": ("E", "beams"), "density": ("density", "beams"), "soil": "soil"}
-    return structure.assemble(parameters, **options)
-
-
-FRAME = portal()
 THETA = np.random.default_rng(0).uniform(0.6, 1.5, (6, 4))
 
 

@@ -1,0 +1,142 @@
+"""Reduced models: as the full model within the box, to the tolerance they state, and never below it."""
+
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, FEModel, ReducedModel, mac, sample
+from tests.fem.frames import FRAME, portal
+
+RANDOM = np.random.default_rng(5)
+THETA = RANDOM.uniform(0.7, 1.3, (100, 4))
+REDUCED = FRAME.reduced(0.3, random_state=0)
+TRACKED = portal(track=True)
+
+
+def test_frequencies_agree_within_tolerance_and_never_fall_below():
+    error = REDUCED.frequencies(THETA) / FRAME.frequencies(THETA) - 1
+    assert error.max() < 1e-5
+    assert error.min() > -1e-8  # Rayleigh-Ritz, but for rounding
+    assert REDUCED.basis_size_ < FRAME.n_dof / 5
+
+
+def test_the_stated_error_is_that_at_the_check_points():
+    assert REDUCED.check_points_.shape == (20, 4)
+    error = np.abs(REDUCED.frequencies(REDUCED.check_points_) / FRAME.frequencies(REDUCED.check_points_) - 1)
+    assert REDUCED.error_ == pytest.approx(error.max(), rel=1e-3)
+    assert REDUCED.error_ < 5e-6
+    assert not (REDUCED.check_points_[:, np.newaxis] == REDUCED.snapshot_points_).all(axis=2).any()
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-7])
+def test_tolerance_sets_the_size(tol):
+    reduced = FRAME.reduced(0.3, tol=tol, random_state=0)
+    assert (reduced.basis_size_ < REDUCED.basis_size_) == (tol > 1e-5)
+    assert np.abs(reduced.frequencies(THETA) / FRAME.frequencies(THETA) - 1).max() < tol
+
+
+def test_the_same_seed_gives_the_same_bits():
+    again = FRAME.reduced(0.3, random_state=0)
+    np.testing.assert_array_equal(again.frequencies(THETA), REDUCED.frequencies(THETA))
+
+
+@pytest.mark.parametrize("model", [FRAME, TRACKED], ids=repr)
+def test_shapes_are_the_full_models_at_all_degrees_of_freedom(model):
+    reduced = model.reduced(0.3, random_state=0)
+    for row, full, mine in zip(THETA[:10], model.modes(THETA[:10])[1], reduced.modes(THETA[:10])[1], strict=True):
+        np.testing.assert_allclose(np.diag(mac(full, mine)), 1, atol=1e-4)
+        mass = model.matrices(row)[1]
+        np.testing.assert_allclose(np.einsum("im,im->m", mine, mass @ mine), 1, rtol=1e-8)
+    assert reduced.n_dof == model.n_dof
+
+
+@pytest.mark.parametrize("model", [FRAME, TRACKED], ids=repr)
+def test_the_jacobian_is_exact_for_the_reduced_model_and_near_the_full_one(model):
+    reduced, step = model.reduced(0.3, random_state=0), 1e-4
+    inner = THETA[:5]
+    differences = [
+        (reduced.frequencies(inner + step * unit) - reduced.frequencies(inner - step * unit)) / (2 * step)
+        for unit in np.eye(4)
+    ]
+    np.testing.assert_allclose(reduced.jacobian(inner), np.stack(differences, axis=2), atol=1e-5)
+    np.testing.assert_allclose(reduced.jacobian(inner), model.jacobian(inner), atol=1e-2)
+
+
+def test_tracked_columns_are_the_full_models():
+    wide = np.random.default_rng(0).uniform(0.3, 1.7, (200, 4))
+    full = TRACKED.frequencies(wide)
+    assert (full != np.sort(full, axis=1)).any()
+    np.testing.assert_allclose(TRACKED.reduced(0.7, random_state=0).frequencies(wide), full, rtol=1e-5)
+
+
+@pytest.mark.parametrize("damage", [{"columns": 0.9}, {"soil": 0.99}, {"beams": -0.15, "columns": 0.2}, {}])
+def test_damage_beyond_the_box_grows_the_basis(damage):
+    reduced = REDUCED.damaged(damage)
+    np.testing.assert_allclose(reduced.frequencies(THETA), FRAME.damaged(damage).frequencies(THETA), rtol=1e-5)
+    assert reduced.error_ < 5e-6
+    assert (reduced.basis_size_ > REDUCED.basis_size_) == bool(damage)
+    assert reduced.groups == FRAME.groups
+
+
+def test_theta_outside_the_bounds_warns_once_a_call():
+    with pytest.warns(UserWarning, match=r"2 of 3 theta are outside the bounds .* row 1 the first") as caught:
+        REDUCED.frequencies([[1.0] * 4, [1.0, 1.0, 1.31, 1.0], [0.69] * 4])
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        REDUCED.frequencies([[0.7] * 4, [1.3] * 4])
+
+
+def test_a_reduced_model_is_a_model_like_any():
+    assert isinstance(REDUCED, FEModel)
+    assert clone(REDUCED) is REDUCED
+    copied = pickle.loads(pickle.dumps(REDUCED))
+    np.testing.assert_array_equal(copied.frequencies(THETA), REDUCED.frequencies(THETA))
+    drawn = [sample(REDUCED, 0.3, 600, n_jobs=n_jobs, random_state=1).frequencies for n_jobs in (1, 2)]
+    np.testing.assert_array_equal(*drawn)
+    assert "basis vectors, error" in repr(REDUCED)
+    assert REDUCED.reduced(0.1, random_state=0).n_dof == FRAME.n_dof
+    assert (REDUCED.matrices(THETA[0])[0] != FRAME.matrices(THETA[0])[0]).nnz == 0
+
+
+def test_small_dense_models_and_varying_mass_reduce_too():
+    truss = make_truss()
+    theta = np.random.default_rng(0).uniform(0.8, 1.2, (50, 4))
+    np.testing.assert_allclose(
+        truss.reduced(0.2, random_state=0).frequencies(theta), truss.frequencies(theta), rtol=1e-5
+    )
+    massless = AffineModel(
+        {("k",): np.diag([2.0, 2, 1]) - np.eye(3, k=1) - np.eye(3, k=-1), ("s",): np.diag([0.0, 0, 1])},
+        {("m",): np.diag([1.0, 0.0, 2.0])},
+        n_modes=2,
+    )
+    theta = np.random.default_rng(0).uniform(0.8, 1.2, (50, 3))
+    np.testing.assert_allclose(massless.reduced(0.2).frequencies(theta), massless.frequencies(theta), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"tol": 0}, "tol is 0; expected a relative error"),
+        ({"bounds": 2.0}, "bounds is 2.0"),
+        ({"tol": 1.0}, "tol is 1"),
+    ],
+)
+def test_reduction_names_what_is_wrong(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        FRAME.reduced(**arguments)
+
+
+def test_an_error_that_no_basis_reaches_is_said(monkeypatch):
+    monkeypatch.setattr("skthermo.fem._reduced.MOST_ROUNDS", 3)
+    with pytest.raises(RuntimeError, match=r"after 3 rounds .* do not give frequencies to 1e-13"):
+        make_truss().reduced(0.2, tol=1e-13)
+
+
+def test_the_class_can_be_called_itself():
+    assert ReducedModel(FRAME, 0.1, random_state=0).basis_size_ < REDUCED.basis_size_
