@@ -1,5 +1,6 @@
 """Damage detection from frequencies."""
 
+from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._mahalanobis import MahalanobisDetector
 
-__all__ = ["MahalanobisDetector"]
+__all__ = ["MahalanobisDetector", "TemperatureCompensator"]

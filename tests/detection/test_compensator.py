@@ -1,0 +1,365 @@
+"""Residuals of frequencies, out of fold and in sample."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
+from sklearn.impute import SimpleImputer
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, TimeSeriesSplit, cross_val_predict
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.preprocessing import KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(2, samples_per_year=100, random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+X = T.join(F)
+MODES = list(F.columns)
+POSITIONS = [X.columns.get_loc(mode) for mode in MODES]
+
+
+def compensator(estimator=None, **options):
+    estimator = KNeighborsRegressor(3) if estimator is None else estimator
+    return TemperatureCompensator(estimator, **({"targets": MODES} | options))
+
+
+def chain(mapper=None):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    inverse = InverseSurrogate(TRUSS, quadratic, bounds=0.2, n_samples=100, random_state=0)
+    return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
+
+
+def with_gaps(columns, rows):
+    holed = X.copy()
+    holed.iloc[rows, [X.columns.get_loc(column) for column in columns]] = np.nan
+    return holed
+
+
+def alarm_rate(detector, records):
+    return (detector.predict(records) == -1).mean()
+
+
+# What residuals are
+
+
+def test_a_perfect_estimator_leaves_nothing():
+    linear = T.join(pd.DataFrame(T.to_numpy() @ [[0.1, 0.2], [0.3, -0.1], [0.0, 0.5]] + 4, T.index, ["f1", "f2"]))
+    perfect = compensator(LinearRegression(), targets=["f1", "f2"])
+    for residuals in (perfect.fit_transform(linear), perfect.transform(linear)):
+        np.testing.assert_allclose(residuals, 0, atol=1e-12)
+
+
+def test_transform_is_measured_minus_predicted_by_the_fitted_clone():
+    estimator = KNeighborsRegressor(3)
+    fitted = compensator(estimator).fit(X)
+    assert fitted.estimator_ is not estimator
+    assert not hasattr(estimator, "n_features_in_")
+    pd.testing.assert_frame_equal(fitted.transform(X), F - fitted.estimator_.predict(T))
+    expected = KNeighborsRegressor(3).fit(T, F).predict(T)
+    np.testing.assert_array_equal(fitted.transform(X), F - expected)
+
+
+@pytest.mark.parametrize(
+    ("cv", "same"), [(None, KFold(5)), (4, KFold(4)), (KFold(3, shuffle=True, random_state=0),) * 2], ids=str
+)
+def test_fit_transform_is_cross_val_predict_and_then_a_fit_on_all_rows(cv, same):
+    fitted = compensator(cv=cv)
+    residuals = fitted.fit_transform(X)
+    np.testing.assert_array_equal(residuals, F - cross_val_predict(KNeighborsRegressor(3), T, F, cv=same))
+    pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X).transform(X))
+
+
+def test_folds_given_as_an_iterable_serve():
+    folds = list(KFold(4).split(X))
+    pd.testing.assert_frame_equal(compensator(cv=folds).fit_transform(X), compensator(cv=4).fit_transform(X))
+
+
+def test_a_folds_targets_enter_only_their_own_residuals():
+    before, changed, fold = compensator().fit_transform(X), X.copy(), slice(80, 120)
+    change = np.random.default_rng(0).normal(size=(40, len(MODES)))
+    changed.iloc[fold, POSITIONS] += change
+    after = compensator().fit_transform(changed)
+    np.testing.assert_allclose(after.iloc[fold], before.iloc[fold] + change, rtol=0, atol=1e-12)
+    others = np.delete(np.arange(len(X)), np.arange(80, 120))
+    assert (after.iloc[others] != before.iloc[others]).any(axis=None)
+
+
+def test_order_of_columns_and_of_targets_does_not_matter():
+    order = np.random.default_rng(0).permutation(X.shape[1])
+    residuals = compensator(LinearRegression()).fit_transform(X)
+    shuffled = compensator(LinearRegression(), targets=MODES[::-1]).fit_transform(X.iloc[:, order])
+    assert list(shuffled.columns) == MODES[::-1]
+    np.testing.assert_allclose(shuffled[MODES], residuals, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["fit_transform", "transform"])
+def test_frames_arrays_names_and_positions_agree(method):
+    by_name, by_position = compensator(), compensator(targets=POSITIONS)
+    plain = compensator(targets=np.array(POSITIONS))
+    frame = getattr(by_name.fit(X), method)(X)
+    assert list(frame.columns) == MODES
+    assert frame.index.equals(X.index)
+    pd.testing.assert_frame_equal(getattr(by_position.fit(X), method)(X), frame)
+    array = getattr(plain.fit(X.to_numpy()), method)(X.to_numpy())
+    assert type(array) is np.ndarray
+    np.testing.assert_array_equal(array, frame)
+
+
+def test_one_target_is_a_vector_for_estimators_that_want_one():
+    forest = RandomForestRegressor(5, random_state=0)  # warns where a column stands for a vector
+    single = compensator(forest, targets=["f2"]).fit(X)
+    others = X.drop(columns="f2")
+    expected = F["f2"] - clone(forest).fit(others, F["f2"]).predict(others)
+    np.testing.assert_array_equal(single.transform(X)["f2"], expected)
+    wrapped = compensator(MultiOutputRegressor(clone(forest)), targets=["f2"])
+    np.testing.assert_array_equal(wrapped.fit_transform(X), single.fit_transform(X))
+
+
+# What they are for
+
+
+def test_out_of_fold_thresholds_keep_their_promise_and_in_sample_ones_do_not():
+    healthy, later, damaged = (
+        make_truss_campaign(2, random_state=seed, damage=damage)
+        for seed, damage in ((0, None), (1, None), (2, {"bottom": 0.2}))
+    )
+    baseline, unseen, damaged = (c.temperatures.join(c.frequencies) for c in (healthy, later, damaged))
+    detector = make_pipeline(compensator(KNeighborsRegressor(2)), MahalanobisDetector(0.02)).fit(baseline)
+    fitted = detector[0]
+    in_sample = MahalanobisDetector(0.02).fit(fitted.transform(baseline))
+    assert alarm_rate(detector, unseen) == pytest.approx(0.02, abs=0.012)  # two standard errors of 730 records
+    assert alarm_rate(in_sample, fitted.transform(unseen)) > 0.3
+    raw = MahalanobisDetector(0.02).fit(baseline[MODES])
+    assert alarm_rate(detector, damaged) > alarm_rate(raw, damaged[MODES]) > 0.9
+
+
+# Frames, models and scikit-learn's machinery
+
+
+def test_lags_within_go_by_time():
+    lagged = make_pipeline(LagFeatures(3), LinearRegression())
+    order = np.random.default_rng(0).permutation(len(X))
+    expected = compensator(lagged).fit(X).transform(X)
+    shuffled = compensator(lagged).fit(X.iloc[order]).transform(X.iloc[order])
+    np.testing.assert_allclose(shuffled.loc[X.index], expected, rtol=0, atol=1e-9)
+    assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
+
+
+@pytest.mark.parametrize(
+    "wrap", [lambda fem: fem, lambda fem: make_pipeline(StandardScaler(), fem)], ids=["bare", "pipe"]
+)
+def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(wrap):
+    holed = with_gaps(["f1"], [20, 21, 130])
+    estimator = wrap(chain(make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression()))))
+    for data, temperatures, frequencies in (
+        (holed, holed[T.columns], holed[MODES]),
+        (holed.to_numpy(), T.to_numpy(), holed[MODES].to_numpy()),
+    ):
+        fitted = compensator(estimator, targets=POSITIONS, cv=4).fit(data)
+        expected = frequencies - clone(estimator).fit(temperatures, frequencies).predict(temperatures)
+        np.testing.assert_allclose(fitted.transform(data), expected, rtol=0, atol=1e-8)
+        residuals = np.asarray(fitted.fit_transform(data))
+        np.testing.assert_array_equal(np.argwhere(np.isnan(residuals)), [[20, 0], [21, 0], [130, 0]])
+
+
+def test_fe_models_within_are_shared_and_never_copied():
+    fitted = compensator(chain()).fit(X)
+    assert fitted.estimator_.model is clone(fitted).estimator.model is TRUSS
+
+
+def test_output_names_and_containers():
+    fitted = compensator().fit(X)
+    assert list(fitted.get_feature_names_out()) == MODES
+    assert list(fitted.targets_) == POSITIONS
+    plain = compensator(targets=[4, 3]).set_output(transform="pandas").fit(X.to_numpy())
+    assert list(plain.transform(X.to_numpy()).columns) == ["x4", "x3"]
+    assert list(plain.get_feature_names_out(X.columns)) == ["f2", "f1"]
+
+
+def test_pickles_keep_outputs():
+    fitted = compensator().fit(X)
+    pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(fitted)).transform(X), fitted.transform(X))
+
+
+def test_nested_parameters_can_be_searched():
+    def spread(pipeline, records, y=None):
+        return -float(np.abs(pipeline.transform(records)).to_numpy().mean())
+
+    pipeline = make_pipeline(compensator(targets=F.columns))
+    grid = {"temperaturecompensator__estimator__n_neighbors": [1, 10]}
+    search = GridSearchCV(pipeline, grid, scoring=spread, cv=3).fit(X)
+    assert search.best_params_ == {"temperaturecompensator__estimator__n_neighbors": 10}  # noise averages out
+
+
+# Missing values
+
+
+def test_a_missing_target_is_missing_in_its_own_residual_only_and_its_row_does_not_train():
+    holed, kept = with_gaps(["f2"], [3, 50]), np.delete(np.arange(len(X)), [3, 50])
+    fitted = compensator().fit(holed)
+    residuals = fitted.transform(holed)
+    np.testing.assert_array_equal(np.argwhere(residuals.isna()), [[3, 1], [50, 1]])
+    pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X.iloc[kept]).transform(X))
+    np.testing.assert_array_equal(np.argwhere(fitted.fit_transform(holed).isna()), [[3, 1], [50, 1]])
+
+
+@pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
+def test_a_missing_temperature_makes_the_row_missing_where_the_estimator_takes_none(data):
+    holed, kept = with_gaps(["T1"], [0, 7]), np.delete(np.arange(len(X)), [0, 7])
+    fitted = compensator(targets=POSITIONS).fit(data(holed))
+    for residuals in (fitted.transform(data(holed)), fitted.fit_transform(data(holed))):
+        expected = np.zeros((len(X), len(MODES)), dtype=bool)
+        expected[[0, 7]] = True
+        np.testing.assert_array_equal(np.isnan(np.asarray(residuals)), expected)
+    complete = compensator(targets=POSITIONS).fit(data(X.iloc[kept]))
+    np.testing.assert_array_equal(fitted.transform(data(X)), complete.transform(data(X)))
+
+
+def test_a_fold_without_a_complete_row_is_missing():
+    residuals = compensator().fit_transform(with_gaps(["T2"], slice(40, 80)))
+    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().all(axis=1)), np.arange(40, 80))
+    assert residuals.drop(index=residuals.index[40:80]).notna().all(axis=None)
+
+
+TREES = HistGradientBoostingRegressor(max_iter=5)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        RandomForestRegressor(5, random_state=0),
+        MultiOutputRegressor(TREES),
+        GridSearchCV(RandomForestRegressor(random_state=0), {"n_estimators": [2, 3]}, cv=2),
+        make_pipeline(StandardScaler(), MultiOutputRegressor(TREES)),
+        make_pipeline("passthrough", SimpleImputer(), Ridge()),
+        make_pipeline(StandardScaler(), KNNGapImputer(), PolynomialFeatures(2), LinearRegression()),
+        TransformedTargetRegressor(make_pipeline(SimpleImputer(), Ridge()), transformer=StandardScaler()),
+    ],
+    ids=lambda estimator: type(estimator[-1] if hasattr(estimator, "steps") else estimator).__name__,
+)
+def test_estimators_that_take_or_fill_missing_temperatures_get_them(estimator):
+    holed = with_gaps(["T1"], [0, 7])
+    fitted = compensator(estimator).fit(holed)
+    expected = clone(estimator).fit(holed[T.columns], F).predict(holed[T.columns])
+    np.testing.assert_array_equal(fitted.transform(holed), F - expected)
+    assert fitted.fit_transform(holed).notna().all(axis=None)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        make_pipeline(StandardScaler(), Ridge()),
+        make_pipeline(PolynomialFeatures(2), SimpleImputer(), Ridge()),
+        TransformedTargetRegressor(transformer=StandardScaler()),
+    ],
+    ids=["scaled", "imputed too late", "default regressor"],
+)
+def test_nothing_missing_reaches_an_estimator_that_takes_none(estimator):
+    residuals = compensator(estimator).fit_transform(with_gaps(["T1"], [0, 7]))
+    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [0, 7])
+
+
+def test_what_cannot_be_predicted_flows_through():
+    class Unsure(RegressorMixin, BaseEstimator):
+        def fit(self, X, y):
+            self.mean_ = np.asarray(y).mean(axis=0)
+            return self
+
+        def predict(self, X):
+            return np.where(np.asarray(X)[:, :1] > 30, np.nan, self.mean_)
+
+    residuals = compensator(Unsure()).fit(X).transform(X)
+    np.testing.assert_array_equal(residuals.isna().all(axis=1), X["T1"] > 30)
+
+
+# Errors
+
+
+@pytest.mark.parametrize(
+    ("targets", "data", "message"),
+    [
+        (["f1", "f9"], X, r"targets \['f9'\] are not columns of X, or more than one; expected some of \['T1',"),
+        (["f1", "f1"], X, r"targets \['f1', 'f1'\] repeat a column; expected each once"),
+        (
+            ["f1"],
+            X.rename(columns={"f2": "f1"}),
+            r"unique column names|\['f1'\] are not columns of X, or more",
+        ),
+        ([3, 9], X, r"targets \[9\] are not columns of X; expected indexes from 0 to 8"),
+        ([-1], X, r"targets \[-1\] are not columns of X; expected indexes from 0 to 8"),
+        (["f1", 4], X, "expected names of columns or their indexes, not both"),
+        ([True, False], X, "expected names of columns or their indexes, not both"),
+        ([], X, "targets are 0 of the 9 columns of X; expected at least one, and at least one other column"),
+        (list(X.columns), X, "targets are 9 of the 9 columns"),
+        ("f1", X, "'targets' parameter of TemperatureCompensator must be an array-like"),
+        (["f1"], X.to_numpy(), r"targets are the names \['f1'\], but X has no column names; expected a frame or ind"),
+        (["f1"], X.set_axis(range(9), axis=1), "X has no column names"),
+        (["f1"], with_gaps(["f1"], slice(None)), "frequency column 'f1' is NaN in all 200 rows"),
+        ([3], X.to_numpy()[:, :1], "1 feature.* minimum of 2"),
+    ],
+)
+@pytest.mark.parametrize("method", ["fit", "fit_transform"])
+def test_bad_targets_are_named(method, targets, data, message):
+    with pytest.raises(ValueError, match=message):
+        getattr(compensator(targets=targets), method)(data)
+
+
+@pytest.mark.parametrize(
+    ("cv", "message"),
+    [
+        (TimeSeriesSplit(4), r"tests row 0 0 times \(40 of 200 rows not exactly once\); expected a partition"),
+        (ShuffleSplit(3, random_state=0), r"cv is ShuffleSplit\(.*expected a partition of the rows"),
+        ([], "cv is .., which tests row 0 0 times"),
+        (201, "n_splits=201 greater than the number of samples: n_samples=200"),
+        (1, "'cv' parameter"),
+        ("five", "'cv' parameter"),
+    ],
+    ids=str,
+)
+def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
+    with pytest.raises(ValueError, match=message):
+        compensator(cv=cv).fit_transform(X)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "holed", "message"),
+    [
+        (Ridge(), with_gaps(["T1"], slice(None)), "every value for Ridge"),
+        (Ridge(), with_gaps(["f1"], slice(1, None)), "every value for Ridge"),
+        (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "every target for RandomForestRegressor"),
+    ],
+    ids=["temperatures", "targets of a fold", "targets"],
+)
+def test_no_row_to_learn_from_is_said(estimator, holed, message):
+    with pytest.raises(ValueError, match=f"none of [0-9]+ rows to learn from is complete; expected .* {message}"):
+        compensator(estimator).fit_transform(holed)
+
+
+def test_predictions_of_another_shape_are_refused():
+    class OneColumn(LinearRegression):
+        def predict(self, X):
+            return super().predict(X)[:, 0]
+
+    with pytest.raises(
+        ValueError, match=r"OneColumn predicted the shape \(200, 1\); expected \(200, 6\), a column for"
+    ):
+        compensator(OneColumn()).fit(X).transform(X)
+
+
+def test_other_columns_than_in_fit_are_refused():
+    fitted = compensator().fit(X)
+    with pytest.raises(ValueError, match="feature names"):
+        fitted.transform(X[MODES + list(T.columns)])
+    with pytest.raises(ValueError, match="9 features"):
+        compensator(targets=POSITIONS).fit(X.to_numpy()).transform(X.to_numpy()[:, :5])
