@@ -9,14 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
-from skthermo.datasets._matlab import read_matrices
+from skthermo._matlab import Matrix, read_matrices
 
 EPOCH = pd.Timestamp("1997-11-11")
 MODES = ["f1", "f2", "f3", "f4"]
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 STATES = ("undamaged", "damaged")
 UNKNOWN = "unknown"
-Matrices = dict[str, NDArray[np.float64] | None]
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
@@ -151,7 +150,7 @@ def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(columns), [STATES[0]] * count + [STATES[1]] * (len(data) - count)
 
 
-def _matlab_hours(content: Matrices, n_records: int, file: Path) -> NDArray[np.float64]:
+def _matlab_hours(content: dict[str, Matrix | None], n_records: int, file: Path) -> NDArray[np.float64]:
     if "idx" not in content:
         return np.arange(float(n_records))
     mask = _matlab_field(content, "idx", file).ravel()
@@ -163,12 +162,12 @@ def _matlab_hours(content: Matrices, n_records: int, file: Path) -> NDArray[np.f
     return np.flatnonzero(mask).astype(float)
 
 
-def _matlab_field(content: Matrices, name: str, file: Path) -> NDArray[np.float64]:
+def _matlab_field(content: dict[str, Matrix | None], name: str, file: Path) -> NDArray[np.float64]:
     if name not in content:
         raise ValueError(f"{file}: no field {name!r}; found {sorted(content)}")
     matrix = content[name]
-    if matrix is None:
-        raise ValueError(f"{file}: field {name!r} is not a matrix of real numbers")
+    if not isinstance(matrix, np.ndarray):
+        raise ValueError(f"{file}: field {name!r} is not a full matrix of real numbers")
     return matrix
 
 
