@@ -4,6 +4,7 @@ from skthermo.fem._affine import AffineModel
 from skthermo.fem._beam import Beam
 from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
+from skthermo.fem._exported import load_affine
 from skthermo.fem._noise import add_noise
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._reduced import ReducedModel
@@ -22,6 +23,7 @@ __all__ = [
     "Spring",
     "Structure",
     "add_noise",
+    "load_affine",
     "mac",
     "sample",
 ]

@@ -1,0 +1,192 @@
+"""FE models that other programs have exported as matrices."""
+
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from functools import reduce
+from operator import add
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+
+from skthermo._matlab import Matrix
+from skthermo.fem._affine import AffineModel
+from skthermo.fem._matrix_files import read_named
+
+Key = str | tuple[str, ...]
+
+MASS_NAMES = ("m", "m0", "mass")
+TOTAL_NAMES = ("k", "k0", "stiffness")
+SAME = 1e-6
+
+
+def load_affine(
+    path: str | PathLike,
+    *,
+    stiffness: Collection[str] | Mapping[str, Key] | None = None,
+    mass: str | None = None,
+    total: str | None = None,
+    n_modes: int = 6,
+    parameter_names: Sequence[str] | None = None,
+    groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
+    track: bool = False,
+) -> AffineModel:
+    """An FE model from the stiffness terms and the mass matrix that another program has written.
+
+    K(theta) is the sum of theta_j times the j-th stiffness matrix, each a parameter of the matrix's name.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A MATLAB v5 file (``.mat``; ``save -v7`` writes it), a NumPy file (``.npz``) of named arrays, or a
+        folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``) or what
+        `scipy.sparse.save_npz` writes (``.npz``). Matrices are dense or sparse.
+    stiffness : collection of str, or mapping of str to str or tuple of str, optional
+        Matrices that are terms; a mapping says which parameters multiply each, as in `AffineModel`: ``()``
+        none, ``("E", "A")`` a product, the same parameter several matrices. By default every square matrix
+        but the mass and the total is a term.
+    mass : str, optional
+        The mass matrix. By default the one called M, M0 or mass, in lower or upper case.
+    total : str, optional
+        The whole nominal stiffness, with which the terms are compared. By default, where ``stiffness`` is
+        not given, the matrix called K, K0 or stiffness, in lower or upper case, if there are others.
+    n_modes : int, default=6
+        How many of the lowest modes the model gives.
+    parameter_names : sequence of str, optional
+        Columns of theta. By default in the order of the file; a folder is read in the order of its names,
+        E_2 before E_10.
+    groups : mapping of str to list of (tuple of str or int), optional
+        Damage groups, as in `AffineModel`: by default each parameter is one.
+    track : bool, default=False
+        Whether a column follows its mode rather than its rank.
+
+    Returns
+    -------
+    AffineModel
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is nothing at the path.
+    ValueError
+        Names the file and the variable that is damaged, missing, of another size than the mass, or not
+        finite; or names the total if it holds less stiffness than the terms together.
+
+    Warns
+    -----
+    UserWarning
+        If a total that was found by its name is more than the sum of the terms.
+
+    See Also
+    --------
+    AffineModel : From matrices at hand.
+    probe : From a program that returns matrices.
+
+    Notes
+    -----
+    Which matrix is which is decided by these rules alone:
+
+    - Text, structs, numbers, vectors and matrices that are not square or not real are left alone; a square
+      matrix of another size than the mass is an error unless ``stiffness`` names the terms.
+    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If it is
+      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal,
+      that is an error. A matrix K0 that comes on top of the terms is said to be so by
+      ``stiffness={"K0": (), "K1": "E_deck", ...}``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from skthermo.fem import load_affine
+    >>> k1, k2 = np.array([[400.0, 0], [0, 0]]), np.array([[400.0, -400], [-400, 400]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.savez(f"{folder}/tower.npz", K0=k1 + k2, k_base=k1, k_top=k2, M0=np.eye(2))
+    ...     model = load_affine(f"{folder}/tower.npz", n_modes=2)
+    >>> model.parameter_names
+    ('k_base', 'k_top')
+    >>> model.frequencies([[1.0, 1.0]]).round(3)
+    array([[1.967, 5.15 ]])
+    """
+    file = Path(path)
+    matrices = read_named(file)
+    mass_name = mass or _named(matrices, MASS_NAMES, "mass", file)
+    if mass_name is None:
+        raise ValueError(f"{file}: no matrix is called {', '.join(MASS_NAMES)}; say mass=..., one of {list(matrices)}")
+    n_dof = _square(matrices, mass_name, file).shape[0]
+    is_given = stiffness is not None or total is not None
+    if stiffness is None:
+        stiffness = _other_square(matrices, mass_name, n_dof, file)
+        total = total or (_named(stiffness, TOTAL_NAMES, "total", file) if len(stiffness) > 1 else None)
+        stiffness = [name for name in stiffness if name != total]
+    elif isinstance(stiffness, str):
+        stiffness = [stiffness]
+    keys: Mapping[str, Key] = stiffness if isinstance(stiffness, Mapping) else {name: name for name in stiffness}
+    if not keys:
+        raise ValueError(f"{file}: no stiffness matrix beside the mass {mass_name!r}; found {list(matrices)}")
+    terms = {name: _square(matrices, name, file, n_dof) for name in keys}
+    pairs: list[tuple[Key, Matrix]] = [(keys[name], term) for name, term in terms.items()]
+    if total is not None:
+        pairs += _rest(_square(matrices, total, file, n_dof), terms, f"{file}: {total!r}", is_given)
+    try:
+        return AffineModel(
+            pairs, matrices[mass_name], n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track
+        )
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def _named(matrices: Collection[str], names: Sequence[str], what: str, file: Path) -> str | None:
+    """The only matrix that has one of the names."""
+    found = [name for name in matrices if name.lower() in names]
+    if len(found) > 1:
+        raise ValueError(f"{file}: {found} could each be the {what}; say {what}=...")
+    return found[0] if found else None
+
+
+def _square(matrices: Mapping[str, Matrix | None], name: str, file: Path, n_dof: int | None = None) -> Matrix:
+    if name not in matrices:
+        raise ValueError(f"{file}: no variable {name!r}; found {list(matrices)}")
+    matrix = matrices[name]
+    if matrix is None:
+        raise ValueError(f"{file}: variable {name!r} is not a matrix of real numbers")
+    expected = (n_dof or matrix.shape[0],) * 2
+    if matrix.shape != expected:
+        raise ValueError(f"{file}: variable {name!r} has shape {matrix.shape}; expected {expected}")
+    return matrix
+
+
+def _other_square(matrices: Mapping[str, Matrix | None], mass: str, n_dof: int, file: Path) -> list[str]:
+    """Square matrices beside the mass, single numbers left out."""
+    shapes = {name: matrix.shape for name, matrix in matrices.items() if matrix is not None and name != mass}
+    square = [name for name, shape in shapes.items() if shape[0] == shape[1] > 1 or shape == (n_dof, n_dof)]
+    for name in square:
+        if shapes[name] != (n_dof, n_dof):
+            raise ValueError(
+                f"{file}: variable {name!r} has shape {shapes[name]}; expected {(n_dof, n_dof)} like the mass "
+                f"{mass!r}, or stiffness=[...] that names the terms"
+            )
+    return square
+
+
+def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_given: bool) -> list[tuple[Key, Matrix]]:
+    """What the terms leave of the total: the constant part, or nothing."""
+    rest = scipy.sparse.coo_array(total - reduce(add, terms.values()))
+    diagonal = np.abs(total.diagonal())
+    scale = np.sqrt(diagonal[rest.row] * diagonal[rest.col])
+    if not (np.abs(rest.data) > SAME * scale).any():
+        return []
+    if (rest.diagonal() < -SAME * diagonal).any():
+        row = int(np.argmin(rest.diagonal()))
+        raise ValueError(
+            f"{what} is {total.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; expected a "
+            "total of the stiffness, or stiffness=... that says which matrices are terms"
+        )
+    if not is_given:
+        warnings.warn(
+            f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
+            f"total=... says so, and stiffness=... names other terms",
+            UserWarning,
+            stacklevel=3,
+        )
+    return [((), scipy.sparse.csc_array(rest) if scipy.sparse.issparse(total) else rest.toarray())]

@@ -1,0 +1,92 @@
+"""Named matrices from the files that other programs write."""
+
+import io
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+import scipy.sparse
+from numpy.typing import NDArray
+
+from skthermo._matlab import Matrix, read_matrices
+
+FORMATS = "a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of .mtx and .npz files"
+
+
+def read_named(path: Path) -> dict[str, Matrix | None]:
+    """Matrices by name, in the file's order; None for what is not a real matrix.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is nothing at the path.
+    ValueError
+        Names the file, and the variable where it is known, that is damaged or not finite.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist; expected {FORMATS}")
+    if path.is_dir():
+        matrices = _read_folder(path)
+    elif path.suffix.lower() == ".mat":
+        matrices = read_matrices(path)
+    elif path.suffix.lower() == ".npz":
+        matrices = {name: _real(array) for name, array in _read_npz(path).items()}
+    else:
+        raise ValueError(f"{path} is neither of these: {FORMATS}")
+    for name, matrix in matrices.items():
+        if matrix is not None and not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
+            raise ValueError(f"{path}: variable {name!r} holds values that are not finite")
+    return matrices
+
+
+def _read_folder(folder: Path) -> dict[str, Matrix | None]:
+    """A matrix for every file, E_2 before E_10."""
+    files = [file for file in folder.iterdir() if file.suffix.lower() in (".mtx", ".npz")]
+    matrices: dict[str, Matrix | None] = {}
+    for file in sorted(files, key=lambda file: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", file.name)]):
+        if file.stem in matrices:
+            raise ValueError(f"{folder} holds {file.stem!r} as .mtx and as .npz; expected one of them")
+        matrices[file.stem] = _real(_read_mtx(file) if file.suffix.lower() == ".mtx" else _read_sparse_npz(file))
+    if not matrices:
+        raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
+    return matrices
+
+
+def _read_mtx(file: Path):
+    try:
+        return scipy.io.mmread(file)
+    except Exception as error:  # a damaged file can fail in every way
+        raise ValueError(f"{file}: not readable as Matrix Market ({error})") from error
+
+
+def _read_sparse_npz(file: Path):
+    _read_npz(file)
+    try:
+        matrix = scipy.sparse.load_npz(file)
+        if matrix.format in ("csr", "csc", "bsr"):
+            matrix.check_format(full_check=True)
+    except Exception as error:  # a damaged file can fail in every way
+        raise ValueError(f"{file}: not a sparse matrix of scipy.sparse.save_npz ({error})") from error
+    return matrix
+
+
+def _read_npz(file: Path) -> dict[str, NDArray]:
+    """Arrays, once the checksum of each is known to be right."""
+    name = ""
+    try:
+        arrays = {}
+        with zipfile.ZipFile(file) as archive:
+            for name in archive.namelist():
+                arrays[name.removesuffix(".npy")] = np.lib.format.read_array(io.BytesIO(archive.read(name)))
+    except Exception as error:  # a damaged file can fail in every way
+        variable = f"variable {name.removesuffix('.npy')!r} is " if name else ""
+        raise ValueError(f"{file}: {variable}not readable as .npz ({error})") from error
+    return arrays
+
+
+def _real(matrix) -> Matrix | None:
+    if matrix.ndim != 2 or matrix.dtype.kind not in "fiub":
+        return None
+    return scipy.sparse.csc_array(matrix, dtype=float) if scipy.sparse.issparse(matrix) else matrix.astype(float)
