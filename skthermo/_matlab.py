@@ -9,12 +9,13 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64] | scipy.sparse.csc_array
+Matrix: TypeAlias = NDArray[np.float64] | scipy.sparse.csc_array
 Part = tuple[int, bytes]
 
 HEADER = 128
@@ -104,7 +105,8 @@ def _matrix(parts: list[Part], order: str) -> Matrix | None:
     if is_complex:
         return None
     if kind == SPARSE_CLASS:
-        return _sparse_matrix(*numbers, *shape.tolist())
+        rows, starts, values = numbers
+        return _sparse_matrix(rows, starts, values, *shape.tolist())
     if numbers[0].size != math.prod(shape.tolist()):
         raise ValueError(f"{numbers[0].size} values; expected {shape.tolist()}")
     return numbers[0].reshape(shape, order="F").astype(float)

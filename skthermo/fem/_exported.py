@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse
 
-from skthermo._matlab import Matrix
 from skthermo.fem._affine import AffineModel
 from skthermo.fem._matrix_files import read_named
+from skthermo.fem._terms import Matrix
 
-Key = str | tuple[str, ...]
+Key = tuple[str, ...]
 
 MASS_NAMES = ("m", "m0", "mass")
 TOTAL_NAMES = ("k", "k0", "stiffness")
@@ -24,7 +24,7 @@ SAME = 1e-6
 def load_affine(
     path: str | PathLike,
     *,
-    stiffness: Collection[str] | Mapping[str, Key] | None = None,
+    stiffness: Collection[str] | Mapping[str, str | Key] | None = None,
     mass: str | None = None,
     total: str | None = None,
     n_modes: int = 6,
@@ -110,83 +110,86 @@ def load_affine(
     """
     file = Path(path)
     matrices = read_named(file)
-    mass_name = mass or _named(matrices, MASS_NAMES, "mass", file)
-    if mass_name is None:
+    square = _square(matrices)
+    mass = mass or _usual(square, MASS_NAMES, "mass", file)
+    if mass is None:
         raise ValueError(f"{file}: no matrix is called {', '.join(MASS_NAMES)}; say mass=..., one of {list(matrices)}")
-    n_dof = _square(matrices, mass_name, file).shape[0]
-    is_given = stiffness is not None or total is not None
+    mass_matrix = _find(matrices, mass, file)
+    says_total = total is not None
     if stiffness is None:
-        stiffness = _other_square(matrices, mass_name, n_dof, file)
-        total = total or (_named(stiffness, TOTAL_NAMES, "total", file) if len(stiffness) > 1 else None)
-        stiffness = [name for name in stiffness if name != total]
-    elif isinstance(stiffness, str):
-        stiffness = [stiffness]
-    keys: Mapping[str, Key] = stiffness if isinstance(stiffness, Mapping) else {name: name for name in stiffness}
+        others = [name for name in square if name != mass]
+        if total is None and len(others) > 1:
+            total = _usual(others, TOTAL_NAMES, "total", file)
+        stiffness = [name for name in others if name != total]
+    keys = _keys(stiffness)
     if not keys:
-        raise ValueError(f"{file}: no stiffness matrix beside the mass {mass_name!r}; found {list(matrices)}")
-    terms = {name: _square(matrices, name, file, n_dof) for name in keys}
-    pairs: list[tuple[Key, Matrix]] = [(keys[name], term) for name, term in terms.items()]
+        raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
+    terms = {name: _find(matrices, name, file, mass_matrix.shape) for name in keys}
+    pairs = [(keys[name], term) for name, term in terms.items()]
     if total is not None:
-        pairs += _rest(_square(matrices, total, file, n_dof), terms, f"{file}: {total!r}", is_given)
+        rest = _rest(_find(matrices, total, file, mass_matrix.shape), terms, f"{file}: {total!r}", says_total)
+        pairs += [] if rest is None else [((), rest)]
     try:
         return AffineModel(
-            pairs, matrices[mass_name], n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track
+            pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track
         )
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 
 
-def _named(matrices: Collection[str], names: Sequence[str], what: str, file: Path) -> str | None:
-    """The only matrix that has one of the names."""
-    found = [name for name in matrices if name.lower() in names]
+def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
+    """Names of square matrices; of single numbers only if there is nothing larger."""
+    sizes = {name: m.shape[0] for name, m in matrices.items() if m is not None and m.shape[0] == m.shape[1] > 0}
+    return [name for name, size in sizes.items() if size > 1] or list(sizes)
+
+
+def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:
+    """The only name that is a usual one."""
+    found = [name for name in names if name.lower() in usual]
     if len(found) > 1:
         raise ValueError(f"{file}: {found} could each be the {what}; say {what}=...")
     return found[0] if found else None
 
 
-def _square(matrices: Mapping[str, Matrix | None], name: str, file: Path, n_dof: int | None = None) -> Matrix:
+def _keys(stiffness: Collection[str] | Mapping[str, str | Key]) -> dict[str, Key]:
+    """The parameters that multiply each term."""
+    names = [stiffness] if isinstance(stiffness, str) else stiffness
+    keys = names if isinstance(names, Mapping) else {name: name for name in names}
+    return {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
+
+
+def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: tuple[int, ...] = ()) -> Matrix:
     if name not in matrices:
         raise ValueError(f"{file}: no variable {name!r}; found {list(matrices)}")
     matrix = matrices[name]
     if matrix is None:
         raise ValueError(f"{file}: variable {name!r} is not a matrix of real numbers")
-    expected = (n_dof or matrix.shape[0],) * 2
-    if matrix.shape != expected:
-        raise ValueError(f"{file}: variable {name!r} has shape {matrix.shape}; expected {expected}")
+    if shape and matrix.shape != shape:
+        raise ValueError(
+            f"{file}: variable {name!r} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] "
+            "that names the terms"
+        )
     return matrix
 
 
-def _other_square(matrices: Mapping[str, Matrix | None], mass: str, n_dof: int, file: Path) -> list[str]:
-    """Square matrices beside the mass, single numbers left out."""
-    shapes = {name: matrix.shape for name, matrix in matrices.items() if matrix is not None and name != mass}
-    square = [name for name, shape in shapes.items() if shape[0] == shape[1] > 1 or shape == (n_dof, n_dof)]
-    for name in square:
-        if shapes[name] != (n_dof, n_dof):
-            raise ValueError(
-                f"{file}: variable {name!r} has shape {shapes[name]}; expected {(n_dof, n_dof)} like the mass "
-                f"{mass!r}, or stiffness=[...] that names the terms"
-            )
-    return square
-
-
-def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_given: bool) -> list[tuple[Key, Matrix]]:
-    """What the terms leave of the total: the constant part, or nothing."""
+def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool) -> Matrix | None:
+    """What the terms leave of the total, if anything."""
     rest = scipy.sparse.coo_array(total - reduce(add, terms.values()))
     diagonal = np.abs(total.diagonal())
     scale = np.sqrt(diagonal[rest.row] * diagonal[rest.col])
     if not (np.abs(rest.data) > SAME * scale).any():
-        return []
-    if (rest.diagonal() < -SAME * diagonal).any():
-        row = int(np.argmin(rest.diagonal()))
+        return None
+    less = rest.diagonal() < -SAME * diagonal
+    if less.any():
+        row = int(np.argmax(less))
         raise ValueError(
             f"{what} is {total.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; expected a "
             "total of the stiffness, or stiffness=... that says which matrices are terms"
         )
-    if not is_given:
+    if not is_meant:
         warnings.warn(
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
-            f"total=... says so, and stiffness=... names other terms",
-            UserWarning,
+            "total=... says that it is, stiffness=... what else the matrices are",
             stacklevel=3,
         )
-    return [((), scipy.sparse.csc_array(rest) if scipy.sparse.issparse(total) else rest.toarray())]
+    return scipy.sparse.csc_array(rest)

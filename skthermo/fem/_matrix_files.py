@@ -10,7 +10,8 @@ import scipy.io
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._matlab import Matrix, read_matrices
+from skthermo._matlab import read_matrices
+from skthermo.fem._terms import Matrix
 
 FORMATS = "a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of .mtx and .npz files"
 
