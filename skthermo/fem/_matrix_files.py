@@ -6,11 +6,11 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._matlab import read_matrices
+from skthermo.fem._matrix_market import read_matrix_market
 from skthermo.fem._terms import Matrix
 
 FORMATS = "a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of .mtx and .npz files"
@@ -49,20 +49,14 @@ def _read_folder(folder: Path) -> dict[str, Matrix | None]:
     for file in sorted(files, key=lambda file: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", file.name)]):
         if file.stem in matrices:
             raise ValueError(f"{folder} holds {file.stem!r} as .mtx and as .npz; expected one of them")
-        matrices[file.stem] = _real(_read_mtx(file) if file.suffix.lower() == ".mtx" else _read_sparse_npz(file))
+        is_text = file.suffix.lower() == ".mtx"
+        matrices[file.stem] = read_matrix_market(file) if is_text else _read_sparse_npz(file)
     if not matrices:
         raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
     return matrices
 
 
-def _read_mtx(file: Path):
-    try:
-        return scipy.io.mmread(file)
-    except Exception as error:  # a damaged file can fail in every way
-        raise ValueError(f"{file}: not readable as Matrix Market ({error})") from error
-
-
-def _read_sparse_npz(file: Path):
+def _read_sparse_npz(file: Path) -> Matrix | None:
     _read_npz(file)
     try:
         matrix = scipy.sparse.load_npz(file)
@@ -70,7 +64,7 @@ def _read_sparse_npz(file: Path):
             matrix.check_format(full_check=True)
     except Exception as error:  # a damaged file can fail in every way
         raise ValueError(f"{file}: not a sparse matrix of scipy.sparse.save_npz ({error})") from error
-    return matrix
+    return _real(matrix)
 
 
 def _read_npz(file: Path) -> dict[str, NDArray]:
