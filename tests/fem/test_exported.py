@@ -1,0 +1,276 @@
+"""Exported models: the same model from every format, what each matrix is taken for, and damaged files."""
+
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from skthermo.fem import AffineModel, load_affine
+
+N = 6
+
+
+def spring(i, j, k):
+    """A spring between two masses of a row, or (i = j) to the ground."""
+    matrix = np.zeros((N, N))
+    matrix[i, i] += k
+    if i != j:
+        matrix[j, j] += k
+        matrix[i, j] = matrix[j, i] = -k
+    return matrix
+
+
+TERMS = {
+    "E_2": sum(spring(i, i + 1, 1000.0 * (i + 1)) for i in range(3)),
+    "E_10": sum(spring(i, i + 1, 3000.0) for i in range(2, 5)),
+    "k_base": spring(0, 0, 1500.5) + spring(5, 5, 1 / 3),
+}
+TOTAL = sum(TERMS.values())
+M = np.diag([1.0, 2.0, 0.0, 1.5, 0.0, 1.0])
+MATRICES = {"K0": TOTAL} | TERMS | {"M0": M}
+CLUTTER = {"measDOFs": np.arange(3.0), "shapes": np.ones((N, 2)), "n": 4, "cube": np.ones((2, 2, 2)), "text": "SAP"}
+RNG = np.random.default_rng(0)
+THETA = RNG.uniform(0.7, 1.3, (5, 3))
+
+
+def write_mat(folder, matrices, *, sparse=False, compressed=True):
+    form = scipy.sparse.csc_array if sparse else np.asarray
+    fields = {name: form(m) if np.shape(m) == (N, N) else m for name, m in matrices.items()}
+    scipy.io.savemat(folder / "model.mat", fields, do_compression=compressed)
+    return folder / "model.mat"
+
+
+def write_npz(folder, matrices):
+    np.savez(folder / "model.npz", **matrices)
+    return folder / "model.npz"
+
+
+def write_mtx(folder, matrices, *, sparse=False):
+    for name, matrix in matrices.items():
+        scipy.io.mmwrite(folder / f"{name}.mtx", scipy.sparse.coo_array(matrix) if sparse else np.asarray(matrix))
+    return folder
+
+
+def write_folder_of_npz(folder, matrices):
+    for i, (name, matrix) in enumerate(matrices.items()):
+        form = [scipy.sparse.csr_array, scipy.sparse.coo_array, scipy.sparse.bsr_array][i % 3]
+        scipy.sparse.save_npz(folder / f"{name}.npz", form(matrix))
+    return folder
+
+
+WRITERS = {
+    "mat": write_mat,
+    "mat sparse": lambda *a: write_mat(*a, sparse=True),
+    "mat sparse, not compressed": lambda *a: write_mat(*a, sparse=True, compressed=False),
+    "npz": write_npz,
+    "mtx": write_mtx,
+    "mtx sparse": lambda *a: write_mtx(*a, sparse=True),
+    "folder of npz": write_folder_of_npz,
+}
+
+
+def assert_same(model, expected):
+    """Equal matrices wherever theta is, the order of parameters apart."""
+    assert set(model.parameter_names) == set(expected.parameter_names)
+    for _ in range(3):
+        theta = dict(zip(expected.parameter_names, RNG.uniform(0.7, 1.3, 9), strict=False))
+        ours, theirs = (one.matrices([theta[name] for name in one.parameter_names]) for one in (model, expected))
+        for got, wanted in zip(ours, theirs, strict=True):
+            np.testing.assert_allclose(got.toarray(), wanted.toarray(), rtol=1e-12, atol=1e-9)
+
+
+EXPECTED = AffineModel({(name,): matrix for name, matrix in TERMS.items()}, M, n_modes=4)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_every_format_is_the_same_model(tmp_path, form):
+    clutter = CLUTTER if form.startswith("mat") else {"shapes": np.ones((N, 2))}
+    model = load_affine(WRITERS[form](tmp_path, MATRICES | clutter), n_modes=4, track=True)
+    assert model.parameter_names == tuple(TERMS)
+    assert model.track
+    assert_same(model, EXPECTED)
+    np.testing.assert_allclose(model.frequencies(THETA)[:, 0], EXPECTED.frequencies(THETA)[:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("field", ["real", "integer"])
+@pytest.mark.parametrize("symmetry", ["general", "symmetric"])
+@pytest.mark.parametrize("sparse", [False, True])
+def test_matrix_market_is_read_as_scipy_reads_it(tmp_path, field, symmetry, sparse):
+    files = {"K": np.round(TOTAL), "M": np.eye(N)}
+    for name, matrix in files.items():
+        target = scipy.sparse.coo_array(matrix) if sparse else matrix
+        target = target.astype(int) if field == "integer" else target
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", target, "a comment", field=field, symmetry=symmetry)
+    stiffness, mass = load_affine(tmp_path, n_modes=2).matrices([1.0])
+    for got, name in ((stiffness, "K"), (mass, "M")):
+        theirs = scipy.io.mmread(tmp_path / f"{name}.mtx")
+        np.testing.assert_array_equal(got.toarray(), theirs.toarray() if sparse else theirs)
+
+
+def test_without_a_total_all_others_are_terms(tmp_path):
+    assert_same(load_affine(write_npz(tmp_path, TERMS | {"mass": M}), n_modes=4), EXPECTED)
+
+
+def test_a_lone_stiffness_is_a_term_though_it_is_called_k(tmp_path):
+    model = load_affine(write_npz(tmp_path, {"K": TOTAL, "m": M}), n_modes=4)
+    assert model.parameter_names == ("K",)
+
+
+def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
+    rest = spring(3, 3, 500.0)
+    expected = AffineModel([((name,), matrix) for name, matrix in TERMS.items()] + [((), rest)], M, n_modes=4)
+    file = write_mat(tmp_path, MATRICES | {"K0": TOTAL + rest}, sparse=True)
+    with pytest.warns(UserWarning, match=r"model\.mat: 'K0' is more than the sum of \['E_2', 'E_10', 'k_base'\]"):
+        assert_same(load_affine(file, n_modes=4), expected)
+    assert_same(load_affine(file, n_modes=4, total="K0"), expected)
+    some = load_affine(file, stiffness=["E_2", "k_base"], total="K0", n_modes=4)
+    assert_same(
+        some,
+        AffineModel({("E_2",): TERMS["E_2"], ("k_base",): TERMS["k_base"], (): rest + TERMS["E_10"]}, M, n_modes=4),
+    )
+
+
+def test_a_total_that_rounding_has_touched_is_still_the_total(tmp_path):
+    rounded = np.vectorize(lambda value: float(f"{value:.8g}"))(TOTAL)
+    assert (rounded != TOTAL).any()
+    assert_same(load_affine(write_npz(tmp_path, MATRICES | {"K0": rounded}), n_modes=4), EXPECTED)
+
+
+def test_a_constant_part_called_k0_is_refused_until_it_is_named(tmp_path):
+    constant = spring(0, 0, 100.0)
+    file = write_npz(tmp_path, MATRICES | {"K0": constant})
+    with pytest.raises(ValueError, match=r"model\.npz: 'K0' is .*less than the sum of .*expected a total"):
+        load_affine(file)
+    keys = {"K0": (), "E_2": "E", "E_10": ("E", "A"), "k_base": "k"}
+    model = load_affine(file, stiffness=keys, parameter_names=["k", "E", "A"], n_modes=4)
+    terms = {(): constant, ("E",): TERMS["E_2"], ("E", "A"): TERMS["E_10"], ("k",): TERMS["k_base"]}
+    assert model.parameter_names == ("k", "E", "A")
+    assert_same(model, AffineModel(terms, M, n_modes=4, parameter_names=["k", "E", "A"]))
+
+
+def test_matrices_may_share_a_parameter_and_damage_groups_cut_through_it(tmp_path):
+    file = write_npz(tmp_path, MATRICES)
+    keys = {"E_2": "E", "E_10": "E", "k_base": "k"}
+    model = load_affine(file, stiffness=keys, groups={"left": [0], "base": [("k",)]}, n_modes=4)
+    assert model.parameter_names == ("E", "k")
+    damaged = model.damaged({"left": 0.4}).frequencies([[1.0, 1.0]])
+    np.testing.assert_allclose(damaged, EXPECTED.damaged({"E_2": 0.4}).frequencies([[1.0] * 3]), rtol=1e-12)
+
+
+def test_a_folder_is_read_in_natural_order(tmp_path):
+    assert load_affine(write_mtx(tmp_path, MATRICES), n_modes=4).parameter_names == ("E_2", "E_10", "k_base")
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "message"),
+    [
+        ({"M0": None}, {}, "no matrix is called m, m0, mass; say mass=..., one of"),
+        ({"mass": M}, {}, r"\['M0', 'mass'\] could each be the mass; say mass="),
+        ({"K": TOTAL}, {}, r"\['K0', 'K'\] could each be the total; say total="),
+        ({"E_2": np.eye(3)}, {}, r"variable 'E_2' has shape \(3, 3\); expected \(6, 6\) like the mass"),
+        ({"E_2": TERMS["E_2"] * np.nan}, {}, "variable 'E_2' holds values that are not finite"),
+        ({"E_2": np.triu(TERMS["E_2"])}, {"total": None, "stiffness": ["E_2"]}, r"'E_2'.* is not symmetric"),
+        ({}, {"stiffness": ["E_7"]}, "no variable 'E_7'; found"),
+        ({}, {"mass": "M"}, "no variable 'M'; found"),
+        ({"E_2": np.ones(4)}, {"stiffness": "E_2"}, "variable 'E_2'"),
+        ({"E_2": TERMS["E_2"] * 1j}, {"stiffness": ["E_2"]}, "variable 'E_2' is not a matrix of real numbers"),
+        ({}, {"stiffness": []}, "no stiffness matrix beside the mass 'M0'"),
+        ({}, {"n_modes": 5}, "n_modes is 5"),
+        ({}, {"stiffness": ["E_2"]}, "the structure is a mechanism"),
+        ({}, {"parameter_names": ["E_2"]}, "expected only the parameters"),
+    ],
+)
+@pytest.mark.parametrize("writer", [write_mat, write_npz])
+def test_errors_name_file_and_variable(tmp_path, writer, changes, arguments, message):
+    matrices = {name: matrix for name, matrix in (MATRICES | changes).items() if matrix is not None}
+    with pytest.raises(ValueError, match=rf"model\.(mat|npz): .*{message}"):
+        load_affine(writer(tmp_path, matrices), **({"n_modes": 4} | arguments))
+
+
+def test_errors_of_paths(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"no_such\.mat does not exist; expected a MATLAB v5 file"):
+        load_affine(tmp_path / "no_such.mat")
+    with pytest.raises(ValueError, match="holds no matrix; expected"):
+        load_affine(tmp_path)
+    (tmp_path / "K.csv").write_text("1,2")
+    with pytest.raises(ValueError, match=r"K\.csv is neither of these"):
+        load_affine(tmp_path / "K.csv")
+    write_mtx(tmp_path, MATRICES)
+    scipy.sparse.save_npz(tmp_path / "K0.npz", scipy.sparse.csr_array(TOTAL))
+    with pytest.raises(ValueError, match=r"holds 'K0' as \.mtx and as \.npz"):
+        load_affine(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the first line is ''"),
+        ("%%MatrixMarket matrix array real\n", "expected '%%MatrixMarket matrix"),
+        ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "expected array or coordinate, real"),
+        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4", "the last line has no end"),
+        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n", "3 numbers; expected 4"),
+        ("%%MatrixMarket matrix array real symmetric\n9999999 9999999\n1\n2\n3\n", "3 numbers; expected"),
+        ("%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n", "the size is"),
+        ("%%MatrixMarket matrix array real general\n\n", "the size is"),
+        ("%%MatrixMarket matrix array real general\n1 1\n1.0x\n", "1.0x"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 3 5.0\n", r"outside 1 to \[2, 2\]"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 0 5.0\n", "outside 1 to"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "5 numbers; expected 2 times"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 5.0\n2 1 5.0\n", "both sides of its diagonal"),
+    ],
+)
+def test_bad_matrix_market_files_are_refused(tmp_path, text, message):
+    write_mtx(tmp_path, MATRICES)
+    (tmp_path / "E_2.mtx").write_text(text)
+    with pytest.raises(ValueError, match=rf"E_2\.mtx: not readable as Matrix Market .*{message}"):
+        load_affine(tmp_path)
+
+
+def outcome(path, n_modes=4):
+    """The model, or what the error says."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return load_affine(path, n_modes=n_modes)
+        except ValueError as error:
+            return str(error)
+
+
+FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@FUZZ
+@given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())
+@pytest.mark.parametrize("form", ["npz", "mtx", "mtx sparse", "folder of npz"])
+def test_damaged_files_are_named_or_their_damage_is_harmless(tmp_path, form, position, bit, cut):
+    path = WRITERS[form](tmp_path, MATRICES)
+    file = path if path.is_file() else next(path.glob("K0.*"))
+    content = bytearray(file.read_bytes())
+    if cut:
+        content = content[: position % len(content)]
+    else:
+        content[position % len(content)] ^= 1 << bit
+    file.write_bytes(content)
+    result = outcome(path)
+    if isinstance(result, str):
+        assert file.name in result or tmp_path.name in result
+    elif "npz" in form:  # whose checksums leave no number wrong
+        assert_same(result, EXPECTED)
+
+
+needs_data = pytest.mark.skipif("SKTHERMO_DATA" not in os.environ, reason="SKTHERMO_DATA names no folder of real data")
+
+
+@needs_data
+def test_the_building_frame():
+    model = load_affine(Path(os.environ["SKTHERMO_DATA"]) / "building_frame" / "ConcreteBuildingFrame.mat")
+    assert model.n_dof == 2302
+    assert set(model.parameter_names) == {f"E_{i}" for i in range(1, 13)} | {"Influence_Link", "Influence_Rebar"}
+    expected = [2.28649, 5.98051, 16.22121, 17.72160, 20.53380, 22.12960]
+    np.testing.assert_allclose(model.frequencies(np.ones((1, 14)))[0], expected, rtol=3e-6)
