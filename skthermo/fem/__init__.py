@@ -6,6 +6,7 @@ from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._exported import load_affine
 from skthermo.fem._noise import add_noise
+from skthermo.fem._probe import probe
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._reduced import ReducedModel
 from skthermo.fem._sampling import sample
@@ -25,5 +26,6 @@ __all__ = [
     "add_noise",
     "load_affine",
     "mac",
+    "probe",
     "sample",
 ]

@@ -1,7 +1,8 @@
 """Rows of parameter multipliers."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,3 +68,21 @@ def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64]) ->
             UserWarning,
             stacklevel=4,
         )
+
+
+def by_name(row: NDArray[np.float64], parameter_names: Sequence[str]) -> dict[str, float]:
+    """Multipliers as they are shown in messages."""
+    return dict(zip(parameter_names, row.tolist(), strict=True))
+
+
+@contextmanager
+def failures_named(rows: NDArray[np.float64], parameter_names: Sequence[str]) -> Iterator[None]:
+    """Say at which theta somebody else's program fails."""
+    try:
+        yield
+    except Exception as error:
+        many = f"{len(rows)} rows from " if rows.ndim == 2 else ""
+        theta = by_name(np.atleast_2d(rows)[0], parameter_names)
+        raise RuntimeError(
+            f"the model's function failed at {many}theta = {theta}: {type(error).__name__}: {error}"
+        ) from error

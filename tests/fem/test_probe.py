@@ -1,0 +1,189 @@
+"""Affine terms recovered from programs, and programs that are not affine named for what they do."""
+
+import numpy as np
+import pytest
+import scipy.sparse
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, Beam, Structure, probe
+
+N = 12
+NAMES = ("E", "A", "rho")
+
+
+def chain(values):
+    """Springs in a row from the ground, as a tridiagonal sparse matrix."""
+    values = np.append(values, 0.0)
+    return scipy.sparse.diags_array([values[:-1] + values[1:], -values[1:-1], -values[1:-1]], offsets=[0, 1, -1])
+
+
+FIRST, SECOND = np.repeat([1000.0, 0.0], N // 2), np.repeat([0.0, 3000.0], N // 2)
+
+
+class Counted:
+    def __init__(self, function):
+        self.function = function
+        self.rows = []
+
+    def __call__(self, row):
+        self.rows.append(row.copy())
+        return self.function(row)
+
+
+def affine_program(row):
+    E, A, rho = row
+    stiffness = chain(E * FIRST + A * SECOND + 1 / 3)
+    return stiffness, scipy.sparse.diags_array((0.5 + rho) * np.ones(N))
+
+
+def test_one_call_for_each_term_and_one_for_each_check():
+    program = Counted(affine_program)
+    model = probe(program, NAMES, n_checks=4, random_state=0)
+    assert len(program.rows) == 1 + 3 + 4
+    np.testing.assert_array_equal(program.rows[:4], np.vstack([np.ones(3), 1 + np.eye(3)]))
+    assert model.parameter_names == NAMES
+    assert set(model.groups) == {"E", "A"}
+
+
+@settings(max_examples=20, deadline=None)
+@given(theta=st.lists(st.floats(0.2, 5), min_size=3, max_size=3))
+def test_the_models_matrices_are_the_programs(theta):
+    model = probe(affine_program, NAMES, random_state=0)
+    for ours, theirs in zip(model.matrices(theta), affine_program(theta), strict=True):
+        theirs = theirs.toarray()
+        np.testing.assert_allclose(ours.toarray(), theirs, rtol=1e-12, atol=1e-12 * theirs.max())
+
+
+def test_sparse_stays_sparse_and_dense_gives_the_same():
+    model = probe(affine_program, NAMES, random_state=0)
+    assert all(matrix.nnz <= 3 * N for matrix in model.matrices(np.ones(3)))
+    dense = probe(lambda row: tuple(m.toarray() for m in affine_program(row)), NAMES, random_state=0)
+    theta = np.random.default_rng(0).uniform(0.5, 2, (4, 3))
+    np.testing.assert_array_equal(dense.frequencies(theta), model.frequencies(theta))
+
+
+def test_rounding_makes_no_term():
+    """0.1 E + 0.2 A + 0.7 E is not exact in binary, and yet there is no constant part."""
+    model = probe(
+        lambda row: (chain(0.1 * row[0] * FIRST + 0.2 * row[1] * SECOND + 0.7 * row[0] * FIRST), np.eye(N)),
+        ["E", "A"],
+        random_state=0,
+    )
+    halved = model.damaged({"E": 0.5, "A": 0.5}).frequencies([[1.0, 1.0]])
+    np.testing.assert_allclose(halved, model.frequencies([[0.5, 0.5]]), rtol=1e-13)
+
+
+@pytest.mark.parametrize("track", [False, True])
+def test_a_models_own_matrices_give_the_model_back(track):
+    truss = make_truss()
+    model = probe(truss.matrices, truss.parameter_names, track=track, random_state=0)
+    theta = np.random.default_rng(0).uniform(0.7, 1.3, (10, 4))
+    found = np.sort(model.frequencies(theta))
+    np.testing.assert_allclose(found, truss.frequencies(theta), rtol=1e-10)
+    assert model.track is track
+
+
+def test_a_structure_of_beams_is_found_again():
+    box = {"E": 37.5e9, "G": 16e9, "A": 4.4, "I_yy": 0.56, "I_zz": 17.0, "J": 1.2, "I_p": 17.56, "density": 2500.0}
+    girder = Structure(
+        {i: (2.5 * i, 0, 0) for i in range(9)},
+        {i: Beam(i, i + 1, **box) for i in range(8)},
+        {0: "xyz rx ry rz"},
+        {"root": range(4), "tip": range(4, 8)},
+    )
+    direct = girder.assemble({"I": ("I_yy", "root"), "GJ": ("J", "tip"), "m": ("mass", "tip")})
+
+    def again(row):
+        halves = [box | {"I_yy": box["I_yy"] * row[0]}, box | {"J": box["J"] * row[1]}]
+        members = {i: Beam(i, i + 1, **halves[i // 4]) for i in range(8)}
+        rebuilt = Structure({i: (2.5 * i, 0, 0) for i in range(9)}, members, {0: "xyz rx ry rz"}, {"tip": range(4, 8)})
+        return rebuilt.assemble({"m": ("mass", "tip")}).matrices(row[2:])
+
+    theta = np.random.default_rng(0).uniform(0.7, 1.3, (5, 3))
+    model = probe(again, ["I", "GJ", "m"], random_state=0)
+    np.testing.assert_allclose(model.frequencies(theta), direct.frequencies(theta), rtol=1e-8)
+
+
+def test_a_program_may_reuse_the_arrays_it_returns():
+    stiffness = np.zeros((2, 2))
+
+    def program(row):
+        stiffness[:] = [[row[0] + row[1], -row[1]], [-row[1], row[1]]]
+        row[:] = 0
+        return stiffness, np.eye(2)
+
+    model = probe(program, ["a", "b"], n_modes=2, random_state=0)
+    expected = AffineModel({("a",): [[1.0, 0], [0, 0]], ("b",): [[1.0, -1], [-1, 1]]}, np.eye(2), n_modes=2)
+    np.testing.assert_allclose(model.frequencies([[2.0, 3.0]]), expected.frequencies([[2.0, 3.0]]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("power", [3.0, 2.0, 0.5, -1.0])
+def test_a_power_is_named_and_told(power):
+    def program(row):
+        return chain(row[0] * FIRST + row[1] ** power * SECOND + 5.0), np.eye(N)
+
+    with pytest.raises(ValueError, match=r"not affine in 'h': its stiffness differs by \d") as error:
+        probe(program, ["E", "h", "rho"][:2], random_state=0)
+    assert f"about the power {power:.2f}" in str(error.value)
+
+
+def test_a_product_is_named_by_both_of_its_factors():
+    def program(row):
+        return chain(row[0] * FIRST + row[1] * row[2] * SECOND), row[0] * np.eye(N)
+
+    counted = Counted(program)
+    with pytest.raises(
+        ValueError, match=r"not affine in 'b' and 'h' together: its stiffness .* may hold their product"
+    ):
+        probe(counted, ["E", "b", "h"], n_checks=1, random_state=0)
+    assert len(counted.rows) <= 1 + 3 + 1 + 2 * 3
+
+
+def test_the_mass_must_be_affine_too():
+    with pytest.raises(ValueError, match="not affine in 'rho': its mass differs"):
+        probe(lambda row: (chain(row[0] * FIRST + SECOND), row[1] ** 2 * np.eye(N)), ["E", "rho"], random_state=0)
+
+
+def test_three_that_act_together_are_named():
+    def program(row):
+        a, b, c = row - 1
+        return chain(FIRST + SECOND + 100 * (a + b + c) + 1000 * a * b * c), np.eye(N)
+
+    with pytest.raises(ValueError, match=r"'c' acts together with two or more of \['a', 'b'\]"):
+        probe(program, ["a", "b", "c"], random_state=0)
+
+
+def test_without_checks_the_program_is_believed():
+    model = probe(lambda row: (chain(row[0] ** 2 * (FIRST + SECOND) + 1e4), np.eye(N)), ["h"], n_checks=0)
+    assert model.parameter_names == ("h",)
+
+
+def failing(row):
+    if row[1] > 1.9:
+        raise ZeroDivisionError("no such section")
+    return affine_program(row)
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "error", "message"),
+    [
+        (failing, {}, RuntimeError, r"failed at theta = {'E': 1.0, 'A': 2.0, 'rho': 1.0}: ZeroDivisionError: no such"),
+        (lambda row: np.eye(N), {}, ValueError, "returned a ndarray at theta = {'E': 1.0.*expected .stiffness, mass"),
+        (lambda row: (np.ones((2, 3)), np.eye(2)), {}, ValueError, r"stiffness.* has shape \(2, 3\).*, at theta = "),
+        (lambda row: (np.eye(2), np.eye(3)), {}, ValueError, r"mass .*shape \(3, 3\); expected \(2, 2\)"),
+        (lambda row: (np.eye(1 + int(row[0])),) * 2, {}, ValueError, r"shape \(3, 3\); expected \(2, 2\).*'E': 2.0"),
+        (lambda row: (np.diag(row) / (row[0] < 2), np.eye(3)), {}, ValueError, "not finite, at theta = {'E': 2.0"),
+        (lambda row: (np.triu(np.ones((2, 2))), np.eye(2)), {}, ValueError, "stiffness.* is not symmetric"),
+        (lambda row: (chain(row[0] * FIRST + row[1] * SECOND), np.eye(N)), {}, ValueError, "'rho' changes neither"),
+        (affine_program, {"n_checks": -1}, ValueError, "n_checks is -1"),
+        (affine_program, {"n_modes": 0}, ValueError, "n_modes is 0"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_what_is_wrong_is_named(program, arguments, error, message):
+    with pytest.raises(error, match=message):
+        probe(program, NAMES, random_state=0, **arguments)
+    with pytest.raises(ValueError, match="different names"):
+        probe(affine_program, ["E", "E", "rho"])
