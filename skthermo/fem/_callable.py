@@ -1,12 +1,15 @@
 """FE models that are somebody else's program."""
 
 from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo.fem._affine_input import check_different, check_n_modes
-from skthermo.fem._theta import check_theta
+from skthermo.fem._solved import SolvedSamples
+from skthermo.fem._theta import by_name, check_theta, failures_named
 
 
 class CallableModel:
@@ -24,11 +27,37 @@ class CallableModel:
         Number of frequencies returned.
     vectorized : bool, default=False
         Whether the function takes many rows at once.
+    cache : str or path-like, optional
+        A file that keeps every solved row of theta, so that none is solved twice: neither
+        when the process was killed and starts again, nor in another process later on.
+
+    Attributes
+    ----------
+    cache : Path or None
+        The file, as an absolute path.
 
     Raises
     ------
     ValueError
-        If a name repeats or ``n_modes`` is not a positive integer.
+        If a name repeats, ``n_modes`` is not a positive integer, or the cache belongs to other
+        parameters or another number of modes.
+
+    Warns
+    -----
+    UserWarning
+        If records of the cache are damaged: these rows are solved again.
+
+    See Also
+    --------
+    probe : For programs that return matrices.
+
+    Notes
+    -----
+    A row is recognised by the exact bits of its theta, and written as soon as it is solved; of
+    many rows at once (``vectorized=True``), all when the last is. Several processes may share a
+    cache; what one of them is still solving, another solves too. A cache cannot know whether the
+    function is still the same: delete the file when the program changes. On Windows, where
+    nothing locks the file, let one process at a time write it.
 
     Examples
     --------
@@ -47,11 +76,20 @@ class CallableModel:
         n_modes: int,
         *,
         vectorized: bool = False,
+        cache: str | PathLike | None = None,
     ):
         self.function = function
         self.parameter_names = check_different(parameter_names)
         self.n_modes = check_n_modes(n_modes)
         self.vectorized = vectorized
+        self._samples = None if cache is None else SolvedSamples(cache, self.parameter_names, self.n_modes)
+        if self._samples is not None:
+            self._samples.read()
+
+    @property
+    def cache(self) -> Path | None:
+        """The file that keeps solved rows."""
+        return None if self._samples is None else self._samples.path
 
     def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:
         """Natural frequencies.
@@ -59,7 +97,7 @@ class CallableModel:
         Parameters
         ----------
         theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
+            Multipliers of the nominal parameters. Rows that repeat are solved once.
 
         Returns
         -------
@@ -69,22 +107,34 @@ class CallableModel:
         Raises
         ------
         ValueError
-            If theta has the wrong width or values, or the function returns another shape.
+            If theta has the wrong width or values, the function returns another shape, or the
+            cache belongs to other parameters.
+        RuntimeError
+            If the function fails; the error says at which theta.
         """
         rows = check_theta(theta, self.parameter_names)
-        if self.vectorized:
-            return self._checked(self.function(rows), (len(rows), self.n_modes))
-        results = [self._checked(self.function(row), (self.n_modes,)) for row in rows]
-        return np.array(results).reshape(len(rows), self.n_modes)
+        keys = [row.tobytes() for row in rows.astype("<f8")]
+        solved = {} if self._samples is None else self._samples.read()
+        missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in solved}
+        batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
+        for batch in batches:
+            solved |= zip(batch, self._solve(np.array([missing[key] for key in batch])), strict=True)
+        return np.array([solved[key] for key in keys]).reshape(len(rows), self.n_modes)
 
-    def _checked(self, result: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        array = np.asarray(result, dtype=float)
-        if array.size != np.prod(shape) or array.shape[-1:] != shape[-1:]:
+    def _solve(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))
+        with failures_named(argument, self.parameter_names):
+            result = np.asarray(self.function(argument.copy()), dtype=float)
+        if result.size != np.prod(shape) or result.shape[-1:] != shape[-1:]:
             raise ValueError(
-                f"the model's function returned shape {array.shape}; expected {shape}"
+                f"the model's function returned shape {result.shape}; expected {shape}"
                 + ("" if self.vectorized else " for one row of theta (for many rows: vectorized=True)")
+                + f", at theta = {by_name(rows[0], self.parameter_names)}"
             )
-        return array.reshape(shape)
+        frequencies = result.reshape(len(rows), self.n_modes)
+        if self._samples is not None:
+            self._samples.append(rows, frequencies)
+        return frequencies
 
     def __sklearn_clone__(self) -> "CallableModel":
         return self

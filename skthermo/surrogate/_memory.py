@@ -1,7 +1,5 @@
 """Simulations that are remembered."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any
@@ -12,12 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
+from skthermo._locks import lock
 from skthermo.fem import FEModel, sample
-
-try:
-    import fcntl
-except ImportError:  # not on Windows
-    fcntl = None  # type: ignore[assignment]
 
 
 def remembered_sample(
@@ -40,19 +34,12 @@ def remembered_sample(
             f"memory cannot recognise {model!r}; expected one that can be pickled, with functions and classes from a "
             "module that can be imported (no lambda, nothing from a script, a notebook or a function), or memory=None"
         ) from error
-    with _locked(Path(memory.location), identity):
+    folder = Path(memory.location)
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / f"{identity}.lock", "w") as file:
+        lock(file)
         return memory.cache(_sample, ignore=["model", "n_jobs"])(identity, model, bounds, n_samples, n_jobs, seed)
 
 
 def _sample(identity: str, model: FEModel, bounds: Any, n_samples: int, n_jobs: int | None, seed: int) -> Bunch:
     return sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
-
-
-@contextmanager
-def _locked(folder: Path, name: str) -> Iterator[None]:
-    """Hold a file lock, which the system lifts when its process ends."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / f"{name}.lock", "w") as file:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -1,0 +1,253 @@
+"""Solved samples on disk: nothing is lost, nothing is solved twice, and nobody else's file is touched."""
+
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+import warnings
+
+import joblib
+import numpy as np
+import pytest
+from sklearn.base import clone
+
+from skthermo.fem import CallableModel, sample
+
+NAMES = ["E", "k"]
+THETA = np.random.default_rng(0).uniform(0.5, 1.5, (20, 2))
+RECORD = 8 * (2 + 3) + 4
+
+
+def three_modes(row):
+    return np.sqrt(row[0] + row[1] * np.arange(1.0, 4.0)) / 3
+
+
+class Counted:
+    def __init__(self):
+        self.rows = []
+
+    def __call__(self, row):
+        self.rows.append(row.copy())
+        return three_modes(row)
+
+
+PLAIN = CallableModel(three_modes, NAMES, 3).frequencies(THETA)
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "folder" / "solved"
+
+
+def test_the_second_model_solves_only_what_is_new(file):
+    first, second = Counted(), Counted()
+    np.testing.assert_array_equal(CallableModel(first, NAMES, 3, cache=file).frequencies(THETA[:15]), PLAIN[:15])
+    np.testing.assert_array_equal(
+        CallableModel(second, NAMES, 3, cache=str(file)).frequencies(THETA[::-1]), PLAIN[::-1]
+    )
+    np.testing.assert_array_equal(first.rows, THETA[:15])
+    np.testing.assert_array_equal(second.rows, THETA[:14:-1])
+
+
+@pytest.mark.parametrize("cached", [False, True])
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_repeated_rows_are_solved_once(file, cached, vectorized):
+    seen = []
+
+    def function(theta):
+        seen.append(len(np.atleast_2d(theta)))
+        result = np.stack([three_modes(row) for row in np.atleast_2d(theta)])
+        theta[:] = np.nan
+        return result if vectorized else result[0]
+
+    model = CallableModel(function, NAMES, 3, vectorized=vectorized, cache=file if cached else None)
+    theta = THETA[[0, 1, 0, 2, 1]]
+    np.testing.assert_array_equal(model.frequencies(theta), PLAIN[[0, 1, 0, 2, 1]])
+    assert sum(seen) == 3
+    np.testing.assert_array_equal(theta, THETA[[0, 1, 0, 2, 1]])
+    assert model.frequencies(np.empty((0, 2))).shape == (0, 3)
+    np.testing.assert_array_equal(model.frequencies(THETA), PLAIN)
+    assert sum(seen) == 3 + (20 - 3 if cached else 20)
+
+
+def test_what_is_not_a_number_is_kept_bit_by_bit(file):
+    model = CallableModel(lambda row: [-0.0, np.nan, np.inf], NAMES, 3, cache=file)
+    first, second = model.frequencies(THETA), model.frequencies(THETA)
+    assert first.tobytes() == second.tobytes()
+    assert np.signbit(second[:, 0]).all()
+
+
+def test_neighbouring_numbers_are_different_rows(file):
+    counted = Counted()
+    theta = np.array([[1.0, 1.0], [np.nextafter(1.0, 2.0), 1.0]])
+    CallableModel(counted, NAMES, 3, cache=file).frequencies(theta)
+    assert len(counted.rows) == 2
+
+
+def test_clone_and_pickle_keep_the_path_wherever_the_process_goes(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    model = CallableModel(three_modes, NAMES, 3, cache="here")
+    monkeypatch.chdir("/")
+    assert model.cache == clone(model).cache == pickle.loads(pickle.dumps(model)).cache == tmp_path / "here"
+    model.frequencies(THETA)
+    assert (tmp_path / "here").is_file()
+    assert CallableModel(three_modes, NAMES, 3).cache is None
+
+
+def solved_file(file, rows=THETA):
+    CallableModel(three_modes, NAMES, 3, cache=file).frequencies(rows)
+    return file.read_bytes()
+
+
+def test_any_length_of_a_cut_off_file_is_survived(file):
+    whole = solved_file(file, THETA[:3])
+    header = len(whole) - 3 * RECORD
+    for length in range(len(whole)):
+        file.write_bytes(whole[:length])
+        counted = Counted()
+        result = CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA[:3])
+        np.testing.assert_array_equal(result, PLAIN[:3])
+        np.testing.assert_array_equal(counted.rows, THETA[max((length - header) // RECORD, 0) : 3])
+        assert file.read_bytes() == whole
+
+
+def test_damaged_records_are_solved_again_and_said(file):
+    whole = bytearray(solved_file(file))
+    whole[-5 * RECORD + 20] ^= 1
+    file.write_bytes(whole)
+    counted = Counted()
+    with pytest.warns(UserWarning, match=r"solved: 1 of 20 records are damaged and left out"):
+        result = CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
+    np.testing.assert_array_equal(result, PLAIN)
+    np.testing.assert_array_equal(counted.rows, THETA[[-5]])
+
+
+@pytest.mark.parametrize(
+    ("names", "n_modes", "got"),
+    [(["k", "E"], 3, r"'parameter_names': \['k', 'E'\], 'n_modes': 3"), (NAMES, 2, "'n_modes': 2")],
+)
+def test_a_file_for_other_parameters_is_refused_and_kept(file, names, n_modes, got):
+    CallableModel(lambda row: three_modes(row)[:n_modes], names, n_modes, cache=file).frequencies(THETA)
+    content = file.read_bytes()
+    with pytest.raises(ValueError, match=rf"solved: the file holds .*{got}.*; expected .*\['E', 'k'\], 'n_modes': 3"):
+        CallableModel(three_modes, NAMES, 3, cache=file)
+    assert file.read_bytes() == content
+
+
+@pytest.mark.parametrize("content", [b"my thesis", b"{}\n", b"[1, 2]\n", b"\x89PNG\r\n\x1a\n" * 99])
+def test_somebody_elses_file_is_refused_and_kept(file, content):
+    model = CallableModel(three_modes, NAMES, 3, cache=file)
+    file.parent.mkdir()
+    file.write_bytes(content)
+    for use in (lambda: CallableModel(three_modes, NAMES, 3, cache=file), lambda: model.frequencies(THETA)):
+        with pytest.raises(ValueError, match="the file holds something that is no cache of solved samples"):
+            use()
+    assert file.read_bytes() == content
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_a_failing_row_is_told_and_what_was_solved_stays(file, vectorized):
+    def fails_at_the_eighth(theta):
+        if (theta == THETA[7]).all(axis=-1).any():
+            raise ArithmeticError("no convergence")
+        return [three_modes(row) for row in theta] if vectorized else three_modes(theta)
+
+    model = CallableModel(fails_at_the_eighth, NAMES, 3, vectorized=vectorized, cache=file)
+    model.frequencies(THETA[:5])
+    row = dict(zip(NAMES, THETA[5 if vectorized else 7].tolist(), strict=True))
+    where = f"15 rows from theta = {row}" if vectorized else f"theta = {row}"
+    with pytest.raises(RuntimeError) as error:
+        model.frequencies(THETA)
+    assert str(error.value) == f"the model's function failed at {where}: ArithmeticError: no convergence"
+    assert isinstance(error.value.__cause__, ArithmeticError)
+    counted = Counted()
+    CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
+    np.testing.assert_array_equal(counted.rows, THETA[5 if vectorized else 7 :])
+
+
+def test_a_wrong_shape_is_told_with_its_theta():
+    model = CallableModel(lambda row: row, NAMES, 3)
+    with pytest.raises(ValueError, match=r"returned shape \(2,\); expected \(3,\).*at theta = {'E': 1.0, 'k': 2.0}"):
+        model.frequencies([[1.0, 2.0]])
+
+
+def test_workers_share_one_file(file):
+    model = CallableModel(three_modes, NAMES, 3, cache=file)
+    with joblib.parallel_config("loky"):
+        spread = sample(model, 0.3, 1000, n_jobs=2, random_state=0)
+    np.testing.assert_array_equal(
+        spread.frequencies, sample(CallableModel(three_modes, NAMES, 3), 0.3, 1000, random_state=0).frequencies
+    )
+    counted = Counted()
+    again = sample(CallableModel(counted, NAMES, 3, cache=file), 0.3, 1000, random_state=0)
+    np.testing.assert_array_equal(again.frequencies, spread.frequencies)
+    assert not counted.rows
+
+
+PROGRAM = """
+import os, sys, time
+import numpy as np
+from skthermo.fem import CallableModel
+
+cache, log, start, stop, pause = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:5]), float(sys.argv[5])
+theta = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
+begun = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+
+def slow(row):
+    os.write(begun, row.tobytes())
+    time.sleep(pause)
+    return np.sqrt(row[0] + row[1] * np.arange(1.0, 4.0)) / 3
+
+CallableModel(slow, ["E", "k"], 3, cache=cache).frequencies(theta[start:stop])
+"""
+MANY = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
+
+
+def run_program(file, log, start, stop, pause):
+    arguments = [sys.executable, "-W", "error", "-c", PROGRAM, file, log, start, stop, pause]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.Popen([str(a) for a in arguments], env=environment)
+
+
+def begun(log):
+    return np.frombuffer(log.read_bytes() if log.exists() else b"").reshape(-1, 2)
+
+
+def check_all_solved(file):
+    counted = Counted()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = CallableModel(counted, NAMES, 3, cache=file).frequencies(MANY)
+    assert not counted.rows
+    np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+def test_killed_in_the_middle_of_a_thousand_solves(file, tmp_path):
+    log = tmp_path / "log"
+    kills = 0
+    for until in (300, 700):
+        process = run_program(file, log, 0, 1000, 0.002)
+        while process.poll() is None and len(begun(log)) < until:
+            time.sleep(0.005)
+        process.kill()
+        kills += process.wait() == -signal.SIGKILL
+    assert kills == 2
+    assert run_program(file, log, 0, 1000, 0.0).wait() == 0
+    rows, times = np.unique(begun(log), axis=0, return_counts=True)
+    assert len(rows) == 1000
+    assert times.sum() <= 1000 + kills  # again only what was under way
+    check_all_solved(file)
+
+
+def test_two_processes_at_once(file, tmp_path):
+    logs = tmp_path / "log1", tmp_path / "log2"
+    both = [run_program(file, logs[0], 0, 700, 0.001), run_program(file, logs[1], 300, 1000, 0.001)]
+    assert [process.wait() for process in both] == [0, 0]
+    header = len(json.dumps({"skthermo": "solved samples 1", "parameter_names": NAMES, "n_modes": 3})) + 1
+    assert (file.stat().st_size - header) % RECORD == 0
+    assert file.stat().st_size - header == RECORD * sum(len(begun(log)) for log in logs)
+    check_all_solved(file)
