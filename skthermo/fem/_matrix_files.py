@@ -35,7 +35,7 @@ def read_named(path: Path) -> dict[str, Matrix | None]:
     elif path.suffix.lower() == ".npz":
         matrices = {name: _real(array) for name, array in _read_npz(path).items()}
     else:
-        raise ValueError(f"{path} is neither of these: {FORMATS}")
+        raise ValueError(f"{path} is none of these: {FORMATS}")
     for name, matrix in matrices.items():
         if matrix is not None and not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
             raise ValueError(f"{path}: variable {name!r} holds values that are not finite")
@@ -69,14 +69,17 @@ def _read_sparse_npz(file: Path) -> Matrix | None:
 
 def _read_npz(file: Path) -> dict[str, NDArray]:
     """Arrays, once the checksum of each is known to be right."""
-    name = ""
+    variable = ""
     try:
         arrays = {}
         with zipfile.ZipFile(file) as archive:
-            for name in archive.namelist():
-                arrays[name.removesuffix(".npy")] = np.lib.format.read_array(io.BytesIO(archive.read(name)))
+            for member in archive.namelist():
+                name = member.removesuffix(".npy")
+                variable = f"variable {name!r} is "
+                content = archive.read(member)
+                is_object = b"'descr': '|O'" in content[:64]  # which only pickle reads
+                arrays[name] = np.empty(0) if is_object else np.lib.format.read_array(io.BytesIO(content))
     except Exception as error:  # a damaged file can fail in every way
-        variable = f"variable {name.removesuffix('.npy')!r} is " if name else ""
         raise ValueError(f"{file}: {variable}not readable as .npz ({error})") from error
     return arrays
 

@@ -55,7 +55,7 @@ class SolvedSamples:
         if not whole.all():
             warnings.warn(
                 f"{self.path}: {count - whole.sum()} of {count} records are damaged and left out, to be solved again",
-                stacklevel=4,
+                stacklevel=3,
             )
         return {record["theta"].tobytes(): record["frequencies"] for record in records[whole]}
 
