@@ -73,7 +73,7 @@ def probe(
 
     Notes
     -----
-    Differences are relative to the diagonal, |difference_ij| / sqrt(A_ii A_jj): below some 1e-14 they are
+    Differences are relative to the diagonal, abs(A_ij - B_ij) / sqrt(A_ii A_jj): below some 1e-14 they are
     rounding and left out, so that sparse matrices stay sparse; above 1e-6 a program is not affine.
 
     Examples
