@@ -63,7 +63,9 @@ def is_contract_of_a_protocol(name):
     return (
         owner in PROTOCOLS
         or name in PROTOCOLS
-        or (owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Spring", "PointMass") and method in ELEMENT_METHODS)
+        or (
+            owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
+        )
     )
 
 

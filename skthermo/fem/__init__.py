@@ -5,6 +5,7 @@ from skthermo.fem._beam import Beam
 from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._exported import load_affine
+from skthermo.fem._membrane import Membrane
 from skthermo.fem._noise import add_noise
 from skthermo.fem._probe import probe
 from skthermo.fem._protocol import FEModel
@@ -19,6 +20,7 @@ __all__ = [
     "Beam",
     "CallableModel",
     "FEModel",
+    "Membrane",
     "PointMass",
     "ReducedModel",
     "Spring",

@@ -35,7 +35,7 @@ class Element(Protocol):
         """Name, value and whether zero is allowed, of every physical property."""
 
     def ends(self, coordinates: Array) -> Array:
-        """Where the element itself begins and ends, given its nodes."""
+        """Where the element itself has its ends or corners, given its nodes."""
 
     def stiffness(self, coordinates: Array) -> ByProperties:
         """Stiffness matrices in N/m by the product of properties that multiplies each."""
@@ -55,7 +55,7 @@ class Sheet:
             yield name, getattr(self, name), name in self._may_be_zero
 
     def ends(self, coordinates: Array) -> Array:
-        """Where the element itself begins and ends, given its nodes."""
+        """Where the element itself has its ends or corners, given its nodes."""
         return coordinates
 
 
@@ -209,11 +209,10 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
     for node in element.nodes:
         if node not in coordinates:
             raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")
-    if len(element.nodes) == 2:
+    ends = element.ends(np.array([coordinates[node] for node in element.nodes]))
+    if len(ends) == 2 and np.array_equal(*ends):
         first, last = element.nodes
-        start, end = element.ends(np.array([coordinates[first], coordinates[last]]))
-        if np.array_equal(start, end):
-            raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
+        raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
         if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):

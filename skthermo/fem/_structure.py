@@ -10,7 +10,7 @@ from skthermo.fem._assembly import MASS, STIFFNESS, TermAssembler
 from skthermo.fem._elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element
 
 Array = NDArray[np.float64]
-Binding = tuple[str, str]
+Binding = tuple[str, str] | tuple[str, str, str]
 
 
 class Structure:
@@ -21,7 +21,7 @@ class Structure:
     nodes : mapping of node to coordinates
         (x, y) or (x, y, z) in m.
     members : mapping of member to element
-        `Bar`, `Beam`, `Spring` and `PointMass` objects.
+        `Bar`, `Beam`, `Membrane`, `Spring` and `PointMass` objects.
     supports : mapping of node to directions
         Fixed directions of a node, such as "xy", ("x", "y") or "xyz rx ry rz".
     groups : mapping of group to members, optional
@@ -96,10 +96,11 @@ class Structure:
 
         Parameters
         ----------
-        parameters : sequence of str, or mapping of str to group or (property, group)
+        parameters : sequence of str, or mapping of str to group or (property, group[, matrix])
             What theta multiplies. A group's name stands for the whole stiffness of the group;
             ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "I_yy", "k", "m", ...) of
-            its members, in stiffness and mass; ``("mass", group)`` for the whole mass.
+            its members, in stiffness and mass; ``("A", "arches", "stiffness")`` in stiffness alone
+            (or ``"mass"``); ``("mass", group)`` for the whole mass.
         groups : sequence of str, optional
             Groups that can be damaged. By default all of the structure's groups.
         n_modes : int, default=6
@@ -122,10 +123,17 @@ class Structure:
         for name, element in self._members.items():
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
-            bound = {p: prop for p, (prop, group) in bindings.items() if name in self._groups[group]}
+            bound = {
+                matrix: {
+                    p: prop
+                    for p, (prop, group, where) in bindings.items()
+                    if matrix in where and name in self._groups[group]
+                }
+                for matrix in (STIFFNESS, MASS)
+            }
             damage = frozenset(group for group in damageable if name in self._groups[group])
-            stiffness.add(element.stiffness(coordinates), dofs, {p: d for p, d in bound.items() if d != MASS}, damage)
-            mass.add(element.mass(coordinates), dofs, {p: d for p, d in bound.items() if d != STIFFNESS})
+            stiffness.add(element.stiffness(coordinates), dofs, bound[STIFFNESS], damage)
+            mass.add(element.mass(coordinates), dofs, bound[MASS])
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
@@ -136,7 +144,8 @@ class Structure:
             dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
         )
 
-    def _read_parameters(self, parameters) -> dict[str, Binding]:
+    def _read_parameters(self, parameters) -> dict[str, tuple[str, str, tuple[str, ...]]]:
+        """Property, group and matrices of every parameter."""
         if isinstance(parameters, str):
             parameters = [parameters]
         if not isinstance(parameters, Mapping):
@@ -145,9 +154,12 @@ class Structure:
             parameters = {group: group for group in parameters}
         bindings = {}
         for name, target in parameters.items():
-            if not isinstance(target, str) and len(target) != 2:
-                raise ValueError(f"parameter {name!r} is {target!r}; expected a group or (property, group)")
-            prop, group = (STIFFNESS, target) if isinstance(target, str) else target
+            if not isinstance(target, str) and len(target) not in (2, 3):
+                raise ValueError(f"parameter {name!r} is {target!r}; expected a group, (property, group) or (property, group, matrix)")
+            prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
+            matrices = (prop,) if prop in (STIFFNESS, MASS) else (STIFFNESS, MASS)
+            if not set(where) <= set(matrices):
+                raise ValueError(f"parameter {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
             members = self._groups[self._known(group, f"parameter {name!r}")]
             known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
             if prop not in known | {STIFFNESS, MASS}:
@@ -155,7 +167,7 @@ class Structure:
                     f"parameter {name!r} is the property {prop!r} of group {group!r}; "
                     f"expected {STIFFNESS!r}, {MASS!r} or one of {sorted(known)}"
                 )
-            bindings[name] = (prop, group)
+            bindings[name] = (prop, group, tuple(where) or matrices)
         return bindings
 
     def _known(self, group: str, what: str) -> str:

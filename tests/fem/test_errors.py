@@ -62,7 +62,7 @@ def test_mechanism_names_the_node_that_moves():
     ("arguments", "message"),
     [
         ({"parameters": ["deck"]}, "parameter 'deck': unknown group 'deck'; expected one of .'rest', 'tie'."),
-        ({"parameters": {"A": ("A",)}}, r"parameter 'A' is \('A',\); expected a group or \(property, group\)"),
+        ({"parameters": {"A": ("A",)}}, r"parameter 'A' is \('A',\); expected a group, \(property, group\)"),
         ({"parameters": {"k": ("k", "tie")}}, "parameter 'k' is the property 'k' of group 'tie'"),
         ({"parameters": ["tie", "tie"]}, "expected each group once"),
         ({"parameters": ["tie"], "groups": ["deck"]}, "groups: unknown group 'deck'"),
