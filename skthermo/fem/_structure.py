@@ -80,6 +80,16 @@ class Structure:
         return len(next(iter(self._coordinates.values())))
 
     @property
+    def nodes(self) -> dict[Hashable, Array]:
+        """Coordinates of every node in m."""
+        return {node: place.copy() for node, place in self._coordinates.items()}
+
+    @property
+    def members(self) -> dict[Hashable, Element]:
+        """Elements by name."""
+        return dict(self._members)
+
+    @property
     def groups(self) -> dict[str, frozenset]:
         """Members of every named group."""
         return dict(self._groups)
@@ -155,7 +165,8 @@ class Structure:
         bindings = {}
         for name, target in parameters.items():
             if not isinstance(target, str) and len(target) not in (2, 3):
-                raise ValueError(f"parameter {name!r} is {target!r}; expected a group, (property, group) or (property, group, matrix)")
+                expected = "a group, (property, group) or (property, group, matrix)"
+                raise ValueError(f"parameter {name!r} is {target!r}; expected {expected}")
             prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
             matrices = (prop,) if prop in (STIFFNESS, MASS) else (STIFFNESS, MASS)
             if not set(where) <= set(matrices):
