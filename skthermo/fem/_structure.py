@@ -134,16 +134,11 @@ class Structure:
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
             bound = {
-                matrix: {
-                    p: prop
-                    for p, (prop, group, where) in bindings.items()
-                    if matrix in where and name in self._groups[group]
-                }
-                for matrix in (STIFFNESS, MASS)
+                p: (prop, matrices) for p, (prop, group, matrices) in bindings.items() if name in self._groups[group]
             }
             damage = frozenset(group for group in damageable if name in self._groups[group])
-            stiffness.add(element.stiffness(coordinates), dofs, bound[STIFFNESS], damage)
-            mass.add(element.mass(coordinates), dofs, bound[MASS])
+            stiffness.add(element.stiffness(coordinates), dofs, _in_matrix(STIFFNESS, bound), damage)
+            mass.add(element.mass(coordinates), dofs, _in_matrix(MASS, bound))
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
@@ -224,6 +219,11 @@ class Structure:
             f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
             f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
         )
+
+
+def _in_matrix(matrix: str, bound: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, str]:
+    """Parameters that multiply a member's stiffness or mass, and its properties that they are."""
+    return {parameter: prop for parameter, (prop, matrices) in bound.items() if matrix in matrices}
 
 
 def _read_directions(along: Collection[str]) -> list[str]:
