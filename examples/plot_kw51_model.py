@@ -65,7 +65,7 @@ def segments(structure, group, places):
 def space(fig, places, centre, width):
     """Axes of equal scale around a structure; centre and width in shares of the figure."""
     aspect = fig.get_figwidth() / fig.get_figheight()
-    height = width * aspect  # square, or the figure's middle is all that shows
+    height = width * aspect  # square, as these axes draw inside a square
     ax = fig.add_axes(
         (centre[0] - width / 2, centre[1] - height / 2, width, height),
         projection="3d",
@@ -75,7 +75,7 @@ def space(fig, places, centre, width):
     points = np.array(list(places.values()))
     low, high = points.min(axis=0), points.max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low, zoom=1.08)
+    ax.set_box_aspect(high - low, zoom=0.97)
     ax.view_init(elev=22, azim=-60)
     ax.set_axis_off()
     ax.patch.set_visible(False)
@@ -94,8 +94,8 @@ def draw_supports(ax, structure):
 def plot_structure(structure):
     """Groups of members and supports."""
     places = structure.nodes
-    fig = plt.figure(figsize=(13, 6.5))
-    ax = space(fig, places, centre=(0.5, 0.57), width=1.0)
+    fig = plt.figure(figsize=(13, 6))
+    ax = space(fig, places, centre=(0.5, 0.55), width=1.0)
     plate = segments(structure, "plate", places)
     ax.add_collection3d(Poly3DCollection(plate, facecolor="#BBBBBB", edgecolor="none", alpha=0.35))
     for group, colour in reversed(COLOURS.items()):
@@ -105,8 +105,8 @@ def plot_structure(structure):
     handles = [Line2D([], [], color=c, lw=3, label=group.replace("_", " ")) for group, c in COLOURS.items()]
     handles += [
         Line2D([], [], color="#BBBBBB", lw=8, label="plate and ballast"),
-        Line2D([], [], ls="", marker="^", ms=9, color="black", label="held along x, y and z"),
-        Line2D([], [], ls="", marker="^", ms=9, color="black", mfc="white", label="held along y and z"),
+        Line2D([], [], ls="", marker="^", ms=9, color="black", label="held in every direction"),
+        Line2D([], [], ls="", marker="^", ms=9, color="black", mfc="white", label="free along the bridge"),
     ]
     fig.legend(handles=handles, loc="lower center", ncols=5, frameon=False)
     return fig
@@ -134,18 +134,23 @@ def plot_modes(structure, model):
     return fig
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
-    folder = parser.parse_args().figures
-    structure, model = kw51_structure(), make_kw51()
-    print(structure, model, sep="\n")
-    folder.mkdir(parents=True, exist_ok=True)
+def draw(structure, model, folder):
+    """Both figures."""
     figures = {"kw51_structure": plot_structure(structure), "kw51_modes": plot_modes(structure, model)}
+    folder.mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
         figure.savefig(folder / f"{name}.png", dpi=130)
         plt.close(figure)
-        print(folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in figures]
+
+
+def main():
+    parser = argparse.ArgumentParser(description="The railway bridge KW51 as an FE model.")
+    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
+    options = parser.parse_args()
+    structure, model = kw51_structure(), make_kw51()
+    print(structure, model, "\nFigures:", sep="\n")
+    print(*draw(structure, model, folder=options.figures), sep="\n")
 
 
 if __name__ == "__main__":

@@ -48,11 +48,9 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
     Returns
     -------
     AffineModel
-        With modes followed by shape (``track=True``). Areas (A_c, A_p, A_d, A_a, A_tb) multiply stiffness
-        alone, M_a and M_g mass alone, moduli the whole stiffness of their members. Damage
-        groups: ``bottom`` and its parts ``girders``, ``transverse_beams``, ``stiffeners`` and ``plate``; ``arch``;
-        ``braces``; ``connections`` and its parts ``arch_connections`` and ``deck_connections``; ``pipes``;
-        ``ballast``.
+        With modes followed by shape (``track=True``). Damage groups: ``bottom`` and its parts ``girders``,
+        ``transverse_beams``, ``stiffeners`` and ``plate``; ``arch``; ``braces``; ``connections`` and its parts
+        ``arch_connections`` and ``deck_connections``; ``pipes``; ``ballast``.
 
     Raises
     ------
@@ -65,6 +63,12 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
 
     Notes
     -----
+    Moduli E_bot (girders, transverse beams, stiffeners, plate), E_arc, E_br, E_con, E_pip and E_b (ballast) multiply
+    the whole stiffness of their members. Areas A_c (connections), A_p (pipes), A_d (braces), A_a (arch) and A_tb
+    (transverse beams) multiply stiffness, not mass; so do second moments of vertical bending, I_33p, I_33a and I_33g
+    (girders), and of lateral bending, I_22p, I_22a, I_22g and I_22s (stiffeners), and the torsion constant J_a.
+    M_a and M_g multiply the masses of arch and girders.
+
     Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. What they leave
     open is assumed here, once and before any updating:
 
@@ -94,9 +98,10 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
     supports 1 and 3     opposite ends of one side         at one end, or across: another order of modes
     ===================  ================================  =====================================================
 
-    Rise, braces, connections, pipes and supports are thus chosen by the paper's un-updated results, and nothing
-    else is. Its six un-updated frequencies, 0.4735 to 2.7810 Hz, are met to 2.3 %. Beams have no shear
-    deformation.
+    Rise, braces, connections, pipes and supports were thus chosen with the paper's un-updated results in view, as
+    round numbers; nothing was optimised. Its six un-updated frequencies, 0.4735 to 2.7810 Hz, are met to 2.3 %.
+    Modes 3 and 5 share more of each other than in Table A.3: supports that hold one side alone couple them.
+    Beams have no shear deformation.
 
     References
     ----------

@@ -82,7 +82,7 @@ class Structure:
     @property
     def nodes(self) -> dict[Hashable, Array]:
         """Coordinates of every node in m."""
-        return {node: place.copy() for node, place in self._coordinates.items()}
+        return dict(self._coordinates)
 
     @property
     def members(self) -> dict[Hashable, Element]:
@@ -242,7 +242,7 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
     first = np.shape(next(iter(nodes.values())))
     for node, place in nodes.items():
         try:
-            xyz = np.asarray(place, dtype=float)
+            xyz = np.array(place, dtype=float)
         except (TypeError, ValueError):
             xyz = np.empty(0)
         if xyz.shape not in ((2,), (3,)) or xyz.shape != first or not np.isfinite(xyz).all():
@@ -253,5 +253,6 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
         twin = places.setdefault(tuple(xyz + 0.0), node)
         if twin != node:
             raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+        xyz.flags.writeable = False
         coordinates[node] = xyz
     return coordinates

@@ -149,7 +149,8 @@ WARPED = QUADRILATERAL + [[0, 0, 0], [0, 0, 0], [0, 0, 0.1], [0, 0, 0]]
     [
         (WARPED, {}, "expected four nodes in one plane"),
         (QUADRILATERAL[[0, 2, 1, 3]], {}, "expected a convex quadrilateral"),
-        (np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]), {}, "corner of a membrane are in line"),
+        (np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]), {}, "expected a convex quadrilateral"),
+        (QUADRILATERAL, {"corners": (0, 0, 1, 2)}, "expected a convex quadrilateral"),
         (QUADRILATERAL[:3], {"corners": (0, 1, 2)}, "expected four nodes"),
         (QUADRILATERAL, {"t": 0.0}, "member 'm' has t = 0.0; expected a positive number"),
         (QUADRILATERAL, {"nu": 0.5}, "nu is 0.5; expected a number between -1 and 0.5"),

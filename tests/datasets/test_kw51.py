@@ -1,0 +1,175 @@
+"""The KW51 bridge against the paper's un-updated model and laws of its own."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from skthermo.datasets import kw51_structure, make_kw51
+from skthermo.fem import Membrane
+
+PATH = Path(__file__).parents[1] / "benchmarks" / "kw51_model.py"
+SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
+PAPER = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(PAPER)
+
+NOMINAL = np.ones((1, 5))
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return kw51_structure()
+
+
+@pytest.fixture(scope="module")
+def model():
+    return make_kw51()
+
+
+@pytest.fixture(scope="module")
+def full_model():
+    return make_kw51("all")
+
+
+def test_unupdated_frequencies_are_the_papers(model):
+    assert model.track
+    assert_allclose(model.frequencies(NOMINAL)[0], PAPER.FREQUENCIES, rtol=0.03)
+
+
+def test_sensitivities_rank_as_the_papers(full_model):
+    found = PAPER.sensitivities(full_model)
+    assert tuple(found.index) == tuple(PAPER.SENSITIVITIES.index) == full_model.parameter_names
+    assert PAPER.rank_correlation(found, PAPER.THERMAL) > 0.9
+    assert PAPER.rank_correlation(found, list(found.index)) > 0.85
+    large = PAPER.SENSITIVITIES.abs() > 0.1
+    assert (np.sign(found)[large] == np.sign(PAPER.SENSITIVITIES)[large])[large].all(axis=None)
+
+
+def test_six_moduli_are_the_whole_stiffness(full_model):
+    found = PAPER.sensitivities(full_model)
+    assert_allclose(found.loc[[*PAPER.THERMAL, "E_b"]].sum(), 0.5, rtol=1e-6)
+    assert (found.loc[["M_a", "M_g"]] <= 1e-9).all(axis=None)
+    assert (found.drop(["M_a", "M_g"]) >= -1e-9).all(axis=None)
+    for whole, parts in {
+        "E_con": ["A_c"],
+        "E_br": ["A_d"],
+        "E_pip": ["A_p", "I_33p", "I_22p"],
+        "E_arc": ["I_33a", "I_22a", "A_a", "J_a"],
+        "E_bot": ["I_33g", "I_22g", "A_tb", "I_22s"],
+    }.items():
+        assert (found.loc[parts].sum() <= found.loc[whole] + 1e-9).all()
+
+
+def motion(structure, shape, part, direction):
+    """Where the part's nodes are along the bridge, and how much they move."""
+    x = [
+        (structure.nodes[node][0], u)
+        for (node, d), u in zip(structure.dofs, shape, strict=True)
+        if node[0] == part and d == direction
+    ]
+    return np.array(x).T
+
+
+def test_modes_are_of_the_right_kind(structure, model):
+    """1, 2, 4: arches sideways; 3: deck sideways; 5, 6: vertical bending; half-waves along the bridge."""
+    shapes = model.modes(NOMINAL)[1][0]
+    kinds = [("arch", "y", 1), ("arch", "y", 2), ("deck", "y", 1), ("arch", "y", 3), ("deck", "z", 1), ("deck", "z", 2)]
+    for shape, (part, direction, half_waves) in zip(shapes.T, kinds, strict=True):
+        energy = {
+            (p, d): (motion(structure, shape, p, d)[1] ** 2).sum() for p in ("arch", "deck") for d in ("x", "y", "z")
+        }
+        assert max(energy, key=energy.get) == (part, direction)
+        x, moved = motion(structure, shape, part, direction)
+        waves = [abs(np.sin(n * np.pi * x / 115) @ moved) for n in (1, 2, 3, 4)]
+        assert np.argmax(waves) == half_waves - 1
+
+
+def test_a_subset_of_parameters_is_the_same_bridge(model, full_model):
+    chosen = make_kw51(["M_g", "E_br"])
+    assert chosen.parameter_names == ("M_g", "E_br")
+    assert make_kw51("A_c", n_modes=2).parameter_names == ("A_c",)
+    assert_allclose(chosen.frequencies([[1.0, 1.0]]), model.frequencies(NOMINAL), rtol=1e-9)
+    assert_allclose(full_model.frequencies(np.ones((1, 21))), model.frequencies(NOMINAL), rtol=1e-9)
+    theta = np.ones((1, 21))
+    theta[0, [full_model.parameter_names.index(name) for name in chosen.parameter_names]] = 1.3, 0.8
+    assert_allclose(full_model.frequencies(theta), chosen.frequencies([[1.3, 0.8]]), rtol=1e-7)
+
+
+@pytest.mark.parametrize("parameters", [["E_bot", "E_x"], ["E_bot", "E_bot"], [], "E"])
+def test_unknown_parameters_are_named(parameters):
+    with pytest.raises(ValueError, match=r"expected 'all' or some, each once, of \['E_bot'"):
+        make_kw51(parameters)
+
+
+def test_damage_groups(model):
+    """A damaged group is a weaker modulus; parts add up to their whole."""
+    groups = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
+    for column, (parameter, group) in enumerate(groups.items()):
+        assert model.parameter_names[column] == parameter
+        theta = NOMINAL - 0.2 * np.eye(5)[[column]]
+        assert_allclose(model.damaged({group: 0.2}).frequencies(NOMINAL), model.frequencies(theta), rtol=1e-6)
+    for whole, parts in {
+        "connections": ("arch_connections", "deck_connections"),
+        "bottom": ("girders", "transverse_beams", "stiffeners", "plate"),
+    }.items():
+        weaker = model.damaged(dict.fromkeys(parts, 0.2)), model.damaged({whole: 0.2})
+        assert_allclose(weaker[0].frequencies(NOMINAL), weaker[1].frequencies(NOMINAL), rtol=1e-6)
+
+
+def test_the_retrofit_lifts_the_braces_mode(model):
+    change = model.damaged({"connections": -0.15}).frequencies(NOMINAL) / model.frequencies(NOMINAL) - 1
+    assert (change > 0).all()
+    assert change[0].argmax() == 5
+
+
+def member_masses(structure):
+    masses = {}
+    for name, element in structure.members.items():
+        corners = np.array([structure.nodes[node] for node in element.nodes])
+        along = [direction == "x" for _, direction in element.dofs(3)]
+        masses[name] = sum(m[np.ix_(along, along)].sum() for m in element.mass(corners).values())
+    return masses
+
+
+def test_mass_is_that_of_the_drawings(structure):
+    masses = member_masses(structure)
+    total = {group: sum(masses[name] for name in members) for group, members in structure.groups.items()}
+    assert_allclose(total["plate"], 7850 * 0.015 * 115 * 12.4, rtol=1e-9)
+    assert_allclose(total["ballast"], 1500 * 0.6 * 115 * 12.4, rtol=1e-9)
+    tee = 1.235 * 0.08 + (0.6 - 0.08) * 0.08
+    assert_allclose(total["girders"], 7850 * tee * 2 * 115, rtol=1e-9)
+    assert_allclose(total["transverse_beams"], 7850 * tee * 33 * 12.4, rtol=1e-9)
+    arc, _ = quad(lambda x: np.hypot(1, 4 * 18 / 115 * (1 - 2 * x / 115)), 0, 115)
+    assert_allclose(total["arch"], 7850 * (1.3 * 0.86 - 1.2 * 0.76) * 2 * arc, rtol=1e-3)
+    assert 20e3 < sum(masses.values()) / 115 < 30e3  # kg/m of two tracks in ballast
+
+
+def test_structure_is_symmetric_but_for_its_supports(structure):
+    def data_sheets(mirror):
+        return sorted(
+            (
+                *sorted(tuple((structure.nodes[node] * mirror[0] + mirror[1]).round(6) + 0.0) for node in member.nodes),
+                tuple(value for _, value, _ in member.properties()),
+            )
+            for member in structure.members.values()
+        )
+
+    as_it_is = data_sheets(([1, 1, 1], [0, 0, 0]))
+    assert data_sheets(([1, -1, 1], [0, 0, 0])) == as_it_is
+    assert data_sheets(([-1, 1, 1], [115, 0, 0])) == as_it_is
+    held = {node for node in structure.nodes if (node, "z") not in structure.dofs}
+    fixed = {node for node in structure.nodes if (node, "x") not in structure.dofs}
+    assert held == {("deck", s, line) for s in (0, 32) for line in (0, 4)}
+    assert fixed == {("deck", 0, 0), ("deck", 32, 0)}
+
+
+def test_parts_are_where_the_appendix_puts_them(structure):
+    places = np.array(list(structure.nodes.values()))
+    assert_allclose(np.ptp(places, axis=0)[:2], [115, 12.4])
+    assert len(structure.groups["pipes"]) == 4
+    assert len(structure.groups["connections"]) == 2 * len(structure.groups["braces"])
+    shells = {name for name, member in structure.members.items() if isinstance(member, Membrane)}
+    assert shells == structure.groups["plate"] | structure.groups["ballast"]
