@@ -35,7 +35,7 @@ SUPPORTS = {(0, 0): "xyz", (0, N_PANELS): "yz", (N_BAYS, 0): "xyz", (N_BAYS, N_P
 
 STEEL = {"E": STEEL_E, "G": STEEL_E / (2 + 2 * NU), "density": STEEL_DENSITY, "I_p": 0.0, "lumped": True}
 STATIONS, LINES, SIDES = range(N_BAYS + 1), range(N_PANELS + 1), (0, N_PANELS)
-ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * pipe for pipe in PIPES)})
+ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * x for x in PIPES)})
 
 
 def kw51_structure() -> Structure:
@@ -108,7 +108,7 @@ def along_deck(line: int) -> list[Node]:
 
 
 def heads(foot: int) -> tuple[int, int]:
-    """Stations of the arch that a V-pair of braces reaches; beyond the last one inside, there is no arch."""
+    """Stations of the arch that a V-pair of braces reaches, at least one bay away from the supports."""
     return max(foot - REACH, 1), min(foot + REACH, N_BAYS - 1)
 
 
