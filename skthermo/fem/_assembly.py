@@ -34,9 +34,9 @@ class TermAssembler:
         matrices: ByProperties,
         dofs: Sequence[Dof],
         bound: Mapping[str, str],
-        damage: frozenset[str] = frozenset(),
+        damage: Mapping[str, str] | None = None,
     ) -> None:
-        """Add one member's matrices, given the parameters bound to its properties."""
+        """Add one member's matrices, given the parameters and damage groups bound to its properties."""
         rows = np.array([self._index.get(dof, -1) for dof in dofs])
         free = np.flatnonzero(rows >= 0)
         grid = np.meshgrid(rows[free], rows[free], indexing="ij")
@@ -46,8 +46,9 @@ class TermAssembler:
                 for parameter, prop in bound.items()
                 for _ in range(1 if prop in (STIFFNESS, MASS) else properties.count(prop))
             )
+            groups = frozenset(g for g, prop in (damage or {}).items() if prop in (STIFFNESS, *properties))
             block = matrix[np.ix_(free, free)]
-            self._entries.setdefault((key, damage), []).append((block, *grid))
+            self._entries.setdefault((key, groups), []).append((block, *grid))
 
     def terms(self) -> list[tuple[Key, scipy.sparse.csr_array]]:
         """Parameters and matrix of every term."""

@@ -11,6 +11,7 @@ from skthermo.fem._elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_
 
 Array = NDArray[np.float64]
 Binding = tuple[str, str] | tuple[str, str, str]
+Target = tuple[str, str, tuple[str, ...]]
 
 
 class Structure:
@@ -98,7 +99,7 @@ class Structure:
         self,
         parameters: Sequence[str] | Mapping[str, str | Binding],
         *,
-        groups: Sequence[str] | None = None,
+        groups: Sequence[str] | Mapping[str, str | Binding] | None = None,
         n_modes: int = 6,
         track: bool = False,
     ) -> AffineModel:
@@ -111,8 +112,9 @@ class Structure:
             ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "I_yy", "k", "m", ...) of
             its members, in stiffness and mass; ``("A", "arches", "stiffness")`` in stiffness alone
             (or ``"mass"``); ``("mass", group)`` for the whole mass.
-        groups : sequence of str, optional
-            Groups that can be damaged. By default all of the structure's groups.
+        groups : sequence of str, or mapping of str to group or (property, group), optional
+            What can be damaged: the whole stiffness of a group, or, as in ``{"torsion": ("G",
+            "girder")}``, what one property has in it. By default all of the structure's groups.
         n_modes : int, default=6
             Number of modes.
         track : bool, default=False
@@ -125,52 +127,58 @@ class Structure:
         Raises
         ------
         ValueError
-            If a group or property is unknown, or the structure is a mechanism.
+            If a group or property is unknown, a property of ``groups`` has no stiffness, or the
+            structure is a mechanism.
         """
-        bindings = self._read_parameters(parameters)
-        damageable = [self._known(group, "groups") for group in (self._groups if groups is None else groups)]
+        bindings = self._read_bindings(parameters, "parameter")
+        damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
         stiffness, mass = TermAssembler(self.dofs), TermAssembler(self.dofs)
         for name, element in self._members.items():
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
-            bound = {
-                p: (prop, matrices) for p, (prop, group, matrices) in bindings.items() if name in self._groups[group]
-            }
-            damage = frozenset(group for group in damageable if name in self._groups[group])
-            stiffness.add(element.stiffness(coordinates), dofs, _in_matrix(STIFFNESS, bound), damage)
-            mass.add(element.mass(coordinates), dofs, _in_matrix(MASS, bound))
+            damage = self._bound(name, damageable, STIFFNESS)
+            stiffness.add(element.stiffness(coordinates), dofs, self._bound(name, bindings, STIFFNESS), damage)
+            mass.add(element.mass(coordinates), dofs, self._bound(name, bindings, MASS))
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
             n_modes=n_modes,
             parameter_names=tuple(bindings),
-            groups={group: terms for group in damageable if (terms := stiffness.positions(group))},
+            groups={name: terms for name in damageable if (terms := stiffness.positions(name)) or groups is not None},
             track=track,
             dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
         )
 
-    def _read_parameters(self, parameters) -> dict[str, tuple[str, str, tuple[str, ...]]]:
-        """Property, group and matrices of every parameter."""
-        if isinstance(parameters, str):
-            parameters = [parameters]
-        if not isinstance(parameters, Mapping):
-            if len(set(parameters)) < len(parameters):
-                raise ValueError(f"parameters are {list(parameters)}; expected each group once")
-            parameters = {group: group for group in parameters}
+    def _bound(self, member: Hashable, bindings: Mapping[str, Target], matrix: str) -> dict[str, str]:
+        """What multiplies the stiffness or mass of one member, and which of its properties that is."""
+        return {
+            name: prop
+            for name, (prop, group, matrices) in bindings.items()
+            if member in self._groups[group] and matrix in matrices
+        }
+
+    def _read_bindings(self, targets, what: str) -> dict[str, Target]:
+        """Property, group and matrices of every parameter or damage group."""
+        if isinstance(targets, str):
+            targets = [targets]
+        if not isinstance(targets, Mapping):
+            if len(set(targets)) < len(targets):
+                raise ValueError(f"{what}s are {list(targets)}; expected each group once")
+            targets = {group: group for group in targets}
         bindings = {}
-        for name, target in parameters.items():
+        for name, target in targets.items():
             if not isinstance(target, str) and len(target) not in (2, 3):
                 expected = "a group, (property, group) or (property, group, matrix)"
-                raise ValueError(f"parameter {name!r} is {target!r}; expected {expected}")
+                raise ValueError(f"{what} {name!r} is {target!r}; expected {expected}")
             prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
             matrices = (prop,) if prop in (STIFFNESS, MASS) else (STIFFNESS, MASS)
             if not set(where) <= set(matrices):
-                raise ValueError(f"parameter {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
-            members = self._groups[self._known(group, f"parameter {name!r}")]
+                raise ValueError(f"{what} {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
+            members = self._groups[self._known(group, f"{what} {name!r}")]
             known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
             if prop not in known | {STIFFNESS, MASS}:
                 raise ValueError(
-                    f"parameter {name!r} is the property {prop!r} of group {group!r}; "
+                    f"{what} {name!r} is the property {prop!r} of group {group!r}; "
                     f"expected {STIFFNESS!r}, {MASS!r} or one of {sorted(known)}"
                 )
             bindings[name] = (prop, group, tuple(where) or matrices)
@@ -219,11 +227,6 @@ class Structure:
             f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
             f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
         )
-
-
-def _in_matrix(matrix: str, bound: Mapping[str, tuple[str, tuple[str, ...]]]) -> dict[str, str]:
-    """Parameters that multiply a member's stiffness or mass, and its properties that they are."""
-    return {parameter: prop for parameter, (prop, matrices) in bound.items() if matrix in matrices}
 
 
 def _read_directions(along: Collection[str]) -> list[str]:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss
-from skthermo.fem import AffineModel, Bar, PointMass, Spring, Structure
+from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure
 
 TRUSS = make_truss()
 THETAS = st.lists(st.floats(0.3, 3.0), min_size=4, max_size=4).map(lambda row: np.array([row]))
@@ -148,6 +148,22 @@ def test_damage_of_the_product_model_scales_the_groups_stiffness_only():
     weaker = model.damaged({"frame": 0.25})
     np.testing.assert_allclose(weaker.frequencies(theta), model.frequencies(theta * [0.75, 1, 1, 1, 1]), rtol=1e-12)
     assert "tank" not in model.groups
+
+
+def test_damage_of_a_property_is_that_property_smaller():
+    section = {"E": 37.5e9, "G": 16e9, "A": 4.4, "I_yy": 0.6, "I_zz": 17.0, "J": 1.2, "density": 2700.0}
+    nodes = {i: (5.0 * i, 0, 0) for i in range(5)}
+    beams = {i: Beam(i, i + 1, **section) for i in range(4)}
+    structure = Structure(nodes, beams, {0: "xyz rx ry rz"}, {"girder": range(4)})
+    properties = {"bending": ("E", "girder"), "torsion": ("G", "girder")}
+    groups = properties | {"all": "girder", "lateral": ("I_zz", "girder")}
+    model = structure.assemble(properties, groups=groups, n_modes=6)
+    for damage, theta in (("bending", [0.6, 1]), ("torsion", [1, 0.6]), ("all", [0.6, 0.6])):
+        np.testing.assert_allclose(
+            model.damaged({damage: 0.4}).frequencies([[1, 1]]), model.frequencies([theta]), rtol=1e-9
+        )
+    lateral = structure.assemble({"I_zz": ("I_zz", "girder")}, n_modes=6).frequencies([[0.6]])
+    np.testing.assert_allclose(model.damaged({"lateral": 0.4}).frequencies([[1, 1]]), lateral, rtol=1e-9)
 
 
 def test_massless_degrees_of_freedom_follow_statically():
