@@ -40,8 +40,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     model : FE model, optional
         Needed unless `fit` gets frequencies and parameters.
     regressor : regressor, optional
-        Any multi-output regressor; inputs are standardised and the logarithms of the
-        parameters learned, standardised too. By default a small ``MLPRegressor``; see
+        Any multi-output regressor, between the logarithms of frequencies and of parameters, which
+        are nearly linear in each other; both are standardised. By default a small ``MLPRegressor``; see
         `paper_network` for the paper's.
     bounds : float or array-like of shape (n_parameters, 2), default=0.3
         Box of multipliers: a half-width, or lowest and highest of each parameter.
@@ -63,7 +63,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     Attributes
     ----------
     regressor_ : regressor
-        Fitted; between standardised frequencies and standardised log parameters.
+        Fitted; between standardised log frequencies and standardised log parameters.
     samples_ : Bunch
         ``theta`` and ``frequencies`` learned from, before noise.
     n_features_in_ : int
@@ -162,7 +162,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 self._parameter_names = list(self.model.parameter_names)
             self.samples_ = Bunch(theta=theta, frequencies=frequencies)
         self._n_parameters = theta.shape[1]
-        self._learn(frequencies, theta, None if self.random_state is None else random)
+        self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

@@ -68,7 +68,9 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         """
         return complete_r2(as_columns(y), as_columns(self.predict(X)))
 
-    def _learn(self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None) -> None:
+    def _learn(
+        self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None, *, log_inputs: bool = False
+    ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
         complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
         if complete.sum() < 2:
@@ -77,7 +79,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             )
         target = y[complete]
         regressor = default_network() if self.regressor is None else clone(self.regressor)
-        regression = standardised_regression(regressor, log=bool((target > 0).all()))
+        self._log_inputs = log_inputs and is_positive(X[complete])
+        regression = standardised_regression(regressor, log_inputs=self._log_inputs, log_targets=is_positive(target))
         seed_parts(regression, random_state)
         with single_blas_thread():
             self._regression = regression.fit(X[complete], target[:, 0] if target.shape[1] == 1 else target)
@@ -101,6 +104,12 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
     def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
         inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        if self._log_inputs and (inputs <= 0).any():
+            row, column = np.argwhere(inputs <= 0)[0]
+            raise ValueError(
+                f"row {row} of {column_names(X, 'f')[column]!r} is {inputs[row, column]:g}; expected positive "
+                "frequencies in Hz, NaN where one is missing"
+            )
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self._n_parameters), np.nan)
         if complete.any():
@@ -119,14 +128,27 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         return tags
 
 
-def standardised_regression(regressor: BaseEstimator, *, log: bool) -> TransformedTargetRegressor:
-    """Standardised inputs to standardised targets, or their logarithms, which keeps them positive."""
-    logarithm = FunctionTransformer(np.log, np.exp, check_inverse=False) if log else identity()
+def standardised_regression(
+    regressor: BaseEstimator, *, log_inputs: bool, log_targets: bool
+) -> TransformedTargetRegressor:
+    """Standardised inputs to standardised targets, or the logarithms of either; logarithms keep targets positive."""
     return TransformedTargetRegressor(
-        make_pipeline(StandardScaler().set_output(transform="default"), regressor),
-        transformer=make_pipeline(logarithm, StandardScaler()).set_output(transform="default"),
+        make_pipeline(*([logarithm()] if log_inputs else []), standardiser(), regressor),
+        transformer=make_pipeline(logarithm() if log_targets else identity(), standardiser()),
         check_inverse=False,
     )
+
+
+def is_positive(values: NDArray) -> bool:
+    return bool((values > 0).all())
+
+
+def standardiser() -> StandardScaler:
+    return StandardScaler().set_output(transform="default")
+
+
+def logarithm() -> FunctionTransformer:
+    return FunctionTransformer(np.log, np.exp, check_inverse=False).set_output(transform="default")
 
 
 def identity() -> FunctionTransformer:

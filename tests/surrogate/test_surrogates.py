@@ -212,3 +212,20 @@ def test_paper_networks(table):
     assert inverse.predict(HELD_OUT.frequencies).shape == (200, 4)
     with pytest.raises(ValueError, match="table is 2; expected one of"):
         paper_network(2)
+
+
+def test_linear_regression_of_logarithms_is_exact_where_all_stiffness_scales_together():
+    """f is proportional to the square root of a common factor, which no linear map of f itself is."""
+    chain = np.diag([2.0, 2, 1]) - np.eye(3, k=1) - np.eye(3, k=-1)
+    model = AffineModel({("k",): chain}, np.eye(3), n_modes=2)
+    inverse = InverseSurrogate(model, LinearRegression(), bounds=0.9, n_samples=20, random_state=0).fit()
+    theta = np.array([[0.02], [0.5], [30.0]])
+    np.testing.assert_allclose(inverse.transform(model.frequencies(theta)), theta, rtol=1e-9)
+
+
+def test_frequencies_that_are_not_positive_are_named():
+    inverse = InverseSurrogate(make_truss(), LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
+    F = make_truss().frequencies(np.ones((3, 4)))
+    F[1, 2] = 0.0
+    with pytest.raises(ValueError, match=r"row 1 of 'f3' is 0; expected positive frequencies in Hz, NaN where"):
+        inverse.transform(F)
