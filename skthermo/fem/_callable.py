@@ -1,5 +1,6 @@
 """FE models that are somebody else's program."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -110,15 +111,29 @@ class CallableModel:
             If theta has the wrong width or values, the function returns another shape, or the
             cache belongs to other parameters.
         RuntimeError
-            If the function fails; the error says at which theta.
+            If the function fails at all of several rows; the error says at which theta first.
+
+        Warns
+        -----
+        UserWarning
+            If the function fails at some rows, which become NaN and are not cached.
         """
         rows = check_theta(theta, self.parameter_names)
         keys = [row.tobytes() for row in rows.astype("<f8")]
         solved = {} if self._samples is None else self._samples.read()
         missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in solved}
         batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
+        failures: list[RuntimeError] = []
         for batch in batches:
-            solved |= zip(batch, self._solve(np.array([missing[key] for key in batch])), strict=True)
+            try:
+                solved |= zip(batch, self._solve(np.array([missing[key] for key in batch])), strict=True)
+            except RuntimeError as failure:
+                failures.append(failure)
+                solved |= dict.fromkeys(batch, np.full(self.n_modes, np.nan))
+        if failures:
+            if len(failures) == len(batches) and len(missing) > 1:
+                raise failures[0]
+            warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {failures[0]}", UserWarning, stacklevel=2)
         return np.array([solved[key] for key in keys]).reshape(len(rows), self.n_modes)
 
     def _solve(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:

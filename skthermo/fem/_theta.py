@@ -63,8 +63,8 @@ def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64]) ->
     if failed.any():
         first = np.flatnonzero(failed)[0]
         warnings.warn(
-            f"{failed.sum()} of {len(theta)} samples have no modes and are NaN: the stiffness is not positive definite "
-            f"or the iteration did not converge, first at theta = {theta[first].tolist()} (row {first})",
+            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
+            f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
             UserWarning,
             stacklevel=4,
         )

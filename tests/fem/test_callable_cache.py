@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -148,24 +149,52 @@ def test_somebody_elses_file_is_refused_and_kept(file, content):
     assert file.read_bytes() == content
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
-def test_a_failing_row_is_told_and_what_was_solved_stays(file, vectorized):
-    def fails_at_the_eighth(theta):
-        if (theta == THETA[7]).all(axis=-1).any():
-            raise ArithmeticError("no convergence")
-        return [three_modes(row) for row in theta] if vectorized else three_modes(theta)
+def fails_at_the_eighth(theta):
+    if (theta == THETA[7]).all(axis=-1).any():
+        raise ArithmeticError("no convergence")
+    return three_modes(theta) if theta.ndim == 1 else [three_modes(row) for row in theta]
 
-    model = CallableModel(fails_at_the_eighth, NAMES, 3, vectorized=vectorized, cache=file)
+
+def test_a_failing_row_is_nan_and_told_and_what_was_solved_stays(file):
+    model = CallableModel(fails_at_the_eighth, NAMES, 3, cache=file)
+    theta = dict(zip(NAMES, THETA[7].tolist(), strict=True))
+    message = (
+        f"1 of {len(THETA)} rows are NaN: the model's function failed at theta = {theta}: ArithmeticError: no conv"
+    )
+    with pytest.warns(UserWarning, match=re.escape(message)):
+        frequencies = model.frequencies(THETA)
+    np.testing.assert_array_equal(np.isnan(frequencies).any(axis=1), np.arange(len(THETA)) == 7)
+    counted = Counted()
+    again = CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
+    np.testing.assert_array_equal(counted.rows, THETA[[7]])
+    np.testing.assert_array_equal(np.delete(again, 7, axis=0), np.delete(frequencies, 7, axis=0))
+
+
+def test_a_function_that_fails_everywhere_is_an_error(file):
+    model = CallableModel(fails_at_the_eighth, NAMES, 3, vectorized=True, cache=file)
     model.frequencies(THETA[:5])
-    row = dict(zip(NAMES, THETA[5 if vectorized else 7].tolist(), strict=True))
-    where = f"15 rows from theta = {row}" if vectorized else f"theta = {row}"
+    row = dict(zip(NAMES, THETA[5].tolist(), strict=True))
     with pytest.raises(RuntimeError) as error:
         model.frequencies(THETA)
-    assert str(error.value) == f"the model's function failed at {where}: ArithmeticError: no convergence"
+    assert (
+        str(error.value)
+        == f"the model's function failed at 15 rows from theta = {row}: ArithmeticError: no convergence"
+    )
     assert isinstance(error.value.__cause__, ArithmeticError)
     counted = Counted()
     CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
-    np.testing.assert_array_equal(counted.rows, THETA[5 if vectorized else 7 :])
+    np.testing.assert_array_equal(counted.rows, THETA[5:])
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_a_failing_sample_does_not_end_a_monte_carlo(n_jobs):
+    def fails_sometimes(row):
+        return three_modes(row) if row[0] < 1.15 else 1 / 0
+
+    model = CallableModel(fails_sometimes, NAMES, 3)
+    with pytest.warns(UserWarning, match="are NaN"):
+        drawn = sample(model, 0.2, 400, n_jobs=n_jobs, random_state=0)
+    np.testing.assert_array_equal(np.isnan(drawn.frequencies).any(axis=1), drawn.theta[:, 0] >= 1.15)
 
 
 def test_a_wrong_shape_is_told_with_its_theta():
