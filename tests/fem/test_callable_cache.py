@@ -236,7 +236,7 @@ MANY = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
 
 
 def run_program(file, log, start, stop, stall=0):
-    arguments = [sys.executable, "-W", "error", "-c", PROGRAM, file, log, start, stop, stall]
+    arguments = [sys.executable, "-c", PROGRAM, file, log, start, stop, stall]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     return subprocess.Popen([str(a) for a in arguments], env=environment)
 
