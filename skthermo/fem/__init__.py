@@ -5,6 +5,7 @@ from skthermo.fem._beam import Beam
 from skthermo.fem._callable import CallableModel
 from skthermo.fem._elements import Bar, PointMass, Spring
 from skthermo.fem._exported import load_affine
+from skthermo.fem._local_modes import shape_jacobian
 from skthermo.fem._membrane import Membrane
 from skthermo.fem._noise import add_noise
 from skthermo.fem._probe import probe
@@ -30,4 +31,5 @@ __all__ = [
     "mac",
     "probe",
     "sample",
+    "shape_jacobian",
 ]

@@ -20,7 +20,7 @@ from skthermo.fem._affine_input import (
 from skthermo.fem._eigen import eigen_form, hertz
 from skthermo.fem._stability import check_supported, count_modes
 from skthermo.fem._terms import CHUNK_BYTES, ROWS_PER_CHUNK, AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem._theta import check_theta, nominal_theta, warn_of_failures
+from skthermo.fem._theta import check_one_theta, check_theta, nominal_theta, warn_of_failures
 from skthermo.fem._tracking import may_be_missed, pair_modes, repeated
 
 Array = NDArray[np.float64]
@@ -130,7 +130,8 @@ class AffineModel:
         eigenvalues, shapes = self._form.modes(nominal, n_modes)
         self._together = repeated(eigenvalues[0])
         self._weighted_shapes = self._mass.product(nominal, shapes)[0]
-        for array in (self._together, self._weighted_shapes):
+        self._reference_masses = self._mass.coefficients(nominal)[0]
+        for array in (self._together, self._weighted_shapes, self._reference_masses):
             array.flags.writeable = False
 
     @property
@@ -250,9 +251,7 @@ class AffineModel:
         -------
         stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
         """
-        row = check_theta(theta, self.parameter_names)
-        if len(row) != 1:
-            raise ValueError(f"theta has {len(row)} rows; expected one, since matrices of many take much memory")
+        row = check_one_theta(theta, self.parameter_names)
         return csc_array(self._stiffness.assemble(row)[0]), csc_array(self._mass.assemble(row)[0])
 
     def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
@@ -280,6 +279,31 @@ class AffineModel:
         twin = copy.copy(self)
         twin._stiffness = self._stiffness.scaled(factors)
         twin._form = self._form.scaled(factors)
+        return twin
+
+    def rescaled(self, theta: ArrayLike) -> "AffineModel":
+        """A new model whose nominal state, theta = 1, is this model at a given theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers that become the new nominal values.
+
+        Returns
+        -------
+        AffineModel
+            Its columns are the modes of this model's nominal state.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width or more than one row, or a value is not finite and positive.
+        """
+        row = check_one_theta(theta, self.parameter_names)
+        twin = copy.copy(self)
+        twin._stiffness = self._stiffness.scaled(self._stiffness.products(row)[0])
+        twin._mass = self._mass.scaled(self._mass.products(row)[0])
+        twin._form = eigen_form(twin._stiffness, twin._mass)
         return twin
 
     def reduced(self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> "AffineModel":
@@ -312,9 +336,12 @@ class AffineModel:
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
 
+    def _at_dofs(self, dofs: NDArray[np.intp], shapes: Array) -> Array:
+        """What shapes, in the coordinates that are solved for, are at degrees of freedom."""
+        return shapes[dofs]
+
     def _likeness(self, shapes: Array) -> Array:
-        nominal = nominal_theta(len(self.parameter_names))
-        masses = self._mass.quadratic_forms(shapes) @ self._mass.coefficients(nominal)[0]
+        masses = self._mass.quadratic_forms(shapes) @ self._reference_masses
         return (self._weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
     def _frequencies(self, theta: Array) -> tuple[Array]:

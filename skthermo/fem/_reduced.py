@@ -14,7 +14,7 @@ from skthermo.fem._affine import GUARD_MODES, AffineModel
 from skthermo.fem._eigen import dense_form
 from skthermo.fem._sampling import check_bounds
 from skthermo.fem._shift_invert import factorise
-from skthermo.fem._theta import check_theta, nominal_theta
+from skthermo.fem._theta import check_one_theta, check_theta, nominal_theta
 
 Array = NDArray[np.float64]
 RandomState = int | np.random.RandomState | None
@@ -185,6 +185,26 @@ class ReducedModel(AffineModel):
         twin._grow(self._basis, check_random_state(0))
         return twin
 
+    def rescaled(self, theta: ArrayLike) -> "ReducedModel":
+        """A new model on the same basis whose nominal state, theta = 1, is this model at a given theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers that become the new nominal values.
+
+        Returns
+        -------
+        ReducedModel
+            For the same box, which its multipliers now measure from theta.
+        """
+        row = check_one_theta(theta, self.parameter_names)
+        twin = ReducedModel.__new__(ReducedModel)
+        vars(twin).update(vars(self) | {"_full": self._full.rescaled(row), "_bounds": self._bounds / row.T})
+        twin.check_points_, twin.snapshot_points_ = self.check_points_ / row, self.snapshot_points_ / row
+        twin._project(self._basis)
+        return twin
+
     def reduced(
         self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None
     ) -> "ReducedModel":
@@ -234,6 +254,9 @@ class ReducedModel(AffineModel):
                 f"{self._tol:g}; expected a larger tol, or narrower bounds"
             )
         self.snapshot_points_ = np.vstack(used)
+
+    def _at_dofs(self, dofs: NDArray[np.intp], shapes: Array) -> Array:
+        return np.tensordot(self._basis[dofs], shapes, axes=1)
 
     def _draw(self, random: np.random.RandomState, n_points: int) -> Array:
         lowest, highest = self._bounds.T

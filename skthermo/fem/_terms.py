@@ -36,9 +36,13 @@ class AffineTerms(ABC):
     def is_constant(self) -> bool:
         return not self.exponents.any()
 
+    def products(self, theta: Array) -> Array:
+        """The product of each term's parameters, (n_samples, n_terms)."""
+        return np.prod(theta[:, np.newaxis] ** self.exponents, axis=2)
+
     def coefficients(self, theta: Array) -> Array:
         """What multiplies each matrix, (n_samples, n_terms)."""
-        return self.factors * np.prod(theta[:, np.newaxis] ** self.exponents, axis=2)
+        return self.factors * self.products(theta)
 
     def coefficient_gradients(self, theta: Array) -> Array:
         """Derivative of ``coefficients``, (n_samples, n_terms, n_parameters)."""
@@ -48,6 +52,11 @@ class AffineTerms(ABC):
         """phi' (dA / d theta_p) phi, (n_samples, n_modes, n_parameters)."""
         return self.quadratic_forms(shapes) @ self.coefficient_gradients(theta)
 
+    def derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times each vector at one row of theta, (n, n_vectors, n_parameters)."""
+        gradients = self.coefficient_gradients(theta)[0]
+        return np.stack([self.weighted_sum(weights) @ vectors for weights in gradients.T], axis=2)
+
     @classmethod
     @abstractmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
@@ -56,6 +65,10 @@ class AffineTerms(ABC):
     @abstractmethod
     def assemble(self, theta: Array) -> Array | list[scipy.sparse.csc_array]:
         """The summed matrix of every row of theta."""
+
+    @abstractmethod
+    def weighted_sum(self, weights: Array) -> Matrix:
+        """The matrices, each multiplied by a weight, in one."""
 
     def product(self, theta: Array, vectors: Array) -> Array:
         """The summed matrix of every row times its vectors, (n_samples, n, n_vectors)."""
@@ -100,6 +113,9 @@ class DenseTerms(AffineTerms):
     def assemble(self, theta: Array) -> Array:
         flat = self.matrices.reshape(len(self.matrices), -1)
         return (self.coefficients(theta) @ flat).reshape(-1, self.n_dof, self.n_dof)
+
+    def weighted_sum(self, weights: Array) -> Array:
+        return np.tensordot(weights, self.matrices, axes=1)
 
     def quadratic_forms(self, shapes: Array) -> Array:
         forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
@@ -153,6 +169,11 @@ class SparseTerms(AffineTerms):
         shape = (self.n_dof, self.n_dof)
         sums = self.entries @ self.coefficients(theta).T
         return [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in sums.T.copy()]
+
+    def weighted_sum(self, weights: Array) -> scipy.sparse.csc_array:
+        used = self.entries[:, np.flatnonzero(weights)]
+        data = used @ weights[weights != 0]
+        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
 
     def quadratic_forms(self, shapes: Array) -> Array:
         forms = [self.entries.T @ (shape[self.rows] * shape[self._columns]) for shape in shapes]

@@ -57,6 +57,14 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
     return rows
 
 
+def check_one_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.float64]:
+    """A single row of finite, positive multipliers, (1, n_parameters)."""
+    row = check_theta(theta, parameter_names)
+    if len(row) != 1:
+        raise ValueError(f"theta has {len(row)} rows; expected one")
+    return row
+
+
 def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64]) -> None:
     """Say how many rows have no solution, and at which theta the first of them is."""
     failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim)))
