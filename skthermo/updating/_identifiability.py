@@ -1,0 +1,158 @@
+"""Which parameters measured modes can tell, and how well."""
+
+import numpy as np
+import pandas as pd
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from sklearn.utils import Bunch
+
+from skthermo.fem import AffineModel, FEModel, shape_jacobian
+from skthermo.fem._noise import check_noise
+from skthermo.fem._theta import nominal_theta
+from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
+from skthermo.updating._measured import check_dofs
+from skthermo.updating._sensitivity import sensitivity
+
+Array = NDArray[np.float64]
+
+COLLINEAR = 0.99
+"""Cosine of two parameters' effects from which on they count as one."""
+
+WELL_KNOWN = 0.1
+"""Largest relative standard deviation of the estimates of a recommended subset."""
+
+
+def identifiability(
+    model: FEModel,
+    theta: ArrayLike | None = None,
+    *,
+    noise: ArrayLike,
+    dofs: ArrayLike | None = None,
+    shape_noise: float | None = None,
+) -> Bunch:
+    """Which parameters measured modes can tell apart, and to what accuracy.
+
+    Parameters
+    ----------
+    model : FE model
+        Without a ``jacobian`` its derivatives are central differences.
+    theta : array-like of shape (n_parameters,), optional
+        Where; at the nominal parameters by default.
+    noise : float or array-like of shape (n_modes,)
+        Relative standard deviation of the measured frequencies: of a mean of n records, that of a record over
+        sqrt(n).
+    dofs : array-like of int of shape (n_dofs,), optional
+        Degrees of freedom, the first being 0, where mode shapes are measured too (of an `AffineModel`).
+    shape_noise : float, optional
+        Standard deviation of a shape's components as a share of their root mean square.
+
+    Returns
+    -------
+    Bunch
+        With the attributes
+
+        - ``sensitivity``: d ln f / d ln theta, a frame of shape (n_modes, n_parameters);
+        - ``singular_values``, ``condition_number``: of the sensitivities, each row weighted by the root mean square
+          noise over its own, and rows of shapes beneath where these are measured. The condition number is
+          infinite if there are more parameters than rows;
+        - ``deviations``: smallest possible relative standard deviation of each parameter's estimate when all
+          are estimated (Cramer-Rao), a series; infinite where it cannot be told from others;
+        - ``collinear``: lists of parameters whose effects are the same but for a factor (cosine of 0.99 or more);
+        - ``recommended``: parameters that can be estimated together, the others held, with deviations of
+          at most 0.1, most informative first.
+
+    Raises
+    ------
+    ValueError
+        If noise is negative or zero for some modes only, or just one of ``dofs`` and ``shape_noise`` is given.
+
+    See Also
+    --------
+    ModelUpdater : Whose ``covariance_`` is the same at the optimum.
+
+    Notes
+    -----
+    With A = (d ln f / d ln theta) / noise, an unbiased estimate of ln theta has at least the covariance
+    (A' A)^-1. A shape of length 1 at n_d degrees of freedom adds its derivative in rows, divided by
+    shape_noise / sqrt(n_d). Parameters are ranked by QR factorisation of A with column pivoting.
+
+    References
+    ----------
+    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3.
+    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.updating import identifiability
+    >>> known = identifiability(make_truss(), noise=0.001)
+    >>> known.deviations.round(4)
+    bottom      0.0084
+    top         0.0111
+    diagonal    0.0042
+    vertical    0.0281
+    dtype: float64
+    >>> known.recommended
+    ['diagonal', 'top', 'vertical', 'bottom']
+    """
+    names = list(model.parameter_names)
+    S = sensitivity(model, theta, method="exact" if hasattr(model, "jacobian") else "central")
+    deviations = check_noise(noise, model.n_modes)
+    if deviations.any() and not deviations.all():
+        raise ValueError(f"noise is {deviations}; expected it positive for all modes, or zero for all")
+    if (dofs is None) != (shape_noise is None):
+        raise ValueError("expected both dofs and shape_noise, or neither")
+    level = np.sqrt(np.mean(deviations**2))
+    rows = S.to_numpy() * (level / deviations if level else np.ones(model.n_modes))[:, np.newaxis]
+    if dofs is not None:
+        rows = np.vstack([rows, level * _shape_rows(model, theta, dofs, shape_noise)])
+
+    values = np.linalg.svd(rows, compute_uv=False)
+    smallest = values[-1] if len(values) == len(names) else 0.0
+    order = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
+    return Bunch(
+        sensitivity=S,
+        singular_values=values,
+        condition_number=float(values[0] / smallest) if smallest else np.inf,
+        deviations=pd.Series(_deviations(rows, level), names),
+        collinear=[[names[i] for i in group] for group in collinear_groups(rows)],
+        recommended=[names[i] for i in _recommended(rows, order, level)],
+    )
+
+
+def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
+    """Derivatives of unit shapes by ln theta over their noise."""
+    if not isinstance(model, AffineModel):
+        raise ValueError(f"shapes of {model!r} cannot be differentiated; expected an AffineModel")
+    if shape_noise is None or not 0 < shape_noise < np.inf:
+        raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
+    places = check_dofs(dofs, model.n_dof)
+    row = nominal_theta(len(model.parameter_names)) if theta is None else np.atleast_2d(np.asarray(theta, dtype=float))
+    shapes, d_shapes = shape_jacobian(model, row, places)
+    slopes = tangent_derivatives(shapes, d_shapes, shape_directions(shapes)) * row[0]
+    return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(places)) / shape_noise
+
+
+def _deviations(rows: Array, level: float) -> Array:
+    variances = np.diagonal(cramer_rao(rows.T @ rows))
+    return np.where(np.isinf(variances), np.inf, np.sqrt(variances) * level)
+
+
+def _recommended(rows: Array, order: NDArray[np.intp], level: float) -> NDArray[np.intp]:
+    """The longest beginning of an order of parameters that can be estimated well together."""
+    for size in range(len(order), 0, -1):
+        if (_deviations(rows[:, order[:size]], level) <= WELL_KNOWN).all():
+            return order[:size]
+    return order[:0]
+
+
+def collinear_groups(rows: Array) -> list[NDArray[np.intp]]:
+    """Columns that are multiples of each other but for a small angle, in groups of two or more."""
+    lengths = np.linalg.norm(rows, axis=0)
+    felt = np.flatnonzero(lengths > 0)
+    directions = rows[:, felt] / lengths[felt]
+    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR), directed=False)[1]
+    groups = (felt[labels == label] for label in np.unique(labels))
+    return [group for group in groups if len(group) > 1]

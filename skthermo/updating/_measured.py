@@ -1,0 +1,165 @@
+"""Reading what was measured."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._validation import as_floats
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Measured:
+    """Modes that were measured, each with a frequency, a shape or both.
+
+    Attributes
+    ----------
+    names : list of str
+        Of these modes.
+    columns : ndarray of int of shape (n_measured,)
+        Which modes of the records they are.
+    frequencies, deviations : ndarray of shape (n_measured,)
+        Mean over records in Hz, NaN where only the shape was measured; and what residuals are divided by.
+    shapes : ndarray of shape (n_dofs, n_measured) or None
+        Of unit length, NaN where only the frequency was measured.
+    dofs : ndarray of int of shape (n_dofs,)
+        Where the shapes were measured.
+    shape_weights : ndarray of shape (n_measured,)
+        Zero where no shape was measured.
+    """
+
+    names: list[str]
+    columns: NDArray[np.intp]
+    frequencies: Array
+    deviations: Array
+    shapes: Array | None
+    dofs: NDArray[np.intp]
+    shape_weights: Array
+
+    @property
+    def has_frequency(self) -> NDArray[np.bool_]:
+        """Modes with a measured frequency."""
+        return np.isfinite(self.frequencies)
+
+    @property
+    def has_shape(self) -> NDArray[np.bool_]:
+        """Modes with a measured shape."""
+        return np.zeros(len(self.names), bool) if self.shapes is None else np.isfinite(self.shapes[0])
+
+    @property
+    def n_residuals(self) -> int:
+        """Independent numbers that the fit is made to: a shape has one less than degrees of freedom."""
+        weighted = self.has_shape & (self.shape_weights > 0)
+        return int(self.has_frequency.sum() + weighted.sum() * max(len(self.dofs) - 1, 0))
+
+
+def read_measured(
+    F: Array,
+    names: list[str],
+    shapes: ArrayLike | None,
+    dofs: ArrayLike | None,
+    frequency_std: ArrayLike | None,
+    shape_weight: ArrayLike,
+    n_dof: int,
+) -> Measured:
+    """Means over records, with shapes and weights, of the modes that were measured."""
+    n_modes = F.shape[1]
+    wrong = np.argwhere(~(np.isnan(F) | ((F > 0) & np.isfinite(F))))
+    if wrong.size:
+        row, column = wrong[0]
+        raise ValueError(f"frequency {names[column]!r} of record {row} is {F[row, column]}; expected Hz above 0, or NaN")
+    counts = np.isfinite(F).sum(axis=0)
+    means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
+    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
+    weights = _per_mode(shape_weight, n_modes, "shape_weight")
+    if (weights < 0).any() or not np.isfinite(weights).all():
+        raise ValueError(f"shape_weight is {shape_weight}; expected finite numbers, none negative")
+    if unit is None and weights.any():
+        raise ValueError(f"shape_weight is {shape_weight} but no shapes were given; expected shapes, or a weight of 0")
+    with_shape = np.zeros(n_modes, bool) if unit is None else np.isfinite(unit[0])
+    columns = np.flatnonzero((counts > 0) | with_shape)
+    if not columns.size:
+        raise ValueError(f"F is NaN in all {len(F)} records of all {n_modes} modes; expected a measured frequency")
+    return Measured(
+        names=[names[i] for i in columns],
+        columns=columns,
+        frequencies=means[columns],
+        deviations=_read_deviations(frequency_std, means, names)[columns],
+        shapes=None if unit is None else unit[:, columns],
+        dofs=places,
+        shape_weights=np.where(with_shape, weights, 0.0)[columns],
+    )
+
+
+def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
+    """Different degrees of freedom of a model, the first being 0."""
+    array = np.asarray(dofs)
+    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
+    outside = array[(array < 0) | (array >= n_dof)]
+    if outside.size:
+        raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
+    values, counts = np.unique(array, return_counts=True)
+    if (counts > 1).any():
+        raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
+    return array.astype(np.intp)
+
+
+def real_shapes(shapes: NDArray) -> Array:
+    """Real parts of complex shapes, each turned by the phase that makes its real part largest."""
+    squares = np.nansum(shapes**2, axis=0)
+    turned = shapes * np.exp(-0.5j * np.angle(squares))
+    lost = np.linalg.norm(np.nan_to_num(turned.imag), axis=0) / np.linalg.norm(np.nan_to_num(shapes), axis=0).clip(1e-300)
+    warnings.warn(
+        f"shapes are complex: each is turned to its largest real part and the rest, up to {lost.max():.1%} of a "
+        "shape's length, is left out",
+        UserWarning,
+        stacklevel=5,
+    )
+    return np.where(np.isnan(shapes), np.nan, turned.real)
+
+
+def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tuple[NDArray[np.intp], Array | None]:
+    if (shapes is None) != (dofs is None):
+        given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
+        raise ValueError(f"{given} were given without {missing}; expected both, or neither")
+    if shapes is None:
+        return np.empty(0, dtype=np.intp), None
+    places = check_dofs(dofs, n_dof)
+    array = np.asarray(shapes)
+    if array.shape != (len(places), n_modes):
+        raise ValueError(
+            f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a column "
+            "for each mode of F"
+        )
+    array = real_shapes(array) if np.iscomplexobj(array) else as_floats(array)
+    for name, column in zip(names, array.T, strict=True):
+        if np.isnan(column).any() and not np.isnan(column).all():
+            row = np.flatnonzero(np.isnan(column))[0]
+            raise ValueError(f"the shape of {name!r} is NaN in row {row} but not in all; expected all rows or none")
+        if np.isinf(column).any() or not column.any():
+            raise ValueError(f"the shape of {name!r} is zero throughout or infinite; expected a mode shape")
+    return places, array / np.linalg.norm(array, axis=0)
+
+
+def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[str]) -> Array:
+    """Standard deviations in Hz; without any, the frequencies themselves, for a weight of 1."""
+    if frequency_std is None:
+        return means
+    deviations = _per_mode(frequency_std, len(means), "frequency_std")
+    wrong = np.flatnonzero(np.isfinite(means) & ~((deviations > 0) & np.isfinite(deviations)))
+    if wrong.size:
+        raise ValueError(
+            f"frequency_std of {names[wrong[0]]!r} is {deviations[wrong[0]]}; expected a positive number in Hz"
+        )
+    return deviations
+
+
+def _per_mode(values: ArrayLike, n_modes: int, what: str) -> Array:
+    array = as_floats(values)
+    if array.shape not in ((), (n_modes,)):
+        raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
+    return np.broadcast_to(array, (n_modes,)).copy()

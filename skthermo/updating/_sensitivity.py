@@ -1,0 +1,132 @@
+"""How strongly parameters move frequencies."""
+
+from numbers import Real
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo.fem import FEModel
+from skthermo.fem._sampling import solve
+from skthermo.fem._theta import check_one_theta, nominal_theta
+
+Array = NDArray[np.float64]
+
+
+def sensitivity(
+    model: FEModel,
+    theta: ArrayLike | None = None,
+    *,
+    method: Literal["exact", "central"] = "exact",
+    step: float = 0.01,
+) -> pd.DataFrame:
+    """Normalised sensitivities of frequencies to parameters, eq. (A.1).
+
+    Parameters
+    ----------
+    model : FE model
+        With ``method="exact"`` it needs a ``jacobian``.
+    theta : array-like of shape (n_parameters,), optional
+        Where; at the nominal parameters by default.
+    method : {"exact", "central"}, default="exact"
+        Exact derivatives, or central differences, eq. (A.2), of any model.
+    step : float, default=0.01
+        Relative step of central differences.
+
+    Returns
+    -------
+    DataFrame of shape (n_modes, n_parameters)
+        S_ij = (theta_j / f_i) d f_i / d theta_j, in rows f1, f2, ... and the parameters' columns.
+
+    Raises
+    ------
+    ValueError
+        If the model has no ``jacobian``, has no frequencies at theta, or method, theta or step is not
+        one of those expected.
+
+    See Also
+    --------
+    select_parameters : Those that move some mode.
+    identifiability : Those that frequencies can tell.
+
+    Notes
+    -----
+    Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.updating import sensitivity
+    >>> S = sensitivity(make_truss())
+    >>> S.loc["f1"].round(3)
+    bottom      0.265
+    top         0.179
+    diagonal    0.055
+    vertical    0.001
+    Name: f1, dtype: float64
+
+    Frequencies rise with the root of all stiffness together:
+
+    >>> S.sum(axis=1).round(3).unique()
+    array([0.5])
+    """
+    row = nominal_theta(len(model.parameter_names)) if theta is None else check_one_theta(theta, model.parameter_names)
+    frequencies = solve(model, row)[0]
+    if not np.isfinite(frequencies).all():
+        raise ValueError(f"the model has the frequencies {frequencies} at theta = {row[0].tolist()}; expected numbers")
+    if method == "exact":
+        if not hasattr(model, "jacobian"):
+            raise ValueError(f"{model!r} has no method 'jacobian'; expected one that has, or method='central'")
+        gradient = model.jacobian(row)[0]
+    elif method == "central":
+        gradient = central_jacobian(model, row, step)
+    else:
+        raise ValueError(f"method is {method!r}; expected 'exact' or 'central'")
+    names = [f"f{i + 1}" for i in range(model.n_modes)]
+    return pd.DataFrame(gradient * row / frequencies[:, np.newaxis], names, list(model.parameter_names))
+
+
+def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
+    """Parameters that move at least one mode enough.
+
+    Parameters
+    ----------
+    S : DataFrame of shape (n_modes, n_parameters)
+        Normalised sensitivities.
+    threshold : float, default=0.1
+        What \\|S\\| must reach for some mode.
+
+    Returns
+    -------
+    list of str
+        Names in the order of the columns.
+
+    Raises
+    ------
+    ValueError
+        If S is not a frame.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.updating import select_parameters, sensitivity
+    >>> select_parameters(sensitivity(make_truss()))
+    ['bottom', 'top', 'diagonal']
+    """
+    if not isinstance(S, pd.DataFrame):
+        raise ValueError(f"S is a {type(S).__name__}; expected a DataFrame whose columns are parameters")
+    return [*S.columns[(S.abs() >= threshold).any(axis=0)]]
+
+
+def central_jacobian(model: FEModel, row: Array, step: float) -> Array:
+    """d f / d theta by central differences of a relative step, (n_modes, n_parameters)."""
+    if not isinstance(step, Real) or not 0 < step < 1:
+        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.01")
+    steps = np.diag(step * row[0])
+    raised, lowered = np.split(solve(model, np.vstack([row + steps, row - steps])), 2)
+    return ((raised - lowered) / (2 * step * row[0][:, np.newaxis])).T
