@@ -376,8 +376,12 @@ class AffineModel:
             gradient -= eigenvalues[:, :, np.newaxis] * self._mass.gradients(theta, shapes)
         return (gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis]),)
 
+    def _read(self, theta: ArrayLike) -> Array:
+        """Rows of theta at which the model may be solved."""
+        return check_theta(theta, self.parameter_names)
+
     def _in_chunks(self, solve, theta: ArrayLike) -> tuple[Array, ...]:
-        rows = check_theta(theta, self.parameter_names)
+        rows = self._read(theta)
         size = self.rows_per_chunk
         parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
         results = tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))

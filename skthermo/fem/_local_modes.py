@@ -34,7 +34,7 @@ class LocalModes:
 
     def __init__(self, model: AffineModel, theta: ArrayLike, n_candidates: int | None = None):
         self._model = model
-        self._theta = check_one_theta(theta, model.parameter_names)
+        self._theta = check_one_theta(model._read(theta), model.parameter_names)
         self._wanted = min(n_candidates or model.n_modes + GUARD_MODES, model._most_candidates)
         eigenvalues, shapes = model._form.modes(self._theta, self._wanted)
         self._eigenvalues, self._shapes = eigenvalues[0], shapes[0]

@@ -14,7 +14,7 @@ from skthermo.fem._affine import GUARD_MODES, AffineModel
 from skthermo.fem._eigen import dense_form
 from skthermo.fem._sampling import check_bounds
 from skthermo.fem._shift_invert import factorise
-from skthermo.fem._theta import check_one_theta, check_theta, nominal_theta
+from skthermo.fem._theta import check_one_theta, nominal_theta
 
 Array = NDArray[np.float64]
 RandomState = int | np.random.RandomState | None
@@ -299,8 +299,8 @@ class ReducedModel(AffineModel):
         errors = np.where(np.isnan(full), 0.0, np.abs(self.frequencies(theta) / full - 1))
         return np.nan_to_num(errors, nan=np.inf).max(axis=1)
 
-    def _in_chunks(self, solve, theta: ArrayLike) -> tuple[Array, ...]:
-        rows = check_theta(theta, self.parameter_names)
+    def _read(self, theta: ArrayLike) -> Array:
+        rows = super()._read(theta)
         lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
         outside = ((rows < lowest) | (rows > highest)).any(axis=1)
         if outside.any():
@@ -308,9 +308,9 @@ class ReducedModel(AffineModel):
                 f"{outside.sum()} of {len(rows)} theta are outside the bounds for which the model was reduced, row "
                 f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
                 UserWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
-        return super()._in_chunks(solve, rows)
+        return rows
 
 
 def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:

@@ -1,0 +1,89 @@
+"""The model's modes beside the measured ones."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from skthermo.fem import AffineModel, FEModel
+from skthermo.fem._local_modes import LocalModes
+from skthermo.fem._sampling import solve
+from skthermo.updating._measured import Measured
+from skthermo.updating._sensitivity import central_jacobian
+
+Array = NDArray[np.float64]
+
+DIFFERENCE_STEP = 1e-3
+"""Relative step of central differences where a model has no derivatives."""
+
+NOMINAL_SHARE = 0.25
+"""What likeness to the nominal modes counts beside the MAC: it decides where sensors cannot tell shapes apart."""
+
+
+@dataclass
+class Counterparts:
+    """The model's modes at one theta that are compared with the measured ones, in their order.
+
+    Attributes
+    ----------
+    frequencies : ndarray of shape (n_measured,)
+        In Hz.
+    shapes : ndarray of shape (n_dofs, n_measured)
+        At the measured degrees of freedom.
+    ranks : ndarray of int of shape (n_measured,) or None
+        Which of the lowest modes they are, where shapes have told.
+    derivatives : callable
+        Gives those of frequencies (n_measured, n_parameters) and shapes (n_dofs, n_measured, n_parameters).
+    """
+
+    frequencies: Array
+    shapes: Array
+    ranks: NDArray[np.intp] | None
+    derivatives: Callable[[], tuple[Array, Array]]
+
+
+def counterparts(model: FEModel, measured: Measured, theta: Array) -> Counterparts:
+    """Modes paired by their shapes where some were measured, else column by column."""
+    if measured.shapes is None:
+        return _by_column(model, measured, theta[np.newaxis])
+    return _by_shape(model, measured, theta)
+
+
+def macs(shapes: Array, measured: Array) -> Array:
+    """MAC of measured unit shapes with as many shapes, one by one, (n_measured,)."""
+    return np.diagonal(mac_table(shapes, measured))
+
+
+def mac_table(shapes: Array, measured: Array) -> Array:
+    """MAC of measured unit shapes and all shapes, (n_measured, n_shapes); zero for shapes that no sensor feels."""
+    squares = (shapes**2).sum(axis=0)
+    return (measured.T @ shapes) ** 2 / np.where(squares > 0, squares, np.inf)
+
+
+def columns_of(model: AffineModel, theta: Array, *, followed: bool) -> NDArray[np.intp]:
+    """Which of the lowest modes at theta are the model's columns, followed from nominal or sorted."""
+    return LocalModes.followed(model, theta)[1] if followed else np.arange(model.n_modes)
+
+
+def _by_column(model: FEModel, measured: Measured, row: Array) -> Counterparts:
+    def derivatives() -> tuple[Array, Array]:
+        exact = hasattr(model, "jacobian")
+        gradient = model.jacobian(row)[0] if exact else central_jacobian(model, row, DIFFERENCE_STEP)
+        return gradient[measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
+
+    frequencies = solve(model, row)[0, measured.columns]
+    return Counterparts(frequencies, np.empty((0, len(frequencies))), None, derivatives)
+
+
+def _by_shape(model: AffineModel, measured: Measured, theta: Array) -> Counterparts:
+    modes = LocalModes(model, theta)
+    shapes = modes.shapes(measured.dofs)
+    alike = NOMINAL_SHARE * modes.likeness[measured.columns]
+    with_shape = measured.has_shape
+    alike[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
+    ranks = linear_sum_assignment(np.nan_to_num(alike), maximize=True)[1]
+    return Counterparts(
+        modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, measured.dofs)
+    )

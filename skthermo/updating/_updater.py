@@ -1,0 +1,363 @@
+"""FE model updating."""
+
+import warnings
+from functools import partial
+from numbers import Integral, Real
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils import check_random_state
+
+from skthermo._validation import (
+    HasMethods,
+    Interval,
+    StrOptions,
+    _fit_context,
+    as_floats,
+    clone_sharing_models,
+    column_names,
+    is_model,
+    validate_data,
+)
+from skthermo.fem import AffineModel, CallableModel, FEModel
+from skthermo.fem._sampling import check_bounds
+from skthermo.fem._tracking import SAME_MODE, share_reordered
+from skthermo.updating._comparison import columns_of, counterparts, macs
+from skthermo.updating._information import cramer_rao
+from skthermo.updating._measured import Measured, read_measured
+from skthermo.updating._optimise import Outcome, optimise
+from skthermo.updating._residuals import Residuals
+
+Array = NDArray[np.float64]
+
+SAME_OPTIMUM = 1e-3
+"""Largest difference of multipliers at which two starts have ended at the same optimum."""
+
+
+class ModelUpdater(BaseEstimator):
+    """Parameters of an FE model from measured frequencies and, where there are any, mode shapes.
+
+    Minimises, within bounds on the multipliers theta of the nominal parameters,
+
+    .. math:: z(\\theta) = \\sum_j \\Bigl(\\frac{f_j(\\theta) - \\tilde f_j}{\\tilde f_j} w_j\\Bigr)^2
+              + \\sum_j \\Bigl(\\frac{1 - \\sqrt{\\mathrm{MAC}_j}}{\\sqrt{\\mathrm{MAC}_j}} v_j\\Bigr)^2
+              + \\sum_p \\Bigl(\\frac{\\theta_p - 1}{\\sigma_p}\\Bigr)^2 ,
+
+    with measured frequencies, their weights w = measured frequency / standard deviation (or 1), weights v of shapes,
+    and standard deviations of a prior. The first sum with unit weights is eq. (A.3).
+
+    Parameters
+    ----------
+    model : FE model
+        Column j of the frequencies is its mode j. Shapes need an `AffineModel`.
+    bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        Box of multipliers that holds 1: a half-width, or lowest and highest of each parameter.
+    shape_weight : float or array-like of shape (n_modes,), default=0.0
+        Weights v. With 0, measured shapes only tell which mode is which.
+    n_starts : int, default=1
+        Number of optimisations. The first starts at theta = 1, the others at random points of the box.
+    method : {"least_squares", "lbfgs"}, default="least_squares"
+        Trust-region Gauss-Newton steps (``scipy.optimize.least_squares``), or L-BFGS-B.
+    prior : float or array-like of shape (n_parameters,), optional
+        Relative standard deviations of a Gaussian prior on theta about 1. By default there is none.
+    max_iter : int, default=200
+        Most evaluations (least_squares) or iterations (lbfgs) of one start.
+    n_jobs : int, optional
+        Jobs over which starts are spread, through joblib.
+    random_state : int, RandomState or None, default=None
+        Seed of the starts.
+
+    Attributes
+    ----------
+    theta_ : ndarray of shape (n_parameters,)
+        Multipliers with the smallest objective of all starts.
+    model_ : FE model
+        The model with these multipliers as its nominal state: theta = 1 is the optimum.
+    table_ : DataFrame
+        One row for each measured mode: ``measured``, ``before`` (theta = 1) and ``after`` in Hz, ``error_before`` and
+        ``error_after`` in percent and, with shapes, ``mac_before`` and ``mac_after``.
+    starts_ : DataFrame
+        One row for each start: ``start`` (where), ``objective``, ``success``, ``n_evaluations``, ``theta``, and
+        ``optimum``, a number for each different optimum from 0, the best.
+    covariance_ : ndarray of shape (n_parameters, n_parameters)
+        Of ``theta_`` about the optimum, if the weights stand for the noise (see Notes): the inverse of
+        the Gauss-Newton matrix J' J. Infinite variances, and NaN covariances, where nothing tells a parameter.
+    n_features_in_ : int
+        Number of modes.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    See Also
+    --------
+    identifiability : What accuracy to expect before anything is measured.
+
+    Notes
+    -----
+    *Pairing.* With shapes, a measured mode is compared with that of the model's modes whose shape is most like its
+    own, among more modes than ``model.n_modes``; likeness to the nominal mode of the same number decides where the
+    sensors cannot. Without shapes, modes are the model's columns: followed by their shapes with ``track=True``.
+    Sorted columns allow a false match, where modes swap and fit each other's frequencies; a warning says so.
+
+    *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
+    v = sqrt(2 (n - 1)) / s^2, one over the standard deviation of their residual. ``covariance_`` takes weights
+    at their word: it is a statement about theta if ``frequency_std`` and ``shape_weight`` (or 0) are the
+    measurement's, and else only for comparison (without ``frequency_std``, the noise on every frequency counts as 1,
+    or 100 %). It knows neither bounds nor errors of the model itself.
+
+    *Method.* A residual of the MAC is quadratic in the error of the shape. The Gauss-Newton matrix is therefore
+    that of the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared
+    length is 1/MAC - 1, weighted with the slope of the objective. All derivatives are exact, those of shapes
+    included; a model without ``jacobian`` gets central differences.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+
+    Friswell & Mottershead, Finite element model updating in structural dynamics, Kluwer, 1995.
+
+    Dong & Wang, Finite element model updating using the Hamiltonian and mode shape expansion, and modal
+    property differences, Journal of Structural Engineering 144 (2018) 04018170.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.updating import ModelUpdater
+    >>> truss, truth = make_truss(), [0.9, 1.1, 0.95, 1.05]
+    >>> updater = ModelUpdater(truss).fit(truss.frequencies([truth]))
+    >>> updater.theta_.round(4)
+    array([0.9 , 1.1 , 0.95, 1.05])
+    >>> updater.model_.frequencies(np.ones((1, 4))).round(2)
+    array([[ 7.42, 27.26, 37.62, 62.04, 67.2 , 95.86]])
+    """
+
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"])],
+        "bounds": [Real, "array-like"],
+        "shape_weight": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "n_starts": [Interval(Integral, 1, None, closed="left")],
+        "method": [StrOptions({"least_squares", "lbfgs"})],
+        "prior": [Interval(Real, 0, None, closed="neither"), "array-like", None],
+        "max_iter": [Interval(Integral, 1, None, closed="left")],
+        "n_jobs": [Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        model: FEModel,
+        *,
+        bounds: ArrayLike = 0.3,
+        shape_weight: ArrayLike = 0.0,
+        n_starts: int = 1,
+        method: Literal["least_squares", "lbfgs"] = "least_squares",
+        prior: ArrayLike | None = None,
+        max_iter: int = 200,
+        n_jobs: int | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.model = model
+        self.bounds = bounds
+        self.shape_weight = shape_weight
+        self.n_starts = n_starts
+        self.method = method
+        self.prior = prior
+        self.max_iter = max_iter
+        self.n_jobs = n_jobs
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(
+        self,
+        F: ArrayLike,
+        y: None = None,
+        *,
+        shapes: ArrayLike | None = None,
+        dofs: ArrayLike | None = None,
+        frequency_std: ArrayLike | None = None,
+    ) -> "ModelUpdater":
+        """Find the multipliers that bring the model nearest to what was measured.
+
+        Parameters
+        ----------
+        F : array-like or DataFrame of shape (n_records, n_modes) or (n_modes,)
+            Measured frequencies in Hz, of which the mean over records counts. NaN is allowed; modes that no
+            record has are left out. With shapes, there may be fewer columns than the model has modes.
+        y : None
+            Ignored.
+        shapes : array-like of shape (n_dofs, n_modes), optional
+            Measured mode shapes, scaled in any way; a column of NaN was not measured. Complex shapes
+            are made real.
+        dofs : array-like of int of shape (n_dofs,), optional
+            The model's degrees of freedom that their rows are, the first being 0.
+        frequency_std : float or array-like of shape (n_modes,), optional
+            Standard deviations of the mean frequencies in Hz.
+
+        Returns
+        -------
+        ModelUpdater
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If the number of modes is not the model's; a shape, degree of freedom or standard deviation is not one of
+            those expected; nothing was measured; bounds are infeasible or do not hold 1; shapes are given for a
+            model that cannot differentiate its own; or no start has modes.
+
+        Warns
+        -----
+        UserWarning
+            If there are more parameters than residuals and no prior, shapes are complex, or a mode of the
+            optimum is not the one it was matched with.
+        """
+        measured = self._read(F, shapes, dofs, frequency_std)
+        bounds, prior = self._read_bounds(), self._read_prior()
+        n_parameters = len(bounds)
+        if prior is None and n_parameters > measured.n_residuals:
+            warnings.warn(
+                f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
+                "equally well; expected fewer parameters, shapes, or a prior",
+                UserWarning,
+                stacklevel=2,
+            )
+        residuals = Residuals(self.model, measured, prior)
+        outcomes = self._run(residuals, bounds)
+        best = min(outcomes, key=lambda outcome: outcome.objective)
+        if not np.isfinite(best.objective):
+            raise ValueError(f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds")
+
+        self.theta_ = best.theta
+        self.model_ = _rescaled(self.model, best.theta)
+        self.starts_ = _starts_table(outcomes)
+        self.covariance_ = cramer_rao(residuals.at(best.theta).information())
+        self.table_ = _modes_table(self.model, measured, best.theta)
+        self._warn_of_false_matches(measured)
+        return self
+
+    def _read(self, F, shapes, dofs, frequency_std) -> Measured:
+        if not is_model(self.model):
+            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
+        table = F if isinstance(F, pd.DataFrame) else np.atleast_2d(as_floats(F))
+        values = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan")
+        n_modes = self.model.n_modes
+        if values.shape[1] > n_modes or (shapes is None and values.shape[1] != n_modes):
+            raise ValueError(
+                f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, NaN where not measured"
+            )
+        if shapes is not None and not isinstance(self.model, AffineModel):
+            raise ValueError(f"shapes were given, but {self.model!r} cannot differentiate its own; expected an AffineModel")
+        n_dof = getattr(self.model, "n_dof", 0)
+        names = column_names(table, "f")
+        return read_measured(values, names, shapes, dofs, frequency_std, self.shape_weight, n_dof)
+
+    def _read_bounds(self) -> Array:
+        names = self.model.parameter_names
+        bounds = check_bounds(self.bounds, names)
+        for name, (lowest, highest) in zip(names, bounds, strict=True):
+            if not lowest <= 1 <= highest:
+                raise ValueError(
+                    f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected them to hold the first start, 1"
+                )
+        return bounds
+
+    def _read_prior(self) -> Array | None:
+        if self.prior is None:
+            return None
+        names = self.model.parameter_names
+        prior = as_floats(self.prior)
+        if prior.shape not in ((), (len(names),)) or not ((prior > 0) & np.isfinite(prior)).all():
+            raise ValueError(
+                f"prior is {prior}; expected relative standard deviations above 0, a number or one for each of {names}"
+            )
+        return np.broadcast_to(prior, (len(names),))
+
+    def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
+        lowest, highest = bounds.T
+        random_state = check_random_state(self.random_state)
+        drawn = random_state.uniform(lowest, highest, size=(self.n_starts - 1, len(bounds)))
+        parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
+        starts = np.vstack([np.ones(len(bounds)), drawn])
+        return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
+
+    def _warn_of_false_matches(self, measured: Measured) -> None:
+        """Say which columns of the updated model are other modes than those measured."""
+        names = np.array(measured.names)
+        if measured.shapes is None:
+            if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):
+                return
+            if isinstance(self.model, AffineModel):
+                followed = columns_of(self.model, self.theta_, followed=True)
+                swapped = names[(followed != np.arange(len(followed)))[measured.columns]]
+            else:
+                swapped = names[: len(names) if share_reordered(self.model, self.theta_[np.newaxis]) else 0]
+            message = "swap places between the nominal model and the optimum, and a sorted column fits another mode's "
+            expected = "frequency: expected a model with track=True, or shapes"
+        else:
+            ranks = counterparts(self.model, measured, self.theta_).ranks
+            columns = columns_of(self.model, self.theta_, followed=self.model.track)[measured.columns]
+            swapped = names[ranks != columns]
+            message = "are by their shapes other modes of the optimum than the columns of model_ with their numbers: "
+            expected = "expected measured modes in the model's order, or track=True where modes swap"
+            unlike = self.table_["mac_after"] < SAME_MODE
+            if unlike.any():
+                warnings.warn(
+                    f"no mode of the optimum is like the measured shapes of {list(names[unlike])} (MAC below {SAME_MODE})",
+                    UserWarning,
+                    stacklevel=3,
+                )
+        if len(swapped):
+            warnings.warn(f"modes {list(swapped)} {message}{expected}", UserWarning, stacklevel=3)
+
+    def __sklearn_clone__(self) -> "ModelUpdater":
+        return clone_sharing_models(self)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
+
+
+def _modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
+    table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
+    states = {
+        "before": counterparts(model, measured, np.ones_like(theta)),
+        "after": counterparts(model, measured, theta),
+    }
+    for name, modes in states.items():
+        table[name] = modes.frequencies
+    for name, modes in states.items():
+        table[f"error_{name}"] = 100 * (modes.frequencies / measured.frequencies - 1)
+    if measured.shapes is not None:
+        for name, modes in states.items():
+            table[f"mac_{name}"] = macs(modes.shapes, measured.shapes)
+    return table
+
+
+def _starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
+    table = pd.DataFrame(outcomes)
+    optima: list[Array] = []
+    numbers = np.empty(len(outcomes), dtype=int)
+    for i in np.argsort(table["objective"], kind="stable"):
+        theta = outcomes[i].theta
+        near = [number for number, known in enumerate(optima) if np.abs(theta - known).max() < SAME_OPTIMUM]
+        if not near:
+            near = [len(optima)]
+            optima.append(theta)
+        numbers[i] = near[0]
+    return table.assign(optimum=numbers)
+
+
+def _rescaled(model: FEModel, theta: Array) -> FEModel:
+    if hasattr(model, "rescaled"):
+        return model.rescaled(theta)
+    function = partial(_frequencies_from, model, theta)
+    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
+
+
+def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
+    return model.frequencies(origin * theta)
