@@ -8,15 +8,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo.fem._affine import GUARD_MODES, AffineModel
 from skthermo.fem._eigen import hertz
-from skthermo.fem._shift_invert import factorise
+from skthermo.fem._shift_invert import ShiftInvertForm
 from skthermo.fem._terms import Matrix
 from skthermo.fem._theta import check_one_theta
 from skthermo.fem._tracking import REPEATED, may_be_missed, pair_modes
 
 Array = NDArray[np.float64]
 
-CONVERGED = 1e-7
-"""Share of the right-hand side at which the iteration for shape derivatives stops."""
+CONVERGED = 1e-5
+"""Residual, as a share of the derivative, at which the iteration for shape derivatives stops; its error is smaller."""
 
 MOST_ITERATIONS = 200
 
@@ -36,10 +36,13 @@ class LocalModes:
         self._model = model
         self._theta = check_one_theta(model._read(theta), model.parameter_names)
         self._wanted = min(n_candidates or model.n_modes + GUARD_MODES, model._most_candidates)
-        eigenvalues, shapes = model._form.modes(self._theta, self._wanted)
-        self._eigenvalues, self._shapes = eigenvalues[0], shapes[0]
+        if isinstance(model._form, ShiftInvertForm):
+            self._eigenvalues, self._shapes, self._factors = model._form.factored_modes(self._theta, self._wanted)
+        else:
+            eigenvalues, shapes = model._form.modes(self._theta, self._wanted)
+            self._eigenvalues, self._shapes, self._factors = eigenvalues[0], shapes[0], None
         self.frequencies = hertz(self._eigenvalues)
-        self.likeness = model._likeness(shapes)[0]
+        self.likeness = model._likeness(self._shapes[np.newaxis])[0]
 
     @classmethod
     def followed(cls, model: AffineModel, theta: ArrayLike) -> tuple["LocalModes", NDArray[np.intp]]:
@@ -80,16 +83,17 @@ class LocalModes:
         apart = np.abs(gaps) > REPEATED * eigenvalues
         amplitudes = along / np.where(apart, gaps, np.inf)[:, :, np.newaxis]
         amplitudes[own] = -d_masses / 2
-        d_shapes = np.tensordot(self._shapes, amplitudes, axes=1) + self._remainder(forces, eigenvalues)
+        remainder = self._remainder(forces, eigenvalues, (amplitudes**2).sum(axis=0))
+        d_shapes = np.tensordot(self._shapes, amplitudes, axes=1) + remainder
         return d_frequencies, self._model._at_dofs(dofs, d_shapes)
 
-    def _remainder(self, forces: Array, eigenvalues: Array) -> Array:
-        """The part of x that is M-orthogonal to the modes at hand."""
+    def _remainder(self, forces: Array, eigenvalues: Array, known: Array) -> Array:
+        """The part of x that is M-orthogonal to the modes at hand, along which its squared length is known."""
         mass = self._model._mass.assemble(self._theta)[0]
-        solve = linear_solver(self._model._stiffness.assemble(self._theta)[0])
+        solve = self._factors.solve if self._factors else dense_solver(self._model._stiffness.assemble(self._theta)[0])
         columns = forces.reshape(len(forces), -1)
         shifts = np.repeat(eigenvalues, forces.shape[2])
-        return solve_beside_modes(solve, mass, self._shapes, columns, shifts).reshape(forces.shape)
+        return solve_beside_modes(solve, mass, self._shapes, columns, shifts, known.ravel()).reshape(forces.shape)
 
 
 def shape_jacobian(model: AffineModel, theta: ArrayLike, dofs: ArrayLike | None = None) -> tuple[Array, Array]:
@@ -136,7 +140,7 @@ def shape_jacobian(model: AffineModel, theta: ArrayLike, dofs: ArrayLike | None 
 
 
 def solve_beside_modes(
-    solve: Callable[[Array], Array], mass: Matrix, shapes: Array, forces: Array, shifts: Array
+    solve: Callable[[Array], Array], mass: Matrix, shapes: Array, forces: Array, shifts: Array, known: Array
 ) -> Array:
     """x of (K - shift M) x = force, M-orthogonal to the lowest modes, for many columns at once.
 
@@ -150,34 +154,30 @@ def solve_beside_modes(
     def beside(vectors: Array) -> Array:
         return vectors - shapes @ (weighted.T @ vectors)
 
-    def squared(vectors: Array) -> Array:
-        return np.einsum("ic,ic->c", vectors, mass @ vectors)
-
-    static = solve(forces)
-    start = beside(static)
-    x, residuals, searches = np.zeros_like(start), start.copy(), np.zeros_like(start)
-    squares, previous = squared(start), np.full(len(shifts), np.inf)
-    enough = CONVERGED**2 * squared(static)
+    residuals = beside(solve(forces))
+    x, searches, found = np.zeros_like(residuals), np.zeros_like(residuals), np.empty_like(residuals)
+    inertia = mass @ residuals
+    squares, previous = np.einsum("ic,ic->c", residuals, inertia), np.full(len(shifts), np.inf)
+    enough, columns = CONVERGED**2 * (known + squares), np.arange(len(shifts))
     for _ in range(MOST_ITERATIONS):
-        active = np.flatnonzero(squares > enough)
-        if not active.size:
-            break
-        search = residuals[:, active] + squares[active] / previous[active] * searches[:, active]
-        image = beside(search - shifts[active] * solve(mass @ search))
-        steps = squares[active] / np.einsum("ic,ic->c", search, mass @ image)
-        x[:, active] += steps * search
-        residuals[:, active] -= steps * image
-        searches[:, active], previous[active] = search, squares[active]
-        squares[active] = squared(residuals[:, active])
-    return x + residuals
+        going = squares > enough
+        if not going.all():
+            found[:, columns[~going]] = (x + residuals)[:, ~going]
+            x, searches, residuals = x[:, going], searches[:, going], residuals[:, going]
+            columns, squares, previous, enough, shifts = (v[going] for v in (columns, squares, previous, enough, shifts))
+            if not columns.size:
+                break
+        searches = residuals + squares / previous * searches
+        inertia = mass @ searches
+        images = beside(searches - shifts * solve(inertia))
+        steps = squares / np.einsum("ic,ic->c", inertia, images)
+        x, residuals, previous = x + steps * searches, residuals - steps * images, squares
+        squares = np.einsum("ic,ic->c", residuals, mass @ residuals)
+    found[:, columns] = x + residuals
+    return found
 
 
-def linear_solver(stiffness: Matrix) -> Callable[[Array], Array]:
+def dense_solver(stiffness: Array) -> Callable[[Array], Array]:
     """What multiplies columns by the inverse of a positive definite stiffness."""
-    if isinstance(stiffness, np.ndarray):
-        factors = scipy.linalg.cho_factor(stiffness)
-        return lambda columns: scipy.linalg.cho_solve(factors, columns)
-    factors = factorise(stiffness)
-    if factors is None:
-        raise np.linalg.LinAlgError("the stiffness is not positive definite")
-    return factors.solve
+    factors = scipy.linalg.cho_factor(stiffness)
+    return lambda columns: scipy.linalg.cho_solve(factors, columns)

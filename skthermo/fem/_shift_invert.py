@@ -39,27 +39,36 @@ class ShiftInvertForm:
         masses = self._mass.assemble(theta[:1] if self._mass.is_constant else theta)
         for row, stiffness in enumerate(self._stiffness.assemble(theta)):
             mass = masses[0 if self._mass.is_constant else row]
-            try:
-                found, vectors = lowest_modes(stiffness, mass, n_modes, self._start)
-            except scipy.sparse.linalg.ArpackError:
-                continue
-            eigenvalues[row] = found
+            eigenvalues[row], vectors = lowest_modes(stiffness, factorise(stiffness), mass, n_modes, self._start)
             if with_shapes:
                 shapes[row] = vectors
         return eigenvalues, shapes
 
+    def factored_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, scipy.sparse.linalg.SuperLU | None]:
+        """Eigenvalues and shapes at one row of theta, and the factors of its stiffness."""
+        stiffness, mass = self._stiffness.assemble(theta)[0], self._mass.assemble(theta)[0]
+        factors = factorise(stiffness)
+        return *lowest_modes(stiffness, factors, mass, n_modes, self._start), factors
+
 
 def lowest_modes(
-    stiffness: scipy.sparse.csc_array, mass: scipy.sparse.csc_array, n_modes: int, start: Array
+    stiffness: scipy.sparse.csc_array,
+    factors: scipy.sparse.linalg.SuperLU | None,
+    mass: scipy.sparse.csc_array,
+    n_modes: int,
+    start: Array,
 ) -> tuple[Array, Array]:
-    """Eigenvalues in ascending order and shapes of unit modal mass; NaN if K is not positive definite."""
+    """Eigenvalues in ascending order and shapes of unit modal mass; NaN without factors or convergence."""
     n_dof = len(start)
-    factors = factorise(stiffness)
+    nothing = np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
     if factors is None:
-        return np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
+        return nothing
     inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
     wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
-    values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
+    try:
+        values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
+    except scipy.sparse.linalg.ArpackError:
+        return nothing
     lowest = np.argsort(values)[:n_modes]
     # One more application of K^-1 M takes out what massless degrees of freedom gather of rounding.
     shapes = factors.solve(mass @ vectors[:, lowest])
