@@ -17,6 +17,7 @@ MAY_IMPORT = {
     "metrics": set(),
     "detection": {"metrics"},
     "surrogate": {"fem", "metrics"},
+    "updating": {"fem", "metrics"},
     "datasets": {"fem"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
@@ -56,7 +57,7 @@ def test_private_scikit_learn_is_imported_in_one_place(path):
 def test_import_loads_no_optional_package():
     code = (
         "import sys, skthermo, skthermo.fem, skthermo.preprocessing, skthermo.surrogate, skthermo.detection, "
-        "skthermo.metrics, skthermo.datasets; print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') "
+        "skthermo.metrics, skthermo.datasets, skthermo.updating; print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') "
         "if m in sys.modules])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -164,7 +164,9 @@ def solve_beside_modes(
         if not going.all():
             found[:, columns[~going]] = (x + residuals)[:, ~going]
             x, searches, residuals = x[:, going], searches[:, going], residuals[:, going]
-            columns, squares, previous, enough, shifts = (v[going] for v in (columns, squares, previous, enough, shifts))
+            columns, squares, previous, enough, shifts = (
+                v[going] for v in (columns, squares, previous, enough, shifts)
+            )
             if not columns.size:
                 break
         searches = residuals + squares / previous * searches

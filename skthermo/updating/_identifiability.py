@@ -89,13 +89,13 @@ def identifiability(
     >>> from skthermo.updating import identifiability
     >>> known = identifiability(make_truss(), noise=0.001)
     >>> known.deviations.round(4)
-    bottom      0.0084
-    top         0.0111
-    diagonal    0.0042
-    vertical    0.0281
+    bottom      0.0066
+    top         0.0088
+    diagonal    0.0025
+    vertical    0.1386
     dtype: float64
     >>> known.recommended
-    ['diagonal', 'top', 'vertical', 'bottom']
+    ['diagonal', 'bottom', 'top']
     """
     names = list(model.parameter_names)
     S = sensitivity(model, theta, method="exact" if hasattr(model, "jacobian") else "central")
@@ -104,6 +104,8 @@ def identifiability(
         raise ValueError(f"noise is {deviations}; expected it positive for all modes, or zero for all")
     if (dofs is None) != (shape_noise is None):
         raise ValueError("expected both dofs and shape_noise, or neither")
+    if dofs is not None and not deviations.any():
+        raise ValueError("noise is 0; expected it positive where shapes are measured too")
     level = np.sqrt(np.mean(deviations**2))
     rows = S.to_numpy() * (level / deviations if level else np.ones(model.n_modes))[:, np.newaxis]
     if dofs is not None:
@@ -136,8 +138,10 @@ def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_
 
 
 def _deviations(rows: Array, level: float) -> Array:
-    variances = np.diagonal(cramer_rao(rows.T @ rows))
-    return np.where(np.isinf(variances), np.inf, np.sqrt(variances) * level)
+    deviations = np.sqrt(np.diagonal(cramer_rao(rows.T @ rows)))
+    known = np.isfinite(deviations)
+    deviations[known] *= level
+    return deviations
 
 
 def _recommended(rows: Array, order: NDArray[np.intp], level: float) -> NDArray[np.intp]:

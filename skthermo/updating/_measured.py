@@ -70,7 +70,9 @@ def read_measured(
     wrong = np.argwhere(~(np.isnan(F) | ((F > 0) & np.isfinite(F))))
     if wrong.size:
         row, column = wrong[0]
-        raise ValueError(f"frequency {names[column]!r} of record {row} is {F[row, column]}; expected Hz above 0, or NaN")
+        raise ValueError(
+            f"frequency {names[column]!r} of record {row} is {F[row, column]}; expected Hz above 0, or NaN"
+        )
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
     places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
@@ -112,7 +114,9 @@ def real_shapes(shapes: NDArray) -> Array:
     """Real parts of complex shapes, each turned by the phase that makes its real part largest."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
-    lost = np.linalg.norm(np.nan_to_num(turned.imag), axis=0) / np.linalg.norm(np.nan_to_num(shapes), axis=0).clip(1e-300)
+    lost = np.linalg.norm(np.nan_to_num(turned.imag), axis=0) / np.linalg.norm(np.nan_to_num(shapes), axis=0).clip(
+        1e-300
+    )
     warnings.warn(
         f"shapes are complex: each is turned to its largest real part and the rest, up to {lost.max():.1%} of a "
         "shape's length, is left out",

@@ -62,18 +62,12 @@ def sensitivity(
     --------
     >>> from skthermo.datasets import make_truss
     >>> from skthermo.updating import sensitivity
-    >>> S = sensitivity(make_truss())
-    >>> S.loc["f1"].round(3)
-    bottom      0.265
-    top         0.179
-    diagonal    0.055
+    >>> sensitivity(make_truss()).loc["f1"].round(3)
+    bottom      0.233
+    top         0.212
+    diagonal    0.054
     vertical    0.001
     Name: f1, dtype: float64
-
-    Frequencies rise with the root of all stiffness together:
-
-    >>> S.sum(axis=1).round(3).unique()
-    array([0.5])
     """
     row = nominal_theta(len(model.parameter_names)) if theta is None else check_one_theta(theta, model.parameter_names)
     frequencies = solve(model, row)[0]

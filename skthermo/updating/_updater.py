@@ -132,7 +132,7 @@ class ModelUpdater(BaseEstimator):
     >>> updater.theta_.round(4)
     array([0.9 , 1.1 , 0.95, 1.05])
     >>> updater.model_.frequencies(np.ones((1, 4))).round(2)
-    array([[ 7.42, 27.26, 37.62, 62.04, 67.2 , 95.86]])
+    array([[ 7.43, 26.97, 37.14, 61.39, 67.72, 93.27]])
     """
 
     _parameter_constraints: dict = {
@@ -229,7 +229,9 @@ class ModelUpdater(BaseEstimator):
         outcomes = self._run(residuals, bounds)
         best = min(outcomes, key=lambda outcome: outcome.objective)
         if not np.isfinite(best.objective):
-            raise ValueError(f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds")
+            raise ValueError(
+                f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds"
+            )
 
         self.theta_ = best.theta
         self.model_ = _rescaled(self.model, best.theta)
@@ -250,7 +252,9 @@ class ModelUpdater(BaseEstimator):
                 f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, NaN where not measured"
             )
         if shapes is not None and not isinstance(self.model, AffineModel):
-            raise ValueError(f"shapes were given, but {self.model!r} cannot differentiate its own; expected an AffineModel")
+            raise ValueError(
+                f"shapes were given, but {self.model!r} cannot differentiate its own; expected an AffineModel"
+            )
         n_dof = getattr(self.model, "n_dof", 0)
         names = column_names(table, "f")
         return read_measured(values, names, shapes, dofs, frequency_std, self.shape_weight, n_dof)
@@ -306,12 +310,12 @@ class ModelUpdater(BaseEstimator):
             unlike = self.table_["mac_after"] < SAME_MODE
             if unlike.any():
                 warnings.warn(
-                    f"no mode of the optimum is like the measured shapes of {list(names[unlike])} (MAC below {SAME_MODE})",
+                    f"no mode of the optimum is like the measured shapes of {names[unlike].tolist()} (MAC below {SAME_MODE})",
                     UserWarning,
                     stacklevel=3,
                 )
         if len(swapped):
-            warnings.warn(f"modes {list(swapped)} {message}{expected}", UserWarning, stacklevel=3)
+            warnings.warn(f"modes {swapped.tolist()} {message}{expected}", UserWarning, stacklevel=3)
 
     def __sklearn_clone__(self) -> "ModelUpdater":
         return clone_sharing_models(self)

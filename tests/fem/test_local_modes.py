@@ -1,0 +1,122 @@
+"""Derivatives of mode shapes, and models rescaled to another nominal state."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, mac, shape_jacobian
+from tests.fem.frames import portal
+
+ROW = np.array([0.9, 1.15, 1.05, 0.85])
+
+
+def building_frame(n_modes=5):
+    folder = os.environ.get("SKTHERMO_DATA")
+    if not folder:
+        pytest.skip("SKTHERMO_DATA is not set")
+    data = scipy.io.loadmat(Path(folder) / "building_frame" / "ConcreteBuildingFrame.mat")
+    names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
+    return AffineModel({(name,): data[name] for name in names}, data["M0"], n_modes=n_modes)
+
+
+def central_differences(model, row, shapes, step):
+    """Of shapes, each with the sign of those given."""
+    differences = []
+    for unit in np.eye(len(row)):
+        ends = [model.modes([row + way * step * unit])[1][0] for way in (1, -1)]
+        raised, lowered = (end * np.sign((end * shapes).sum(axis=0)) for end in ends)
+        differences.append((raised - lowered) / (2 * step))
+    return np.stack(differences, axis=2)
+
+
+MODELS = {
+    "truss": make_truss,
+    "truss, all but two modes": lambda: make_truss(n_modes=21),
+    "dense frame": lambda: portal(3, track=True),
+    "sparse frame": portal,
+    "sparse tracked frame": lambda: portal(track=True),
+    "reduced frame": lambda: portal(track=True).reduced(0.3, random_state=0),
+}
+
+
+@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+def test_shape_derivatives_equal_central_differences(make):
+    model = make()
+    shapes, derivatives = shape_jacobian(model, ROW)
+    expected = central_differences(model, ROW, shapes, 1e-4)
+    scale = np.abs(expected).max(axis=(0, 2), keepdims=True)
+    np.testing.assert_allclose(derivatives / scale, expected / scale, atol=1e-4)
+    some = [5, 2]
+    np.testing.assert_allclose(np.abs(shape_jacobian(model, ROW, some)[1]), np.abs(derivatives[some]), rtol=1e-9)
+
+
+def test_shape_derivatives_of_a_real_model_with_massless_degrees_of_freedom():
+    model, random = building_frame(), np.random.default_rng(0)
+    row, direction = random.uniform(0.8, 1.2, 14), random.standard_normal(14)
+    shapes, derivatives = shape_jacobian(model, row)
+    ends = [model.modes([row + way * 1e-4 * direction])[1][0] for way in (1, -1)]
+    raised, lowered = (end * np.sign((end * shapes).sum(axis=0)) for end in ends)
+    expected = (raised - lowered) / 2e-4
+    scale = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(derivatives @ direction / scale, expected / scale, atol=1e-4)
+
+
+@pytest.mark.parametrize("track", [False, True])
+def test_shapes_of_the_jacobian_are_the_models_columns(track):
+    model = portal(3, track=track)
+    row = np.array([0.3, 3.0, 0.4, 0.2])
+    shapes, _ = shape_jacobian(model, row)
+    np.testing.assert_allclose(np.diagonal(mac(shapes, model.modes([row])[1][0])), 1)
+
+
+def test_unit_modal_mass_is_kept_where_mass_varies():
+    model = portal(3)
+    shapes, derivatives = shape_jacobian(model, ROW)
+    step = 1e-5
+    for p, unit in enumerate(np.eye(4)):
+        mass = model.matrices(ROW + step * unit)[1]
+        moved = shapes + step * derivatives[:, :, p]
+        np.testing.assert_allclose(np.diag(moved.T @ (mass @ moved)), 1, atol=1e-8)
+
+
+@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+def test_a_rescaled_model_is_the_same_structure_seen_from_another_theta(make):
+    model = make()
+    origin, theta = np.array([0.95, 1.05, 1.1, 0.9]), np.array([[1.0, 1.0, 1.0, 1.0], [0.9, 1.1, 0.95, 1.05]])
+    twin = model.rescaled(origin)
+    assert twin.parameter_names == model.parameter_names
+    assert twin.track == model.track
+    np.testing.assert_allclose(twin.frequencies(theta), model.frequencies(theta * origin), rtol=1e-9)
+    np.testing.assert_allclose(twin.jacobian(theta), model.jacobian(theta * origin) * origin, rtol=1e-5, atol=1e-9)
+    again = twin.rescaled(1 / origin)
+    np.testing.assert_allclose(again.frequencies(theta), model.frequencies(theta), rtol=1e-9)
+
+
+def test_damage_and_rescaling_commute():
+    model = portal(3, track=True)
+    one = model.damaged({"columns": 0.3}).rescaled(ROW)
+    other = model.rescaled(ROW).damaged({"columns": 0.3})
+    theta = [[1.0, 0.9, 1.1, 1.0]]
+    np.testing.assert_allclose(one.frequencies(theta), other.frequencies(theta), rtol=1e-12)
+    np.testing.assert_allclose(
+        one.frequencies(theta), model.damaged({"columns": 0.3}).frequencies(theta * ROW), rtol=1e-12
+    )
+
+
+def test_columns_of_a_rescaled_model_stay_the_nominal_modes_where_modes_swap():
+    """Two masses on springs of their own: the first mode is the second one's frequency away from nominal."""
+    stiffness = {("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 1.5])}
+    model = AffineModel(stiffness, {("m",): np.eye(2)}, n_modes=2, track=True)
+    twin = model.rescaled([2.0, 1.0, 0.5])
+    nominal = np.ones((1, 3))
+    np.testing.assert_allclose((2 * np.pi * twin.frequencies(nominal)) ** 2, [[4.0, 3.0]])
+    np.testing.assert_allclose(np.diagonal(twin.likeness(twin.modes(nominal)[1])[0]), 1)
+
+
+def test_rescaling_takes_one_theta():
+    with pytest.raises(ValueError, match="2 rows; expected one"):
+        make_truss().rescaled(np.ones((2, 4)))

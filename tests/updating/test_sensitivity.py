@@ -1,0 +1,122 @@
+"""Sensitivities and what they say of identifiability."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel
+from skthermo.updating import identifiability, select_parameters, sensitivity
+from tests.fem.frames import FRAME
+from tests.fem.test_local_modes import building_frame
+
+THETA = [0.9, 1.1, 1.05, 0.95]
+
+
+@pytest.mark.parametrize("model", [make_truss(), FRAME], ids=["truss", "sparse frame"])
+@pytest.mark.parametrize("theta", [None, THETA])
+def test_exact_sensitivities_equal_central_differences(model, theta):
+    exact = sensitivity(model, theta)
+    central = sensitivity(model, theta, method="central", step=1e-4)
+    pd.testing.assert_frame_equal(exact, central, rtol=0, atol=1e-6)
+    assert list(exact.columns) == list(model.parameter_names)
+    assert list(exact.index) == [f"f{i}" for i in range(1, 7)]
+
+
+def test_exact_sensitivities_of_a_real_model_equal_central_differences():
+    model = building_frame()
+    pd.testing.assert_frame_equal(
+        sensitivity(model), sensitivity(model, method="central", step=1e-3), rtol=0, atol=1e-5
+    )
+
+
+def test_sensitivities_sum_to_a_half_where_parameters_hold_all_stiffness():
+    model = building_frame()
+    np.testing.assert_allclose(sensitivity(model).sum(axis=1), 0.5, atol=1e-8)
+
+
+def test_a_power_law_has_its_exponents_as_sensitivities():
+    exponents = np.array([[0.5, -0.5], [0.2, 1.0], [0.0, 0.1]])
+    model = CallableModel(lambda theta: np.exp(np.log(theta) @ exponents.T), ["k", "m"], 3, vectorized=True)
+    S = sensitivity(model, [0.7, 2.0], method="central", step=1e-4)
+    np.testing.assert_allclose(S, exponents, atol=1e-7)
+    assert select_parameters(S) == ["k", "m"]
+    assert select_parameters(S, threshold=0.6) == ["m"]
+    assert select_parameters(S, threshold=2.0) == []
+    known = identifiability(model, [0.7, 2.0], noise=0.01)
+    covariance = np.linalg.inv(exponents.T @ exponents) * 0.01**2
+    np.testing.assert_allclose(known.deviations, np.sqrt(np.diag(covariance)), rtol=1e-4)
+    values = np.linalg.svd(exponents, compute_uv=False)
+    np.testing.assert_allclose(known.singular_values, values, rtol=1e-4)
+    assert known.condition_number == pytest.approx(values[0] / values[1], rel=1e-4)
+
+
+def test_errors_of_sensitivities():
+    model = CallableModel(lambda row: row[:1], ["k", "m"], 1)
+    with pytest.raises(ValueError, match="no method 'jacobian'; expected one that has, or method='central'"):
+        sensitivity(model)
+    with pytest.raises(ValueError, match="expected 'exact' or 'central'"):
+        sensitivity(make_truss(), method="forward")
+    with pytest.raises(ValueError, match="step is 0"):
+        sensitivity(model, method="central", step=0)
+    with pytest.raises(ValueError, match="2 rows"):
+        sensitivity(model, np.ones((2, 2)), method="central")
+    with pytest.warns(UserWarning, match="no modes"), pytest.raises(ValueError, match="expected numbers"):
+        sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1), method="central")
+    with pytest.raises(ValueError, match="expected a DataFrame"):
+        select_parameters(np.ones((2, 2)))
+
+
+def series_of_springs():
+    """Two of the four springs act in parallel, so that nothing tells them apart; the mass hides in all."""
+    unit = np.diag([1.0, 0.0])
+    stiffness = {("a",): 2 * unit, ("twin",): unit, ("b",): np.array([[1.0, -1.0], [-1.0, 1.0]])}
+    return AffineModel(stiffness, {("m",): np.eye(2)}, n_modes=2)
+
+
+def test_parameters_that_act_alike_are_collinear_and_have_no_deviation():
+    known = identifiability(series_of_springs(), noise=0.001)
+    assert known.collinear == [["a", "twin"]]
+    assert np.isinf(known.deviations).all()  # the mass makes four unknowns of two frequencies
+    assert known.condition_number == np.inf
+    assert len(known.recommended) == 2
+    assert not {"a", "twin"} <= set(known.recommended)
+
+
+def test_what_only_some_parameters_share_leaves_the_others_known():
+    model = AffineModel(
+        {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])},
+        np.eye(3),
+        n_modes=3,
+    )
+    known = identifiability(model, noise=0.001)
+    assert np.isinf(known.deviations[["a", "twin"]]).all()
+    assert known.deviations["b"] == pytest.approx(2 * 0.001 / np.sqrt(2))
+    assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
+
+
+def test_noise_that_varies_weights_the_modes():
+    model, noise = make_truss(), np.array([1, 2, 3, 1, 2, 3]) / 1000
+    known = identifiability(model, noise=noise)
+    rows = known.sensitivity.to_numpy() / noise[:, np.newaxis]
+    np.testing.assert_allclose(known.deviations, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))), rtol=1e-9)
+    same = identifiability(model, noise=0.002)
+    np.testing.assert_allclose(same.singular_values, np.linalg.svd(same.sensitivity, compute_uv=False))
+    with pytest.raises(ValueError, match="positive for all modes, or zero for all"):
+        identifiability(model, noise=[0.0, *noise[1:]])
+
+
+def test_shapes_add_information():
+    model, dofs = make_truss(), np.arange(0, 20, 3)
+    without = identifiability(model, noise=0.001).deviations
+    known = identifiability(model, noise=0.001, dofs=dofs, shape_noise=0.01)
+    assert (known.deviations < without).all()
+    nothing = identifiability(model, noise=0.001, dofs=dofs, shape_noise=1e6)
+    np.testing.assert_allclose(nothing.deviations, without, rtol=1e-6)
+    with pytest.raises(ValueError, match="both dofs and shape_noise"):
+        identifiability(model, noise=0.001, dofs=dofs)
+    with pytest.raises(ValueError, match="shape_noise is 0"):
+        identifiability(model, noise=0.001, dofs=dofs, shape_noise=0)
+    other = CallableModel(model.frequencies, model.parameter_names, 6, vectorized=True)
+    with pytest.raises(ValueError, match="expected an AffineModel"):
+        identifiability(other, noise=0.001, dofs=dofs, shape_noise=0.01)
