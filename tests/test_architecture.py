@@ -57,8 +57,8 @@ def test_private_scikit_learn_is_imported_in_one_place(path):
 def test_import_loads_no_optional_package():
     code = (
         "import sys, skthermo, skthermo.fem, skthermo.preprocessing, skthermo.surrogate, skthermo.detection, "
-        "skthermo.metrics, skthermo.datasets, skthermo.updating; print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') "
-        "if m in sys.modules])"
+        "skthermo.metrics, skthermo.datasets, skthermo.updating; "
+        "print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') if m in sys.modules])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert loaded.stdout.strip() == "[]"

@@ -61,7 +61,7 @@ class LocalModes:
         return self._model._at_dofs(dofs, self._shapes)
 
     def derivatives(self, columns: NDArray[np.intp], dofs: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Derivatives of some modes' frequencies (n_columns, n_parameters) and shapes (n_dofs, n_columns, n_parameters).
+        """Derivatives of modes' frequencies (n_columns, n_parameters) and shapes (n_dofs, n_columns, n_parameters).
 
         With b = -(dK - lambda_j dM) phi_j, the derivative of phi_j is x of (K - lambda_j M) x = b in M-orthogonal
         parts: (phi_k' b) / (lambda_k - lambda_j) along every other mode at hand, -1/2 phi_j' dM phi_j along phi_j

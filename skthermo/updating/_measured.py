@@ -114,14 +114,13 @@ def real_shapes(shapes: NDArray) -> Array:
     """Real parts of complex shapes, each turned by the phase that makes its real part largest."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
-    lost = np.linalg.norm(np.nan_to_num(turned.imag), axis=0) / np.linalg.norm(np.nan_to_num(shapes), axis=0).clip(
-        1e-300
-    )
+    lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
+    lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
     warnings.warn(
         f"shapes are complex: each is turned to its largest real part and the rest, up to {lost.max():.1%} of a "
         "shape's length, is left out",
         UserWarning,
-        stacklevel=5,
+        stacklevel=7,  # past scikit-learn's wrapper of fit
     )
     return np.where(np.isnan(shapes), np.nan, turned.real)
 
@@ -136,8 +135,8 @@ def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tu
     array = np.asarray(shapes)
     if array.shape != (len(places), n_modes):
         raise ValueError(
-            f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a column "
-            "for each mode of F"
+            f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
+            "column for each mode of F"
         )
     array = real_shapes(array) if np.iscomplexobj(array) else as_floats(array)
     for name, column in zip(names, array.T, strict=True):

@@ -55,7 +55,7 @@ def _least_squares(at, residuals: Residuals, bounds: Array, start: Array, max_it
         loss=residuals.loss,
         ftol=TOLERANCE,
         xtol=TOLERANCE,
-        gtol=None,
+        gtol=np.finfo(float).eps,
         max_nfev=max_iter,
     )
 

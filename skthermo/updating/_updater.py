@@ -223,7 +223,7 @@ class ModelUpdater(BaseEstimator):
                 f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
                 "equally well; expected fewer parameters, shapes, or a prior",
                 UserWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
         residuals = Residuals(self.model, measured, prior)
         outcomes = self._run(residuals, bounds)
@@ -249,7 +249,8 @@ class ModelUpdater(BaseEstimator):
         n_modes = self.model.n_modes
         if values.shape[1] > n_modes or (shapes is None and values.shape[1] != n_modes):
             raise ValueError(
-                f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, NaN where not measured"
+                f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, "
+                "NaN where one was not measured"
             )
         if shapes is not None and not isinstance(self.model, AffineModel):
             raise ValueError(
@@ -310,12 +311,13 @@ class ModelUpdater(BaseEstimator):
             unlike = self.table_["mac_after"] < SAME_MODE
             if unlike.any():
                 warnings.warn(
-                    f"no mode of the optimum is like the measured shapes of {names[unlike].tolist()} (MAC below {SAME_MODE})",
+                    f"no mode of the optimum is like the measured shapes of {names[unlike].tolist()} "
+                    f"(MAC below {SAME_MODE})",
                     UserWarning,
-                    stacklevel=3,
+                    stacklevel=4,
                 )
         if len(swapped):
-            warnings.warn(f"modes {swapped.tolist()} {message}{expected}", UserWarning, stacklevel=3)
+            warnings.warn(f"modes {swapped.tolist()} {message}{expected}", UserWarning, stacklevel=4)
 
     def __sklearn_clone__(self) -> "ModelUpdater":
         return clone_sharing_models(self)

@@ -10,6 +10,7 @@ import argparse
 import os
 import time
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from unittest import mock
 
@@ -44,7 +45,7 @@ def tower(n_storeys=8, n_elements=3):
         names = [first, *((group, first, i) for i in range(1, n_elements)), last]
         for i, name in enumerate(names):
             nodes[name] = tuple(np.add(start, np.subtract(end, start) * i / n_elements))
-        for one, other in zip(names, names[1:], strict=False):
+        for one, other in pairwise(names):
             members[one, other] = Beam(one, other, **section)
             groups.setdefault(group, []).append((one, other))
 

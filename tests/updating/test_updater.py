@@ -133,10 +133,12 @@ def test_a_false_match_of_swapped_modes_is_refused():
     assert frequencies[0, 0] > frequencies[0, 1]
     np.testing.assert_allclose(ModelUpdater(tracked, bounds=0.6).fit(frequencies).theta_, truth, rtol=1e-6)
 
+    bounds, F = [[0.9, 1.6], [0.6, 1.01], [0.5, 1.5]], np.sqrt([[1.3, 1.5, 9.0]]) / (2 * np.pi)
+    honest = ModelUpdater(tracked, bounds=bounds, n_starts=8, random_state=0).fit(F)
+    np.testing.assert_allclose(honest.theta_, [1.3, 1.01, 1.0], atol=1e-4)
     with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] swap places .* expected a model with track=True"):
-        false = ModelUpdater(sorted_, bounds=[[1.3, 1.6], [0.6, 0.95], [0.5, 1.5]], n_starts=1)
-        false.bounds = [[0.99, 1.6], [0.6, 1.01], [0.5, 1.5]]
-        false.fit(np.sort(frequencies) * [[0.9, 0.9, 1.0]])
+        false = ModelUpdater(sorted_, bounds=bounds, n_starts=8, random_state=0).fit(F)
+    assert false.starts_["objective"].min() < 1e-9 < honest.starts_["objective"].min()
     with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] are by their shapes other modes"):
         updater = ModelUpdater(sorted_, bounds=0.6).fit(frequencies, shapes=np.eye(3), dofs=[0, 1, 2])
     np.testing.assert_allclose(updater.theta_, truth, rtol=1e-6)
@@ -144,9 +146,6 @@ def test_a_false_match_of_swapped_modes_is_refused():
 
 
 def test_shapes_that_the_model_does_not_have_are_named():
-    shapes = np.eye(3)
-    shapes[:, 2] = [1.0, 1.0, 1.0]
-    shapes[:, 1] = [1.0, -1.0, 1.0]
     with pytest.warns(UserWarning, match=r"no mode .* shapes of \['f3'\] \(MAC below 0.5\)"):
         ModelUpdater(oscillators(True)).fit(
             oscillators(True).frequencies([np.ones(3)]), shapes=[[1, 0, 1], [0, 1, 1], [0, 0, 0.3]], dofs=[0, 1, 2]
@@ -213,7 +212,11 @@ def test_bounds_are_kept_and_reached(method):
     bounds = np.array([[0.95, 1.05], [0.95, 1.05], [0.5, 1.5], [0.5, 1.5]])
     updater = ModelUpdater(TRUSS, bounds=bounds, method=method).fit(TRUSS.frequencies([TRUTH]))
     assert ((updater.theta_ >= bounds[:, 0]) & (updater.theta_ <= bounds[:, 1])).all()
-    np.testing.assert_allclose(updater.theta_[:2], [0.95, 1.05], atol=1e-5)
+    assert updater.theta_[0] == pytest.approx(0.95, abs=1e-5)
+    bounds[0, 0] = 0.96
+    tighter = ModelUpdater(TRUSS, bounds=bounds, method=method).fit(TRUSS.frequencies([TRUTH]))
+    assert tighter.theta_[0] == pytest.approx(0.96, abs=1e-5)
+    assert tighter.starts_["objective"].min() > updater.starts_["objective"].min()
 
 
 def two_wells():
@@ -277,7 +280,7 @@ def test_the_updater_follows_scikit_learn():
 def test_the_updated_model_composes_with_the_chain():
     year = make_truss_campaign(random_state=0)
     updater = ModelUpdater(TRUSS).fit(year.frequencies)
-    np.testing.assert_allclose(updater.model_.frequencies([np.ones(4)])[0], year.frequencies.mean(), rtol=2e-3)
+    np.testing.assert_allclose(updater.model_.frequencies([np.ones(4)])[0], year.frequencies.mean(), rtol=5e-3)
     fem = DataInformedFEM(updater.model_, inverse=InverseSurrogate(bounds=0.2, n_samples=200), random_state=0)
     assert fem.fit(year.temperatures, year.frequencies).score(year.temperatures, year.frequencies) > 0
     assert sensitivity(updater.model_).shape == (6, 4)
