@@ -101,7 +101,7 @@ def report(model, options):
     dofs = np.sort(random.choice(moving(model), N_DOFS, replace=False))
     truth, frequencies, shapes = measure(model, dofs, random)
     known = identifiability(model, truth, noise=FREQUENCY_NOISE, dofs=dofs, shape_noise=SHAPE_NOISE)
-    updater, seconds = fit(model, dofs, frequencies, shapes, n_starts=options.starts)
+    updater, seconds = fit(model, dofs, frequencies, shapes, n_starts=options.starts, method=options.method)
     starts = updater.starts_
     found = (starts["objective"] <= NEAR_BEST * starts["objective"].min()).to_numpy()
     deviations = known.deviations.to_numpy()
@@ -144,6 +144,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--method", choices=["least_squares", "lbfgs"], default="least_squares")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     if folder := os.environ.get("SKTHERMO_DATA"):
