@@ -116,7 +116,7 @@ def plot_a3(ours):
         image = ax.imshow(table, cmap="RdBu_r", vmin=-0.45, vmax=0.45, aspect="auto")
         for (row, column), value in np.ndenumerate(table.to_numpy()):
             if abs(value) >= 0.005:
-                colour = "white" if abs(value) > 0.3 else "black"
+                colour = "white" if abs(value) > 0.25 else "black"
                 ax.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
         ax.set_xticks(range(6), MODES)
         ax.set_yticks(range(len(table)), table.index)

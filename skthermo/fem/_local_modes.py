@@ -78,6 +78,8 @@ class LocalModes:
         along = np.tensordot(self._shapes.T, forces, axes=1)
         own = (columns, np.arange(len(columns)))
         d_frequencies = -along[own] / (8 * np.pi**2 * self.frequencies[columns, np.newaxis])
+        if not len(dofs):
+            return d_frequencies, np.empty((0, *d_frequencies.shape))
 
         gaps = self._eigenvalues[:, np.newaxis] - eigenvalues
         apart = np.abs(gaps) > REPEATED * eigenvalues

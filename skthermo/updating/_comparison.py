@@ -62,11 +62,6 @@ def mac_table(shapes: Array, measured: Array) -> Array:
     return (measured.T @ shapes) ** 2 / np.where(squares > 0, squares, np.inf)
 
 
-def columns_of(model: AffineModel, theta: Array, *, followed: bool) -> NDArray[np.intp]:
-    """Which of the lowest modes at theta are the model's columns, followed from nominal or sorted."""
-    return LocalModes.followed(model, theta)[1] if followed else np.arange(model.n_modes)
-
-
 def _by_column(model: FEModel, measured: Measured, row: Array) -> Counterparts:
     def derivatives() -> tuple[Array, Array]:
         exact = hasattr(model, "jacobian")
@@ -84,6 +79,5 @@ def _by_shape(model: AffineModel, measured: Measured, theta: Array) -> Counterpa
     with_shape = measured.has_shape
     alike[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
     ranks = linear_sum_assignment(np.nan_to_num(alike), maximize=True)[1]
-    return Counterparts(
-        modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, measured.dofs)
-    )
+    felt = measured.dofs if measured.shape_weights.any() else measured.dofs[:0]
+    return Counterparts(modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, felt))

@@ -1,7 +1,6 @@
 """FE model updating."""
 
 import warnings
-from functools import partial
 from numbers import Integral, Real
 from typing import Literal
 
@@ -23,19 +22,15 @@ from skthermo._validation import (
     is_model,
     validate_data,
 )
-from skthermo.fem import AffineModel, CallableModel, FEModel
+from skthermo.fem import AffineModel, FEModel
 from skthermo.fem._sampling import check_bounds
-from skthermo.fem._tracking import SAME_MODE, share_reordered
-from skthermo.updating._comparison import columns_of, counterparts, macs
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
+from skthermo.updating._report import false_matches, modes_table, rescaled, starts_table
 from skthermo.updating._residuals import Residuals
 
 Array = NDArray[np.float64]
-
-SAME_OPTIMUM = 1e-3
-"""Largest difference of multipliers at which two starts have ended at the same optimum."""
 
 
 class ModelUpdater(BaseEstimator):
@@ -234,11 +229,12 @@ class ModelUpdater(BaseEstimator):
             )
 
         self.theta_ = best.theta
-        self.model_ = _rescaled(self.model, best.theta)
-        self.starts_ = _starts_table(outcomes)
+        self.model_ = rescaled(self.model, best.theta)
+        self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
-        self.table_ = _modes_table(self.model, measured, best.theta)
-        self._warn_of_false_matches(measured)
+        self.table_ = modes_table(self.model, measured, best.theta)
+        for message in false_matches(self.model, measured, best.theta):
+            warnings.warn(message, UserWarning, stacklevel=3)
         return self
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
@@ -289,36 +285,6 @@ class ModelUpdater(BaseEstimator):
         starts = np.vstack([np.ones(len(bounds)), drawn])
         return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
 
-    def _warn_of_false_matches(self, measured: Measured) -> None:
-        """Say which columns of the updated model are other modes than those measured."""
-        names = np.array(measured.names)
-        if measured.shapes is None:
-            if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):
-                return
-            if isinstance(self.model, AffineModel):
-                followed = columns_of(self.model, self.theta_, followed=True)
-                swapped = names[(followed != np.arange(len(followed)))[measured.columns]]
-            else:
-                swapped = names[: len(names) if share_reordered(self.model, self.theta_[np.newaxis]) else 0]
-            message = "swap places between the nominal model and the optimum, and a sorted column fits another mode's "
-            expected = "frequency: expected a model with track=True, or shapes"
-        else:
-            ranks = counterparts(self.model, measured, self.theta_).ranks
-            columns = columns_of(self.model, self.theta_, followed=self.model.track)[measured.columns]
-            swapped = names[ranks != columns]
-            message = "are by their shapes other modes of the optimum than the columns of model_ with their numbers: "
-            expected = "expected measured modes in the model's order, or track=True where modes swap"
-            unlike = self.table_["mac_after"] < SAME_MODE
-            if unlike.any():
-                warnings.warn(
-                    f"no mode of the optimum is like the measured shapes of {names[unlike].tolist()} "
-                    f"(MAC below {SAME_MODE})",
-                    UserWarning,
-                    stacklevel=4,
-                )
-        if len(swapped):
-            warnings.warn(f"modes {swapped.tolist()} {message}{expected}", UserWarning, stacklevel=4)
-
     def __sklearn_clone__(self) -> "ModelUpdater":
         return clone_sharing_models(self)
 
@@ -326,44 +292,3 @@ class ModelUpdater(BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
-
-
-def _modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
-    table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
-    states = {
-        "before": counterparts(model, measured, np.ones_like(theta)),
-        "after": counterparts(model, measured, theta),
-    }
-    for name, modes in states.items():
-        table[name] = modes.frequencies
-    for name, modes in states.items():
-        table[f"error_{name}"] = 100 * (modes.frequencies / measured.frequencies - 1)
-    if measured.shapes is not None:
-        for name, modes in states.items():
-            table[f"mac_{name}"] = macs(modes.shapes, measured.shapes)
-    return table
-
-
-def _starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
-    table = pd.DataFrame(outcomes)
-    optima: list[Array] = []
-    numbers = np.empty(len(outcomes), dtype=int)
-    for i in np.argsort(table["objective"], kind="stable"):
-        theta = outcomes[i].theta
-        near = [number for number, known in enumerate(optima) if np.abs(theta - known).max() < SAME_OPTIMUM]
-        if not near:
-            near = [len(optima)]
-            optima.append(theta)
-        numbers[i] = near[0]
-    return table.assign(optimum=numbers)
-
-
-def _rescaled(model: FEModel, theta: Array) -> FEModel:
-    if hasattr(model, "rescaled"):
-        return model.rescaled(theta)
-    function = partial(_frequencies_from, model, theta)
-    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
-
-
-def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
-    return model.frequencies(origin * theta)

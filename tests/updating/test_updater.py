@@ -152,6 +152,14 @@ def test_shapes_that_the_model_does_not_have_are_named():
         )
 
 
+def test_measured_modes_in_another_order_are_found_by_their_shapes():
+    dofs, order = np.arange(0, 23, 3), [1, 0, 2, 4, 3, 5]
+    frequencies, shapes = measured(TRUSS, TRUTH, dofs)
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2', 'f4', 'f5'\] are by their shapes other modes"):
+        updater = ModelUpdater(TRUSS).fit(frequencies[order], shapes=shapes[:, order], dofs=dofs)
+    np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
+
+
 def test_a_mode_pushed_up_is_found_among_more_modes_than_measured():
     truth = np.array([1.0, 1.0, 0.15])
     model = oscillators(False, n_modes=2)

@@ -1,0 +1,94 @@
+"""What model updating has found."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo.fem import AffineModel, CallableModel, FEModel
+from skthermo.fem._local_modes import LocalModes
+from skthermo.fem._tracking import SAME_MODE, share_reordered
+from skthermo.updating._comparison import counterparts, macs
+from skthermo.updating._measured import Measured
+from skthermo.updating._optimise import Outcome
+
+Array = NDArray[np.float64]
+
+SAME_OPTIMUM = 1e-3
+"""Largest difference of multipliers at which two starts have ended at the same optimum."""
+
+
+def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
+    table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
+    states = {
+        "before": counterparts(model, measured, np.ones_like(theta)),
+        "after": counterparts(model, measured, theta),
+    }
+    for name, modes in states.items():
+        table[name] = modes.frequencies
+    for name, modes in states.items():
+        table[f"error_{name}"] = 100 * (modes.frequencies / measured.frequencies - 1)
+    if measured.shapes is not None:
+        for name, modes in states.items():
+            table[f"mac_{name}"] = macs(modes.shapes, measured.shapes)
+    return table
+
+
+def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
+    table = pd.DataFrame(outcomes)
+    optima: list[Array] = []
+    numbers = np.empty(len(outcomes), dtype=int)
+    for i in np.argsort(table["objective"], kind="stable"):
+        theta = outcomes[i].theta
+        near = [number for number, known in enumerate(optima) if np.abs(theta - known).max() < SAME_OPTIMUM]
+        if not near:
+            near = [len(optima)]
+            optima.append(theta)
+        numbers[i] = near[0]
+    return table.assign(optimum=numbers)
+
+
+def rescaled(model: FEModel, theta: Array) -> FEModel:
+    if hasattr(model, "rescaled"):
+        return model.rescaled(theta)
+    function = partial(_frequencies_from, model, theta)
+    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
+
+
+def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
+    return model.frequencies(origin * theta)
+
+
+def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
+    """What is to be said of measured modes that are other modes than the updated model's columns."""
+    names = np.array(measured.names)
+    if measured.shapes is None:
+        swapped = names[_swapped(model, theta)[measured.columns]]
+        if swapped.size:
+            yield (
+                f"modes {swapped.tolist()} swap places between the nominal model and the optimum, and a sorted column "
+                "fits another mode's frequency: expected a model with track=True, or shapes"
+            )
+        return
+    modes = counterparts(model, measured, theta)
+    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < SAME_MODE)]
+    if unlike.size:
+        yield f"no mode of the optimum is like the measured shapes of {unlike.tolist()} (MAC below {SAME_MODE})"
+    columns = LocalModes.followed(model, theta)[1] if model.track else np.arange(model.n_modes)
+    other = names[modes.ranks != columns[measured.columns]]
+    if other.size:
+        yield (
+            f"modes {other.tolist()} are by their shapes other modes of the optimum than the columns of model_ with "
+            "their numbers: expected measured modes in the model's order, or track=True where modes swap"
+        )
+
+
+def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
+    """Columns that hold another mode at theta than at the nominal parameters."""
+    if getattr(model, "track", True) or not hasattr(model, "modes"):
+        return np.zeros(model.n_modes, bool)
+    if isinstance(model, AffineModel):
+        return LocalModes.followed(model, theta)[1] != np.arange(model.n_modes)
+    return np.full(model.n_modes, share_reordered(model, theta[np.newaxis]) > 0)
