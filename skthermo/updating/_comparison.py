@@ -46,9 +46,9 @@ class Counterparts:
 
 def counterparts(model: FEModel, measured: Measured, theta: Array) -> Counterparts:
     """Modes paired by their shapes where some were measured, else column by column."""
-    if measured.shapes is None:
-        return _by_column(model, measured, theta[np.newaxis])
-    return _by_shape(model, measured, theta)
+    if measured.dofs.size and isinstance(model, AffineModel):
+        return _by_shape(model, measured, theta)
+    return _by_column(model, measured, theta[np.newaxis])
 
 
 def macs(shapes: Array, measured: Array) -> Array:
@@ -64,8 +64,8 @@ def mac_table(shapes: Array, measured: Array) -> Array:
 
 def _by_column(model: FEModel, measured: Measured, row: Array) -> Counterparts:
     def derivatives() -> tuple[Array, Array]:
-        exact = hasattr(model, "jacobian")
-        gradient = model.jacobian(row)[0] if exact else central_jacobian(model, row, DIFFERENCE_STEP)
+        jacobian = getattr(model, "jacobian", None)
+        gradient = jacobian(row)[0] if jacobian else central_jacobian(model, row, DIFFERENCE_STEP)
         return gradient[measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
     frequencies = solve(model, row)[0, measured.columns]

@@ -23,10 +23,10 @@ class Measured:
         Which modes of the records they are.
     frequencies, deviations : ndarray of shape (n_measured,)
         Mean over records in Hz, NaN where only the shape was measured; and what residuals are divided by.
-    shapes : ndarray of shape (n_dofs, n_measured) or None
+    shapes : ndarray of shape (n_dofs, n_measured)
         Of unit length, NaN where only the frequency was measured.
     dofs : ndarray of int of shape (n_dofs,)
-        Where the shapes were measured.
+        Where the shapes were measured; none where no shapes were.
     shape_weights : ndarray of shape (n_measured,)
         Zero where no shape was measured.
     """
@@ -35,7 +35,7 @@ class Measured:
     columns: NDArray[np.intp]
     frequencies: Array
     deviations: Array
-    shapes: Array | None
+    shapes: Array
     dofs: NDArray[np.intp]
     shape_weights: Array
 
@@ -47,7 +47,7 @@ class Measured:
     @property
     def has_shape(self) -> NDArray[np.bool_]:
         """Modes with a measured shape."""
-        return np.zeros(len(self.names), bool) if self.shapes is None else np.isfinite(self.shapes[0])
+        return _given(self.shapes)
 
     @property
     def n_residuals(self) -> int:
@@ -78,10 +78,12 @@ def read_measured(
     places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
     weights = _per_mode(shape_weight, n_modes, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
-        raise ValueError(f"shape_weight is {shape_weight}; expected finite numbers, none negative")
-    if unit is None and weights.any():
-        raise ValueError(f"shape_weight is {shape_weight} but no shapes were given; expected shapes, or a weight of 0")
-    with_shape = np.zeros(n_modes, bool) if unit is None else np.isfinite(unit[0])
+        raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
+    if not places.size and weights.any():
+        raise ValueError(
+            f"shape_weight is {shape_weight!r} but no shapes were given; expected shapes, or a weight of 0"
+        )
+    with_shape = _given(unit)
     columns = np.flatnonzero((counts > 0) | with_shape)
     if not columns.size:
         raise ValueError(f"F is NaN in all {len(F)} records of all {n_modes} modes; expected a measured frequency")
@@ -90,7 +92,7 @@ def read_measured(
         columns=columns,
         frequencies=means[columns],
         deviations=_read_deviations(frequency_std, means, names)[columns],
-        shapes=None if unit is None else unit[:, columns],
+        shapes=unit[:, columns],
         dofs=places,
         shape_weights=np.where(with_shape, weights, 0.0)[columns],
     )
@@ -125,12 +127,17 @@ def real_shapes(shapes: NDArray) -> Array:
     return np.where(np.isnan(shapes), np.nan, turned.real)
 
 
-def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tuple[NDArray[np.intp], Array | None]:
+def _given(shapes: Array) -> NDArray[np.bool_]:
+    """Which columns were measured: all NaN, or no rows at all, were not."""
+    return np.asarray(np.isfinite(shapes).any(axis=0))
+
+
+def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tuple[NDArray[np.intp], Array]:
     if (shapes is None) != (dofs is None):
         given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
         raise ValueError(f"{given} were given without {missing}; expected both, or neither")
     if shapes is None:
-        return np.empty(0, dtype=np.intp), None
+        return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
     places = check_dofs(dofs, n_dof)
     array = np.asarray(shapes)
     if array.shape != (len(places), n_modes):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from skthermo.fem import AffineModel, CallableModel, FEModel
 from skthermo.fem._local_modes import LocalModes
+from skthermo.fem._protocol import ModalModel
 from skthermo.fem._tracking import SAME_MODE, share_reordered
 from skthermo.updating._comparison import counterparts, macs
 from skthermo.updating._measured import Measured
@@ -30,7 +32,7 @@ def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFram
         table[name] = modes.frequencies
     for name, modes in states.items():
         table[f"error_{name}"] = 100 * (modes.frequencies / measured.frequencies - 1)
-    if measured.shapes is not None:
+    if measured.dofs.size:
         for name, modes in states.items():
             table[f"mac_{name}"] = macs(modes.shapes, measured.shapes)
     return table
@@ -51,7 +53,7 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
 
 
 def rescaled(model: FEModel, theta: Array) -> FEModel:
-    if hasattr(model, "rescaled"):
+    if isinstance(model, AffineModel):
         return model.rescaled(theta)
     function = partial(_frequencies_from, model, theta)
     return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
@@ -64,7 +66,7 @@ def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
 def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
     """What is to be said of measured modes that are other modes than the updated model's columns."""
     names = np.array(measured.names)
-    if measured.shapes is None:
+    if not (measured.dofs.size and isinstance(model, AffineModel)):
         swapped = names[_swapped(model, theta)[measured.columns]]
         if swapped.size:
             yield (
@@ -90,5 +92,5 @@ def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
     if getattr(model, "track", True) or not hasattr(model, "modes"):
         return np.zeros(model.n_modes, bool)
     if isinstance(model, AffineModel):
-        return LocalModes.followed(model, theta)[1] != np.arange(model.n_modes)
-    return np.full(model.n_modes, share_reordered(model, theta[np.newaxis]) > 0)
+        return np.asarray(LocalModes.followed(model, theta)[1] != np.arange(model.n_modes))
+    return np.full(model.n_modes, share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)
