@@ -100,9 +100,9 @@ class ModelUpdater(BaseEstimator):
     *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
     v = sqrt(2 (n - 1)) / s^2, one over the standard deviation of their residual. Weights thousands of times
     smaller leave a narrow curved valley, in which many evaluations are needed. ``covariance_`` takes weights at
-    their word: it is a statement about theta if ``frequency_std`` and ``shape_weight`` (or 0) are the measurement's, and
-    else only for comparison (without ``frequency_std``, the noise on every frequency counts as 1, or 100 %). It
-    knows neither bounds nor errors of the model itself.
+    their word: it is a statement about theta if ``frequency_std`` and ``shape_weight`` (or 0) are the measurement's,
+    and else only for comparison (without ``frequency_std``, the noise on every frequency counts as 1, or 100 %).
+    It knows neither bounds nor errors of the model itself.
 
     *Method.* A residual of the MAC is quadratic in the error of the shape. The Gauss-Newton matrix is therefore
     that of the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared
