@@ -28,7 +28,8 @@ FEET, REACH = range(2, N_BAYS, 4), 2
 CONNECTION_LENGTH = 1.6
 PIPES = (0.25, 0.385, 0.615, 0.75)
 N_PANELS = 4
-STIFFENER_SPACING = 0.6
+END_STIFFNESS = 1.4
+STIFFENER_SPACING = 0.5
 NU = 0.3
 STEEL_DENSITY, BALLAST_DENSITY = 7850.0, 1500.0
 SUPPORTS = {(0, 0): "xyz", (0, N_PANELS): "yz", (N_BAYS, 0): "xyz", (N_BAYS, N_PANELS): "yz"}
@@ -62,7 +63,7 @@ def kw51_structure() -> Structure:
     hangers = [hanger(foot, head, line) for line in SIDES for foot in FEET for head in heads(foot)]
     parts = {
         "girders": beams("girder", (along_deck(line) for line in SIDES), T_BEAM),
-        "transverse_beams": beams("transverse beam", ([("deck", s, n) for n in LINES] for s in STATIONS), T_BEAM),
+        "transverse_beams": transverse_beams(),
         "stiffeners": stiffeners(),
         "plate": membranes("plate", E=STEEL_E, t=PLATE_T, density=STEEL_DENSITY),
         "ballast": membranes("ballast", E=BALLAST_E, t=BALLAST_T, density=BALLAST_DENSITY),
@@ -118,11 +119,22 @@ def hanger(foot: int, head: int, line: int) -> list[Node]:
     return [("deck", foot, line), *joints, on_arch(head, line)]
 
 
-def beams(part: str, chains: Iterable[Sequence[Node]], section: Section) -> dict[Node, Beam]:
-    """Beams along chains of nodes."""
+def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffness: float = 1.0) -> dict[Node, Beam]:
+    """Beams along chains of nodes, of steel or something stiffer."""
+    material = STEEL | {modulus: stiffness * STEEL[modulus] for modulus in ("E", "G")}
     return {
-        (part, start, end): Beam(start, end, **STEEL, **section) for chain in chains for start, end in pairwise(chain)
+        (part, start, end): Beam(start, end, **material, **section)
+        for chain in chains
+        for start, end in pairwise(chain)
     }
+
+
+def transverse_beams() -> dict[Node, Beam]:
+    """Across the deck at every station; those at the ends are stiffer."""
+    lines = [[("deck", station, line) for line in LINES] for station in STATIONS]
+    first, *inner, last = lines
+    ends = beams("transverse beam", [first, last], T_BEAM, END_STIFFNESS)
+    return beams("transverse beam", inner, T_BEAM) | ends
 
 
 def stiffeners() -> dict[Node, Beam]:
