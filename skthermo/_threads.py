@@ -1,6 +1,6 @@
 """Small matrices and small networks run on one BLAS thread each."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
@@ -44,15 +44,16 @@ def single_blas_thread() -> Iterator[None]:
                 _limits = None
 
 
-def map_on_blas_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
     """Map with as many Python threads as BLAS has, one BLAS thread in each.
 
-    Whoever limits BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limits this too.
+    Whoever limits BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limits this too. Closing the
+    iterator waits for what runs and leaves the rest.
     """
-    items = list(items)
     n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
     with single_blas_thread():
         if min(n_threads, len(items)) < 2:
-            return [function(item) for item in items]
-        with ThreadPoolExecutor(n_threads) as pool:
-            return list(pool.map(function, items))
+            yield from map(function, items)
+        else:
+            with ThreadPoolExecutor(n_threads) as pool:
+                yield from pool.map(function, items)

@@ -19,7 +19,7 @@ from skthermo.fem._affine_input import (
 )
 from skthermo.fem._eigen import eigen_form, hertz
 from skthermo.fem._stability import check_supported, count_modes
-from skthermo.fem._terms import CHUNK_BYTES, ROWS_PER_CHUNK, AffineTerms, DenseTerms, SparseTerms
+from skthermo.fem._terms import CHUNK_BYTES, AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import check_one_theta, check_theta, nominal_theta, warn_of_failures
 from skthermo.fem._tracking import may_be_missed, pair_modes, repeated
 
@@ -158,7 +158,7 @@ class AffineModel:
     def rows_per_chunk(self) -> int:
         """How many samples are solved at once, so that memory stays bounded."""
         numbers = max(self._stiffness.n_entries, 2 * self._stiffness.n_dof * self.n_modes)
-        return max(1, min(ROWS_PER_CHUNK, CHUNK_BYTES // (8 * numbers)))
+        return max(1, min(self._stiffness.most_rows, CHUNK_BYTES // (8 * numbers)))
 
     @property
     def prefer(self) -> str:
@@ -376,14 +376,21 @@ class AffineModel:
             gradient -= eigenvalues[:, :, np.newaxis] * self._mass.gradients(theta, shapes)
         return (gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis]),)
 
-    def _read(self, theta: ArrayLike) -> Array:
-        """Rows of theta at which the model may be solved."""
-        return check_theta(theta, self.parameter_names)
-
     def _in_chunks(self, solve, theta: ArrayLike) -> tuple[Array, ...]:
-        rows = self._read(theta)
+        rows = check_theta(theta, self.parameter_names)
         size = self.rows_per_chunk
         parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
         results = tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
-        warn_of_failures(rows, results[0])
+        self._warn_of(rows, results[0])
         return results
+
+    def _frequencies_of_chunk(self, theta: Array) -> Array:
+        """Frequencies of checked rows, without a warning."""
+        return self._frequencies(theta)[0]
+
+    def _warn_of(self, theta: Array, solved: Array) -> None:
+        self._warn_of_bounds(theta)
+        warn_of_failures(theta, solved, stacklevel=5)
+
+    def _warn_of_bounds(self, theta: Array) -> None:
+        """A model that is good everywhere has nothing to say."""

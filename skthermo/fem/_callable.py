@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo.fem._affine_input import check_different, check_n_modes
 from skthermo.fem._solved import SolvedSamples
+from skthermo.fem._terms import ROWS_PER_CHUNK
 from skthermo.fem._theta import by_name, check_theta, failures_named
+
+ROWS_PER_TASK = 32
+"""Of a program that solves row by row: few, so that many workers share them and progress is seen."""
 
 
 class CallableModel:
@@ -91,6 +95,11 @@ class CallableModel:
     def cache(self) -> Path | None:
         """The file that keeps solved rows."""
         return None if self._samples is None else self._samples.path
+
+    @property
+    def rows_per_chunk(self) -> int:
+        """How many samples are one task, where many are solved."""
+        return ROWS_PER_CHUNK if self.vectorized else ROWS_PER_TASK
 
     def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:
         """Natural frequencies.

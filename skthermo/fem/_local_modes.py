@@ -34,7 +34,8 @@ class LocalModes:
 
     def __init__(self, model: AffineModel, theta: ArrayLike, n_candidates: int | None = None):
         self._model = model
-        self._theta = check_one_theta(model._read(theta), model.parameter_names)
+        self._theta = check_one_theta(theta, model.parameter_names)
+        model._warn_of_bounds(self._theta)
         self._wanted = min(n_candidates or model.n_modes + GUARD_MODES, model._most_candidates)
         if isinstance(model._form, ShiftInvertForm):
             self._eigenvalues, self._shapes, self._factors = model._form.factored_modes(self._theta, self._wanted)

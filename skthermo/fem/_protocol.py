@@ -25,7 +25,10 @@ class FEModel(Protocol):
     - ``jacobian(theta)``, d f / d theta in Hz, (n_samples, n_modes, n_parameters);
     - ``damaged({group: severity})``, a new model with the groups' stiffness times (1 - severity);
     - ``groups``, the names that ``damaged`` knows;
-    - ``track``, whether a column follows its mode (True) or its rank (False).
+    - ``track``, whether a column follows its mode (True) or its rank (False);
+    - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box;
+    - ``rows_per_chunk`` and ``prefer``, how many samples make a task, and joblib's hint what tasks are best spread
+      over.
 
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.
     """

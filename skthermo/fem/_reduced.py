@@ -240,7 +240,7 @@ class ReducedModel(AffineModel):
             self._project(orthonormal(snapshots, stiffness, drop=max(self._tol / 100, LEAST_ENERGY)))
             candidates = self._draw(random, CANDIDATES_PER_ROUND)
             errors = self._estimated_errors(candidates, factors)
-            if errors.max() < self._tol / 10:
+            if errors.max() < self._tol / 4:
                 candidates = self.check_points_ = self._draw(random, CHECKS)
                 errors = self._errors(candidates)
                 self.error_ = float(errors.max())
@@ -299,18 +299,16 @@ class ReducedModel(AffineModel):
         errors = np.where(np.isnan(full), 0.0, np.abs(self.frequencies(theta) / full - 1))
         return np.nan_to_num(errors, nan=np.inf).max(axis=1)
 
-    def _read(self, theta: ArrayLike) -> Array:
-        rows = super()._read(theta)
+    def _warn_of_bounds(self, theta: Array) -> None:
         lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
-        outside = ((rows < lowest) | (rows > highest)).any(axis=1)
+        outside = ((theta < lowest) | (theta > highest)).any(axis=1)
         if outside.any():
             warnings.warn(
-                f"{outside.sum()} of {len(rows)} theta are outside the bounds for which the model was reduced, row "
+                f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
                 f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
                 UserWarning,
-                stacklevel=4,
+                stacklevel=5,
             )
-        return rows
 
 
 def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:

@@ -1,7 +1,9 @@
 """Monte Carlo sampling of FE models."""
 
+from collections.abc import Callable, Generator
+from contextlib import closing
 from numbers import Integral
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
@@ -9,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._threads import single_blas_thread
+from skthermo._progress import watched
+from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import ROWS_PER_CHUNK
 from skthermo.fem._theta import check_theta, warn_of_failures
@@ -61,6 +64,7 @@ def sample(
     *,
     method: Literal["uniform", "lhs", "sobol"] = "uniform",
     n_jobs: int | None = None,
+    progress: bool | None = None,
     random_state: RandomState = None,
 ) -> Bunch:
     """Frequencies of an FE model at random parameters.
@@ -78,6 +82,8 @@ def sample(
         where ``n_samples`` is a power of 2).
     n_jobs : int, optional
         Jobs over which chunks of rows are spread, through joblib.
+    progress : bool, optional
+        Whether a bar on stderr tells how far it is. By default on a terminal, once a second has passed.
     random_state : int, RandomState or None, default=None
         Seed. The same seed gives the same bits whatever ``n_jobs`` is.
 
@@ -102,38 +108,53 @@ def sample(
     lowest, highest = check_bounds(bounds, model.parameter_names).T
     if not isinstance(n_samples, Integral) or n_samples < 1:
         raise ValueError(f"n_samples is {n_samples!r}; expected a positive integer")
-    unit = _unit_cube(method, n_samples, len(lowest), check_random_state(random_state))
-    theta = lowest + (highest - lowest) * unit
-    return Bunch(theta=theta, frequencies=solve(model, theta, n_jobs=n_jobs))
+    theta = _unit_cube(method, n_samples, len(lowest), check_random_state(random_state))
+    theta *= highest - lowest
+    theta += lowest
+    return Bunch(theta=theta, frequencies=solve(model, theta, n_jobs=n_jobs, progress=progress))
 
 
-def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None) -> Array:
+def solve(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = False) -> Array:
     """Frequencies (n_samples, n_modes) of many rows; a row of theta with NaN gives NaN.
 
-    Rows are cut into the same chunks whatever ``n_jobs`` is. A model that states its ``rows_per_chunk`` cuts
-    them itself if one job is all, and may state what joblib should ``prefer``.
+    Rows are cut into the same chunks whatever ``n_jobs`` is, of ``rows_per_chunk`` if the model states that; it
+    may also state what joblib should ``prefer``. One job is as many threads as BLAS has, for models of ours.
     """
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
     if not known.size:
         return frequencies
-    stated_size = getattr(model, "rows_per_chunk", None)
-    if stated_size and effective_n_jobs(n_jobs) == 1:
-        frequencies[known] = model.frequencies(rows[known])
-        return frequencies
-    size = stated_size or ROWS_PER_CHUNK
-    chunks = [rows[known[i : i + size]] for i in range(0, len(known), size)]
-    parallel = Parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-    solved = parallel(delayed(_solve_chunk)(model, chunk) for chunk in chunks)
-    frequencies[known] = np.concatenate(solved)
-    warn_of_failures(rows[known], frequencies[known])  # which workers said where nobody hears it
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    places = [known[i : i + size] for i in range(0, len(known), size)]
+    with closing(_solved(model, rows, places, n_jobs)) as parts:
+        for place, part in zip(places, watched(parts, len(known), progress), strict=True):
+            frequencies[place] = part
+    getattr(model, "_warn_of", warn_of_failures)(rows, frequencies)
     return frequencies
 
 
-def _solve_chunk(model: FEModel, theta: Array) -> Array:
+def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
+    """Frequencies at each of the places in their order; the work ends where the generator is closed."""
+    quiet = getattr(model, "_frequencies_of_chunk", None)
+    if quiet and effective_n_jobs(n_jobs) == 1:
+        yield from map_on_blas_threads(lambda place: quiet(rows[place]), places)
+    else:
+        parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        yield from parallel(delayed(_solve_chunk)(quiet or model.frequencies, rows[place]) for place in places)
+
+
+def _parallel(**options: Any) -> Parallel:
+    """Gives results as they come where the active backend can."""
+    try:
+        return Parallel(return_as="generator", **options)
+    except ValueError:  # pools of workers, Ray's among them, give all at the end
+        return Parallel(**options)
+
+
+def _solve_chunk(frequencies: Callable[[Array], Array], theta: Array) -> Array:
     with single_blas_thread():
-        return model.frequencies(theta)
+        return frequencies(theta)
 
 
 def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.random.RandomState) -> Array:

@@ -36,9 +36,8 @@ class ShiftInvertForm:
     def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
         eigenvalues = np.full((len(theta), n_modes), np.nan)
         shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
-        masses = self._mass.assemble(theta[:1] if self._mass.is_constant else theta)
-        for row, stiffness in enumerate(self._stiffness.assemble(theta)):
-            mass = masses[0 if self._mass.is_constant else row]
+        pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
+        for row, (stiffness, mass) in enumerate(pairs):
             eigenvalues[row], vectors = lowest_modes(stiffness, factorise(stiffness), mass, n_modes, self._start)
             if with_shapes:
                 shapes[row] = vectors

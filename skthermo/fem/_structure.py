@@ -217,7 +217,8 @@ class Structure:
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
                 fixed.add((node, direction))
-        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used - fixed]
+        used -= fixed
+        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
         if not free:
             raise ValueError("the supports fix every node in every direction; expected a structure that can move")
         return free

@@ -1,7 +1,7 @@
 """Matrices that are affine in products of the parameters."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -12,6 +12,11 @@ Array = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
 
 ROWS_PER_CHUNK = 256
+"""Most samples solved at once."""
+
+SPARSE_ROWS_PER_CHUNK = 16
+"""Sparse samples are solved one after the other, and a few of them are work enough for a task."""
+
 CHUNK_BYTES = 2**25
 
 
@@ -27,6 +32,7 @@ class AffineTerms(ABC):
     """
 
     n_dof: int
+    most_rows = ROWS_PER_CHUNK
 
     def __init__(self, exponents: NDArray[np.int64], factors: Array | None = None):
         self.exponents = exponents
@@ -70,10 +76,16 @@ class AffineTerms(ABC):
     def weighted_sum(self, weights: Array) -> Matrix:
         """The matrices, each multiplied by a weight, in one."""
 
+    def each(self, theta: Array) -> Iterator[Matrix]:
+        """The summed matrices one after the other; a constant one is summed once."""
+        for i, row in enumerate(theta[:, np.newaxis]):
+            if i == 0 or not self.is_constant:
+                matrix = self.assemble(row)[0]
+            yield matrix
+
     def product(self, theta: Array, vectors: Array) -> Array:
         """The summed matrix of every row times its vectors, (n_samples, n, n_vectors)."""
-        pairs = zip(self.assemble(theta), vectors, strict=True)
-        return np.stack([matrix @ columns for matrix, columns in pairs])
+        return np.stack([matrix @ columns for matrix, columns in zip(self.each(theta), vectors, strict=True)])
 
     @property
     @abstractmethod
@@ -134,6 +146,8 @@ class SparseTerms(AffineTerms):
     The union is stored as compressed sparse columns, so that a sum of terms is one product
     with ``entries`` and has the same pattern whatever theta is.
     """
+
+    most_rows = SPARSE_ROWS_PER_CHUNK
 
     def __init__(
         self,

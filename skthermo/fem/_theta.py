@@ -65,16 +65,16 @@ def check_one_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray
     return row
 
 
-def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64]) -> None:
-    """Say how many rows have no solution, and at which theta the first of them is."""
-    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim)))
+def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64], *, stacklevel: int = 4) -> None:
+    """Say how many known rows have no solution, and at which theta the first of them is."""
+    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
     if failed.any():
         first = np.flatnonzero(failed)[0]
         warnings.warn(
             f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
             f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
             UserWarning,
-            stacklevel=4,
+            stacklevel=stacklevel,
         )
 
 

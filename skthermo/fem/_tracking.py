@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 SAME_MODE = 0.5
 """MAC above which no other mode can be more like the reference, since shapes are orthogonal."""
 
+ROWS_AT_ONCE = 64
+"""Samples whose shapes, at all degrees of freedom, are held at once."""
+
 REPEATED = 1e-6
 """Relative distance of eigenvalues below which rounding decides which shapes they have."""
 
@@ -103,6 +106,11 @@ def repeated(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def share_reordered(model: "ModalModel", theta: NDArray[np.float64]) -> float:
     """Share of the rows of theta at which some column is not its nominal mode any more."""
+    pieces = range(ROWS_AT_ONCE, len(theta), ROWS_AT_ONCE)
+    return float(np.concatenate([_reordered(model, rows) for rows in np.split(theta, pieces)]).mean())
+
+
+def _reordered(model: "ModalModel", theta: NDArray[np.float64]) -> NDArray[np.bool_]:
     shapes = model.modes(theta)[1]
     if hasattr(model, "likeness"):
         likeness = model.likeness(shapes)
@@ -111,7 +119,7 @@ def share_reordered(model: "ModalModel", theta: NDArray[np.float64]) -> float:
         likeness = np.stack([mac(nominal, phi) for phi in shapes])
     swapped = pair_modes(likeness) != np.arange(likeness.shape[1])
     replaced = np.diagonal(likeness, axis1=1, axis2=2) < SAME_MODE
-    return float((swapped | replaced).any(axis=1).mean())
+    return (swapped | replaced).any(axis=1)
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:

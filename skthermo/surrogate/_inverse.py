@@ -23,11 +23,10 @@ from skthermo._validation import (
 from skthermo.fem import FEModel, add_noise
 from skthermo.fem._sampling import solve
 from skthermo.fem._theta import check_theta
-from skthermo.fem._tracking import share_reordered
-from skthermo.surrogate._memory import remembered_sample
+from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
 
-ORDER_CHECKS = 256
+DEFAULT_TOLERANCE = 1e-5
 
 
 class InverseSurrogate(TransformerMixin, MultiplierRegressor):
@@ -51,6 +50,10 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With
         the measurement's noise, M1 learns the posterior mean of the parameters and does not
         amplify that noise, at the price of estimates drawn towards the middle of the box.
+    reduce : bool or float, default=False
+        Whether simulations are of ``model.reduced(bounds)``, which large models are learned from much
+        faster. True allows a relative error of 1e-5 in the frequencies, a number that error.
+        `inverse_transform` stays with the model itself.
     memory : str or joblib.Memory, optional
         Where simulations are kept, so that a search over other settings does not repeat them.
         Processes that want the same simulations wait for the first one. Clear it when the program behind
@@ -98,6 +101,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         "bounds": [Real, "array-like"],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
         "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
         "memory": [str, HasMethods(["cache"]), None],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
@@ -111,6 +115,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         bounds: ArrayLike = 0.3,
         n_samples: int = 1000,
         noise: ArrayLike = 0.0,
+        reduce: bool | float = False,
         memory: str | Memory | None = None,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -120,6 +125,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self.bounds = bounds
         self.n_samples = n_samples
         self.noise = noise
+        self.reduce = reduce
         self.memory = memory
         self.n_jobs = n_jobs
         self.random_state = random_state
@@ -144,7 +150,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         ------
         ValueError
             If there is neither y nor a model, the numbers of modes or parameters are not the
-            model's, the bounds are infeasible, or multipliers of a model are not positive.
+            model's, the bounds are infeasible, multipliers of a model are not positive, or a model
+            that is to be reduced has no method for it.
 
         Warns
         -----
@@ -238,22 +245,29 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 stacklevel=4,
             )
         seed = random.randint(np.iinfo(np.int32).max)
-        drawn = remembered_sample(self.memory, model, self.bounds, self.n_samples, n_jobs=self.n_jobs, seed=seed)
-        self._warn_of_swaps(drawn.theta)
+        tol = self._tolerance()
+        drawn, share_reordered = remembered_simulations(
+            self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed
+        )
+        if share_reordered:
+            warnings.warn(
+                f"modes change their order in {share_reordered:.1%} of {min(self.n_samples, ORDER_CHECKS)} samples of "
+                "the box, and the model sorts them: expected narrower bounds, or a model with track=True",
+                UserWarning,
+                stacklevel=4,
+            )
         self.samples_ = drawn
         self._parameter_names = list(model.parameter_names)
         self._y_is_vector = False
         return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
 
-    def _warn_of_swaps(self, theta: NDArray[np.float64]) -> None:
-        if getattr(self.model, "track", True) or not hasattr(self.model, "modes"):
-            return
-        checked = theta[:ORDER_CHECKS]
-        share = share_reordered(self.model, checked)
-        if share:
-            warnings.warn(
-                f"modes change their order in {share:.1%} of {len(checked)} samples of the box, and the model sorts "
-                "them: expected narrower bounds, or a model with track=True",
-                UserWarning,
-                stacklevel=5,
+    def _tolerance(self) -> float | None:
+        """Relative error of frequencies that a reduced model may have; None for the model itself."""
+        if not self.reduce:
+            return None
+        if not hasattr(self.model, "reduced"):
+            raise ValueError(
+                f"reduce is {self.reduce}, but {self.model!r} has no method 'reduced'; expected a model with one, such "
+                "as AffineModel, or reduce=False"
             )
+        return DEFAULT_TOLERANCE if isinstance(self.reduce, (bool, np.bool_)) else self.reduce

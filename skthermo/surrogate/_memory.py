@@ -12,12 +12,15 @@ from sklearn.utils.validation import check_memory
 
 from skthermo._locks import lock
 from skthermo.fem import FEModel, sample
+from skthermo.fem._tracking import share_reordered
+
+ORDER_CHECKS = 256
 
 
-def remembered_sample(
-    memory: str | Memory | None, model: FEModel, bounds: ArrayLike, n_samples: int, *, n_jobs: int | None, seed: int
-) -> Bunch:
-    """`sample`, looked up in a memory; processes that want the same simulations wait for the first.
+def remembered_simulations(
+    memory: str | Memory | None, model: FEModel, bounds: ArrayLike, n_samples: int, tol: float | None, *, n_jobs, seed
+) -> tuple[Bunch, float]:
+    """`simulations`, looked up in a memory; processes that want the same ones wait for the first.
 
     Raises
     ------
@@ -26,7 +29,7 @@ def remembered_sample(
     """
     memory = check_memory(memory)
     if memory.location is None:
-        return sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
+        return simulations("", model, bounds, n_samples, tol, n_jobs, seed)
     try:
         identity = joblib.hash(model, coerce_mmap=True)
     except PicklingError as error:
@@ -38,8 +41,16 @@ def remembered_sample(
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / f"{identity}.lock", "w") as file:
         lock(file)
-        return memory.cache(_sample, ignore=["model", "n_jobs"])(identity, model, bounds, n_samples, n_jobs, seed)
+        remembered = memory.cache(simulations, ignore=["model", "n_jobs"])
+        return remembered(identity, model, bounds, n_samples, tol, n_jobs, seed)
 
 
-def _sample(identity: str, model: FEModel, bounds: Any, n_samples: int, n_jobs: int | None, seed: int) -> Bunch:
-    return sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
+def simulations(
+    identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, n_jobs: int | None, seed: int
+) -> tuple[Bunch, float]:
+    """A sample, by the reduced model if there is a tolerance, and the share of it in which modes change their order."""
+    if tol is not None:
+        model = model.reduced(bounds, tol=tol, random_state=seed)
+    drawn = sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
+    sorts = not getattr(model, "track", True) and hasattr(model, "modes")
+    return drawn, share_reordered(model, drawn.theta[:ORDER_CHECKS]) if sorts else 0.0

@@ -95,6 +95,11 @@ def test_the_same_theta_gives_the_same_bits_alone_and_among_others():
     np.testing.assert_array_equal(FRAME.frequencies(THETA), alone)
 
 
+def test_no_theta_gives_no_frequencies():
+    assert FRAME.frequencies(np.empty((0, 4))).shape == (0, 6)
+    assert [part.shape for part in FRAME.modes(np.empty((0, 4)))] == [(0, 6), (0, FRAME.n_dof, 6)]
+
+
 def test_sparse_massless_degrees_of_freedom_have_no_modes():
     mass = scipy.sparse.diags_array(np.where(np.arange(300) % 3, 0.0, 1.0))
     model = AffineModel({("k",): chain(300)}, mass, n_modes=4)

@@ -11,6 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, add_noise, sample
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper, paper_network
+from tests.fem.frames import FRAME
 
 TRUSS = make_truss()
 QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
@@ -101,6 +102,43 @@ def test_simulations_are_remembered(tmp_path):
     assert CALLS == [50]
     InverseSurrogate(model, LinearRegression(), **(settings | {"random_state": 1})).fit()
     assert CALLS == [50, 50]
+
+
+FRAME_SETTINGS = {"bounds": 0.1, "n_samples": 200, "random_state": 0}
+
+
+def test_a_reduced_model_teaches_what_the_full_one_teaches():
+    theta = np.random.default_rng(3).uniform(0.92, 1.08, (20, 4))
+    measured = FRAME.frequencies(theta)
+    estimates = {}
+    for reduce in (False, True, 1e-3):
+        inverse = InverseSurrogate(FRAME, QUADRATIC, reduce=reduce, **FRAME_SETTINGS).fit()
+        estimates[reduce] = inverse.transform(measured)
+        np.testing.assert_array_equal(inverse.inverse_transform(theta), measured)
+    error = {reduce: np.abs(estimate / estimates[False] - 1).max() for reduce, estimate in estimates.items()}
+    assert 0 < error[True] < error[1e-3]
+    np.testing.assert_allclose(estimates[True], estimates[False], rtol=1e-3)
+
+
+def test_reduced_simulations_are_remembered_apart(tmp_path, monkeypatch):
+    settings = FRAME_SETTINGS | {"n_samples": 30, "memory": str(tmp_path)}
+    full, reduced = (
+        InverseSurrogate(FRAME, Ridge(), reduce=reduce, **settings).fit().samples_ for reduce in (False, True)
+    )
+    np.testing.assert_array_equal(full.theta, reduced.theta)
+    np.testing.assert_allclose(full.frequencies, reduced.frequencies, rtol=1e-5)
+    assert (full.frequencies != reduced.frequencies).any()
+    monkeypatch.setattr(AffineModel, "reduced", None)  # which nobody calls again
+    again = InverseSurrogate(FRAME, Ridge(), reduce=True, **settings).fit().samples_
+    np.testing.assert_array_equal(again.frequencies, reduced.frequencies)
+
+
+def test_only_what_can_be_reduced_is():
+    program = CallableModel(counted, TRUSS.parameter_names, 6, vectorized=True)
+    with pytest.raises(ValueError, match=r"reduce is True, but CallableModel.* has no method 'reduced'; expected"):
+        InverseSurrogate(program, Ridge(), reduce=True).fit()
+    with pytest.raises(ValueError, match="'reduce' parameter of InverseSurrogate must be"):
+        InverseSurrogate(TRUSS, Ridge(), reduce=2.0).fit()
 
 
 def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):

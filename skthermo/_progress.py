@@ -1,0 +1,57 @@
+"""How far a long computation is, as a line of text."""
+
+import multiprocessing
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator
+
+from numpy.typing import NDArray
+
+SILENT_SECONDS = 1.0
+SECONDS_BETWEEN = 0.1
+WIDTH = 30
+
+
+def watched(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
+    """The same arrays, while a bar on stderr tells how many of all their rows have come.
+
+    With ``shown=None`` only on a terminal, once a second has passed, and only from the main thread of the main
+    process: bars of several workers would overwrite each other.
+    """
+    if shown is False or (shown is None and not _somebody_watches()):
+        yield from parts
+        return
+    start = time.monotonic()
+    drawn, next_time, done = False, start + (0.0 if shown else SILENT_SECONDS), 0
+    try:
+        for part in parts:
+            done += len(part)
+            now = time.monotonic()
+            if now >= next_time or (drawn and done == n_rows):
+                sys.stderr.write("\r" + bar(done, n_rows, now - start))
+                sys.stderr.flush()
+                drawn, next_time = True, now + SECONDS_BETWEEN
+            yield part
+    finally:
+        if drawn:
+            sys.stderr.write("\n")
+
+
+def bar(done: int, total: int, seconds: float) -> str:
+    """One line: share, rows, time passed and time left.
+
+    Examples
+    --------
+    >>> bar(250, 1000, 60)
+    ' 25 % |#######-----------------------| 250 of 1000 samples in 60 s, 180 s left   '
+    """
+    filled = int(WIDTH * done / total)
+    left = f", {seconds * (total / done - 1):.0f} s left" if done < total else ""
+    drawing = "#" * filled + "-" * (WIDTH - filled)
+    return f"{100 * done // total:3d} % |{drawing}| {done} of {total} samples in {seconds:.0f} s{left}   "
+
+
+def _somebody_watches() -> bool:
+    is_main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return is_main and sys.stderr is not None and sys.stderr.isatty()

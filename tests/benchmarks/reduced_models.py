@@ -1,0 +1,117 @@
+"""Large frames, reduced and not, against a loop of scipy.sparse.linalg.eigsh.
+
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
+
+On the exported building frame, if SKTHERMO_DATA names the folder that has it, and on a tied-arch bridge. The loop
+solves ready-made matrices, some of the samples only, and is scaled up; making the basis and checking it counts as
+part of every reduced sample. Medians of several rounds in one run.
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+import scipy.sparse.linalg
+from bridges import frame_bridge
+from measure import median_seconds, peak_megabytes
+
+from skthermo.fem import AffineModel, sample
+
+BOUNDS = 0.3
+
+
+def building_frame():
+    """2302 degrees of freedom, 913 of them massless, and 14 parameters."""
+    content = scipy.io.loadmat(Path(os.environ["SKTHERMO_DATA"]) / "building_frame" / "ConcreteBuildingFrame.mat")
+    names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
+    return AffineModel({(name,): content[name] for name in names}, content["M0"])
+
+
+def draw(model, n_samples, seed, inside=1.0):
+    share = np.random.default_rng(seed).uniform(-1, 1, (n_samples, len(model.parameter_names)))
+    return 1 + inside * BOUNDS * share
+
+
+def central_differences(model, theta, step=1e-4):
+    differences = [
+        (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit)) / (2 * step)
+        for unit in np.eye(theta.shape[1])
+    ]
+    return np.stack(differences, axis=2)
+
+
+def compare(model, options):
+    """Accuracy and speed of one frame."""
+    reduced = model.reduced(BOUNDS, random_state=0)
+    print(f"{reduced}, {len(reduced.snapshot_points_)} snapshots")
+    fresh = draw(model, options.fresh, seed=1)
+    error = np.abs(reduced.frequencies(fresh) / model.frequencies(fresh) - 1).max()
+    print(f"largest relative error at {options.fresh} fresh points: {error:.1e}")
+
+    theta, inner = draw(model, 1000, seed=2), draw(model, 100, seed=3, inside=0.99)
+    matrices = [model.matrices(row) for row in theta[: options.loop]]
+    n_modes = model.n_modes
+    ways = {
+        "loop of eigsh": lambda: [scipy.sparse.linalg.eigsh(K, n_modes, M, sigma=0) for K, M in matrices],
+        "full model": lambda: model.frequencies(theta[: options.loop]),
+        "making the basis": lambda: model.reduced(BOUNDS, random_state=0),
+        "1000 reduced samples": lambda: reduced.frequencies(theta),
+        "exact Jacobian": lambda: model.jacobian(inner[:5]),
+        "central differences": lambda: central_differences(model, inner[:5]),
+        "reduced exact Jacobian": lambda: reduced.jacobian(inner),
+        "reduced central differences": lambda: central_differences(reduced, inner),
+    }
+    seconds = median_seconds(ways, options.rounds)
+    loop, full = (seconds[name] / options.loop for name in ("loop of eigsh", "full model"))
+    basis, solve = seconds["making the basis"], seconds["1000 reduced samples"] / 1000
+    print(f"milliseconds a solve: loop {1e3 * loop:.1f}, full model {1e3 * full:.1f}, reduced {1e3 * solve:.3f}")
+    print(f"making the basis: {basis:.2f} s")
+    for n_samples in (1000, 10_000, 100_000):
+        ratio = n_samples * loop / (basis + n_samples * solve)
+        print(f"{n_samples:6d} samples, basis included: {basis + n_samples * solve:6.2f} s, {ratio:.1f} times the loop")
+    for kind in ("", "reduced "):
+        ratio = seconds[f"{kind}central differences"] / seconds[f"{kind}exact Jacobian"]
+        print(f"{kind}exact Jacobian, {len(model.parameter_names)} parameters: {ratio:.1f} times central differences")
+
+
+def compare_workers(model, options):
+    """Two loky processes against one."""
+    ways = {
+        n_jobs: lambda n_jobs=n_jobs: sample(model, BOUNDS, options.workers, n_jobs=n_jobs, random_state=0)
+        for n_jobs in (1, 2)
+    }
+    ways[2]()  # starts the processes
+    seconds = median_seconds(ways, options.rounds)
+    ratio = seconds[1] / seconds[2]
+    print(f"{options.workers} full samples: {seconds[1]:.2f} s, two workers {seconds[2]:.2f} s, {ratio:.2f} times")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bridge", type=int, nargs=3, default=[40, 4, 9], help="bays, elements a member, stringers")
+    parser.add_argument("--fresh", type=int, default=500, help="points at which the error is measured")
+    parser.add_argument("--loop", type=int, default=100, help="samples of the loop")
+    parser.add_argument("--workers", type=int, default=400, help="full samples of two workers")
+    parser.add_argument("--memory", type=int, default=1_000_000, help="samples whose memory is measured")
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    frames = {"tied-arch bridge": frame_bridge(*options.bridge)}
+    if os.environ.get("SKTHERMO_DATA"):
+        frames = {"building frame": building_frame()} | frames
+    for name, model in frames.items():
+        print(f"\n{name}")
+        compare(model, options)
+        compare_workers(model, options)
+    print(f"\npeak memory of the {name}")
+    print(f"making the basis: {peak_megabytes(lambda: model.reduced(BOUNDS, random_state=0)):.0f} MB")
+    reduced = model.reduced(BOUNDS, random_state=0)
+    for n_samples in (options.memory // 100, options.memory // 10, options.memory):
+        peak = peak_megabytes(lambda n=n_samples: sample(reduced, BOUNDS, n, random_state=0))
+        result = 8e-6 * n_samples * (len(model.parameter_names) + model.n_modes)
+        print(f"{n_samples} reduced samples: {peak:.0f} MB, {result:.0f} MB of them the result")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+"""How cost grows with samples, degrees of freedom and parameters: tables, and the guide's figure.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/scaling.py --figure docs/images/scaling.png
+
+Tied-arch bridges of all sizes, and the 28-bar truss, with bounds of 30 %, on one core.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from bridges import frame_bridge
+from measure import median_seconds
+
+from skthermo.datasets import make_truss
+from skthermo.fem import sample
+
+BOUNDS = 0.3
+SIZES = [(4, 1, 1), (6, 2, 1), (10, 2, 3), (16, 3, 4), (24, 4, 5), (40, 4, 9), (48, 5, 9)]
+ZONES = (1, 4, 8, 16)
+BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+
+
+def seconds_of(way, rounds):
+    return median_seconds({"way": way}, rounds)["way"]
+
+
+def by_samples(most, most_full, bridge, rounds):
+    """Seconds of n samples: {name: [(n, seconds), ...]}, the basis included; the largest n is solved once."""
+    model = frame_bridge(*bridge)
+    basis = seconds_of(lambda: model.reduced(BOUNDS, random_state=0), rounds)
+    reduced = model.reduced(BOUNDS, random_state=0)
+    runs = (
+        (f"truss, {make_truss().n_dof} dof", make_truss(), most, 0.0),
+        (f"bridge, {model.n_dof} dof, reduced", reduced, most, basis),
+        (f"bridge, {model.n_dof} dof", model, most_full, 0.0),
+    )
+    table = {}
+    for name, solver, limit, before in runs:
+        counts = [10**k for k in range(2, 7) if 10**k <= limit]
+        ways = {n: lambda n=n, solver=solver: sample(solver, BOUNDS, n, random_state=0) for n in counts}
+        seconds = {n: seconds_of(way, rounds if n < limit else 1) for n, way in ways.items()}
+        table[name] = [(n, before + passed) for n, passed in seconds.items()]
+    return table
+
+
+def costs_of(model, rounds, n_samples):
+    """Milliseconds of a solve and a Jacobian, full and reduced; seconds of the basis and its size."""
+    theta = 1 + 0.99 * BOUNDS * np.random.default_rng(0).uniform(-1, 1, (n_samples, len(model.parameter_names)))
+    reduced = model.reduced(BOUNDS, random_state=0)
+    ways = {
+        "full": lambda: model.frequencies(theta),
+        "Jacobian": lambda: model.jacobian(theta),
+        "reduced": lambda: reduced.frequencies(np.tile(theta, (20, 1))),
+        "basis": lambda: model.reduced(BOUNDS, random_state=0),
+    }
+    seconds = median_seconds(ways, rounds)
+    return {
+        "degrees of freedom": model.n_dof,
+        "parameters": len(model.parameter_names),
+        "full (ms)": 1e3 * seconds["full"] / n_samples,
+        "with Jacobian (ms)": 1e3 * seconds["Jacobian"] / n_samples,
+        "reduced (ms)": 1e3 * seconds["reduced"] / (20 * n_samples),
+        "basis (s)": seconds["basis"],
+        "basis vectors": reduced.basis_size_,
+    }
+
+
+def show(rows):
+    print("   ".join(rows[0]))
+    for row in rows:
+        cells = (f"{v:.3g}" if isinstance(v, float) else str(v) for v in row.values())
+        print("   ".join(f"{cell:>{len(name)}}" for cell, name in zip(cells, row, strict=True)))
+
+
+def plot(samples, sizes, zones):
+    import matplotlib.pyplot as plt
+
+    fig, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
+    for (name, points), marker, colour in zip(samples.items(), "os^", (BLUE, GREEN, ORANGE), strict=True):
+        axes[0].loglog(*zip(*points, strict=True), marker=marker, color=colour, label=name)
+    axes[0].set(xlabel="samples", ylabel="seconds, basis included")
+    for ax, rows, x in ((axes[1], sizes, "degrees of freedom"), (axes[2], zones, "parameters")):
+        for column, marker, colour in (
+            ("full (ms)", "^", ORANGE),
+            ("with Jacobian (ms)", "v", BLUE),
+            ("reduced (ms)", "s", GREEN),
+        ):
+            ax.loglog([r[x] for r in rows], [r[column] for r in rows], marker=marker, color=colour, label=column[:-5])
+        ax.set(xlabel=x, ylabel="milliseconds a solve of 6 modes")
+    axes[2].set_xscale("linear")
+    axes[2].set_title(f"{zones[0]['degrees of freedom']} degrees of freedom", fontsize="medium")
+    for ax in axes:
+        ax.legend(fontsize="small")
+        ax.grid(alpha=0.3)
+    return fig
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--most-samples", type=int, default=1_000_000)
+    parser.add_argument("--most-full", type=int, default=1000, help="samples of the bridge that is not reduced")
+    parser.add_argument("--sizes", type=int, default=len(SIZES), help="how many sizes of the bridge")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--figure", type=Path, help="where the figure goes")
+    options = parser.parse_args()
+    sizes = SIZES[: options.sizes]
+
+    samples = by_samples(options.most_samples, options.most_full, sizes[-2], options.rounds)
+    for name, points in samples.items():
+        print(f"{name}: " + ", ".join(f"{n} in {seconds:.3g} s" for n, seconds in points))
+    by_size = [costs_of(frame_bridge(*size), options.rounds, n_samples=20) for size in sizes]
+    show(by_size)
+    middle = sizes[len(sizes) // 2]
+    by_parameters = [costs_of(frame_bridge(*middle, n_zones=n), options.rounds, 20) for n in ZONES if n <= middle[0]]
+    show(by_parameters)
+    if options.figure:
+        options.figure.parent.mkdir(parents=True, exist_ok=True)
+        plot(samples, by_size, by_parameters).savefig(options.figure, dpi=110)
+        print(f"Figure: {options.figure}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""Long simulations say how far they are, and end when they are interrupted."""
+
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+
+from skthermo._progress import bar
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel, sample
+from skthermo.fem._sampling import solve
+
+TRUSS = make_truss()
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_bar_on_request_counts_every_sample(capsys):
+    drawn = sample(TRUSS, 0.2, 600, progress=True, random_state=0)
+    lines = capsys.readouterr().err.split("\r")
+    assert lines[-1].startswith("100 % |##############################| 600 of 600 samples in ")
+    assert lines[-1].endswith("\n")
+    counts = [int(count) for count in re.findall(r"(\d+) of 600", "".join(lines))]
+    assert counts == sorted(counts)
+    np.testing.assert_array_equal(drawn.frequencies, sample(TRUSS, 0.2, 600, random_state=0).frequencies)
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_while(monkeypatch, n_jobs):
+    for stderr, silence, progress, seen in (
+        (io.StringIO(), 0.0, None, False),
+        (Terminal(), 0.0, None, True),
+        (Terminal(), 0.0, False, False),
+        (Terminal(), 3600.0, None, False),
+    ):
+        monkeypatch.setattr("skthermo._progress.SILENT_SECONDS", silence)
+        monkeypatch.setattr(sys, "stderr", stderr)
+        sample(TRUSS, 0.2, 300, n_jobs=n_jobs, progress=progress, random_state=0)
+        assert bool(stderr.getvalue()) == seen
+
+
+def test_the_bar_says_what_is_left():
+    assert bar(1, 4, 10.0).split("|")[2].strip() == "1 of 4 samples in 10 s, 30 s left"
+    assert "left" not in bar(4, 4, 10.0)
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
+@pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
+def test_every_backend_gives_the_same_bits(backend):
+    """That of multiprocessing, of which Ray's is made, cannot give results as they come."""
+    expected = sample(TRUSS, 0.2, 600, random_state=0).frequencies
+    with joblib.parallel_config(backend, n_jobs=2):
+        np.testing.assert_array_equal(sample(TRUSS, 0.2, 600, random_state=0).frequencies, expected)
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_many_chunks_without_modes_are_one_warning_by_row(n_jobs):
+    model = AffineModel({("k",): np.eye(3), ("force",): -0.5 * np.eye(3)}, np.eye(3), n_modes=2)
+    with pytest.warns(UserWarning, match="of 2000 samples are NaN") as caught:
+        drawn = sample(model, [[0.1, 1.0], [0.9, 1.1]], 2000, n_jobs=n_jobs, random_state=0)
+    failed = np.isnan(drawn.frequencies).any(axis=1)
+    assert len(caught) == 1
+    assert str(caught[0].message).startswith(f"{failed.sum()} of 2000")
+    assert f"(row {np.argmax(failed)})" in str(caught[0].message)
+    assert caught[0].filename == __file__
+
+
+def test_rows_in_a_warning_are_the_callers():
+    model = AffineModel({("k",): np.eye(3), ("force",): -0.5 * np.eye(3)}, np.eye(3), n_modes=2)
+    with pytest.warns(UserWarning, match=r"1 of 3 samples are NaN.*\(row 2\)"):
+        frequencies = solve(model, [[np.nan, 1.0], [1.0, 1.0], [0.4, 1.0]])
+    assert np.isnan(frequencies).all(axis=1).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
+    reduced = TRUSS.reduced(0.1, random_state=0)
+    with pytest.warns(UserWarning, match=r"\d+ of 600 theta are outside the bounds") as caught:
+        sample(reduced, 0.2, 600, n_jobs=n_jobs, random_state=0)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+
+
+def test_rows_of_a_program_are_shared_among_more_workers_than_chunks_of_a_model():
+    row_by_row = CallableModel(lambda row: TRUSS.frequencies([row])[0], TRUSS.parameter_names, 6)
+    assert row_by_row.rows_per_chunk < 50 < TRUSS.rows_per_chunk
+    expected = sample(TRUSS, 0.2, 50, random_state=0).frequencies
+    np.testing.assert_allclose(sample(row_by_row, 0.2, 50, random_state=0).frequencies, expected, rtol=1e-12)
+
+
+ENDLESS = """
+import os, sys, time
+from pathlib import Path
+from skthermo.fem import CallableModel, sample
+
+def endless(row):
+    Path(sys.argv[1], str(os.getpid())).touch()
+    time.sleep(3600)
+
+if __name__ == "__main__":
+    Path(sys.argv[1], "me").write_text(str(os.getpid()))
+    sample(CallableModel(endless, ["E"], 1), 0.2, 1000, n_jobs=2, progress=True, random_state=0)
+"""
+
+
+def processes_of(session):
+    """Processes of a session that still run, by their files in /proc."""
+    running = []
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, its_session = file.read_text().rsplit(")", 1)[1].split()[:4]
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(its_session) == session and state != "Z":
+            running.append(int(file.parent.name))
+    return running
+
+
+def until(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to look for processes")
+@pytest.mark.parametrize("everyone", [False, True], ids=["the process", "Ctrl-C reaches the workers too"])
+def test_an_interrupt_ends_the_work_and_leaves_no_process(tmp_path, everyone):
+    script = tmp_path / "endless.py"
+    script.write_text(ENDLESS)
+    working = tmp_path / "working"
+    working.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(working)], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        assert until(lambda: len(list(working.iterdir())) == 3), process.stderr.read()
+        assert len(processes_of(process.pid)) >= 3
+        (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
+        assert "KeyboardInterrupt" in process.communicate(timeout=60)[1]
+        assert process.returncode
+        assert until(lambda: not processes_of(process.pid)), processes_of(process.pid)
+    finally:
+        for left in processes_of(process.pid):
+            os.kill(left, signal.SIGKILL)
+
+
+def test_an_error_in_a_worker_comes_through():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        broken = CallableModel(_broken, ["E"], 1)
+        with pytest.raises(RuntimeError, match="the program failed at 1"):
+            sample(broken, 0.2, 100, n_jobs=2, random_state=0)
+
+
+def _broken(row):
+    raise RuntimeError(f"the program failed at {row[0]:.0f}")

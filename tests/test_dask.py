@@ -1,0 +1,72 @@
+"""A Dask cluster gives the bits of one process."""
+
+import os
+
+import joblib
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV, KFold
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.fem import CallableModel, sample
+from skthermo.metrics import frequency_scorer
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.fem.frames import FRAME
+
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
+pytestmark = pytest.mark.filterwarnings("default")  # Dask's own warnings are not ours to judge
+
+TRUSS = make_truss()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cluster():
+    """Two workers on this machine; its client."""
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@pytest.mark.parametrize(
+    "model",
+    [TRUSS, FRAME, FRAME.reduced(0.2, random_state=0), CallableModel(FRAME.frequencies, FRAME.parameter_names, 6)],
+    ids=["dense", "sparse", "reduced", "program"],
+)
+def test_samples_are_those_of_one_process(model):
+    n_samples = 600 if model is TRUSS else 40
+    expected = sample(model, 0.2, n_samples, random_state=0)
+    with joblib.parallel_config("dask"):
+        drawn = sample(model, 0.2, n_samples, random_state=0)
+    np.testing.assert_array_equal(drawn.theta, expected.theta)
+    np.testing.assert_array_equal(drawn.frequencies, expected.frequencies)
+
+
+def test_samples_are_solved_by_the_workers(cluster):
+    where = CallableModel(lambda row: [os.getpid()], ["E"], 1)
+    with joblib.parallel_config("dask"):
+        processes = set(sample(where, 0.2, 64, random_state=0).frequencies.ravel())
+    assert processes
+    assert processes <= set(cluster.run(os.getpid).values())
+
+
+def test_a_grid_search_is_that_of_one_process():
+    year = make_truss_campaign(random_state=0)
+    chain = DataInformedFEM(
+        TRUSS,
+        inverse=InverseSurrogate(regressor=Ridge(1e-6), bounds=0.2, n_samples=200),
+        mapper=TemperatureMapper(Ridge()),
+        random_state=0,
+    )
+    grid = {"inverse__noise": [0.0, 0.01], "mapper__regressor__alpha": [0.1, 10.0]}
+    search = GridSearchCV(chain, grid, cv=KFold(3), scoring=frequency_scorer, refit="neg_mape")
+    here = clone(search).fit(year.temperatures, year.frequencies)
+    with joblib.parallel_config("dask"):
+        there = clone(search).fit(year.temperatures, year.frequencies)
+    for scores in ("split0_test_neg_mape", "split1_test_neg_mape", "split2_test_neg_mape"):
+        np.testing.assert_array_equal(there.cv_results_[scores], here.cv_results_[scores])
+    weather = make_truss_campaign(random_state=1).temperatures
+    np.testing.assert_array_equal(there.predict(weather), here.predict(weather))
