@@ -15,6 +15,7 @@ from skthermo.fem._eigen import dense_form
 from skthermo.fem._sampling import check_bounds
 from skthermo.fem._shift_invert import factorise
 from skthermo.fem._theta import check_one_theta, nominal_theta
+from skthermo.fem._tracking import may_be_missed, pair_modes
 
 Array = NDArray[np.float64]
 RandomState = int | np.random.RandomState | None
@@ -267,9 +268,12 @@ class ReducedModel(AffineModel):
         if not len(theta):
             return np.empty((self.n_dof, 0))
         n_snapshots = min(self.n_modes + GUARD_MODES, self._full._most_candidates)
-        shapes = [*self._full._form.modes(theta, n_snapshots)[1]]
+        lowest = self._full._form.modes(theta, n_snapshots)[1]
+        shapes = [*lowest]
         if self.track:
-            shapes += [*self._full.modes(theta)[1]]
+            likeness = self._full._likeness(lowest)
+            elsewhere = may_be_missed(likeness, pair_modes(likeness, self._together), self._together)
+            shapes += [*self._full._modes(theta[elsewhere])[1]] if elsewhere.any() else []
         together = np.hstack(shapes)
         return together[:, np.isfinite(together).all(axis=0)]
 
