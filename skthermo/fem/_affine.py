@@ -147,7 +147,7 @@ class AffineModel:
     @property
     def n_dof(self) -> int:
         """Number of degrees of freedom."""
-        return self._stiffness.n_dof
+        return self._unreduced._stiffness.n_dof
 
     @property
     def track(self) -> bool:
@@ -206,7 +206,7 @@ class AffineModel:
             With unit modal mass; signs are arbitrary.
         """
         frequencies, shapes = self._in_chunks(self._modes, theta)
-        return frequencies, shapes
+        return frequencies, self._expanded(shapes)
 
     def jacobian(self, theta: ArrayLike) -> Array:
         """Exact derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi.
@@ -237,7 +237,7 @@ class AffineModel:
         ndarray of shape (n_samples, n_modes, n_candidates)
             Between 0 and 1.
         """
-        return self._likeness(shapes)
+        return self._unreduced._likeness(shapes)
 
     def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
         """Stiffness and mass at one theta.
@@ -252,7 +252,9 @@ class AffineModel:
         stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
         """
         row = check_one_theta(theta, self.parameter_names)
-        return csc_array(self._stiffness.assemble(row)[0]), csc_array(self._mass.assemble(row)[0])
+        terms = self._unreduced._stiffness, self._unreduced._mass
+        stiffness, mass = (csc_array(term.assemble(row)[0]) for term in terms)
+        return stiffness, mass
 
     def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
         """A new model with less stiffness (or more) in some groups; mass stays.
@@ -325,7 +327,7 @@ class AffineModel:
         """
         from skthermo.fem._reduced import ReducedModel  # which is an AffineModel itself
 
-        return ReducedModel(self, bounds, tol=tol, random_state=random_state)
+        return ReducedModel(self._unreduced, bounds, tol=tol, random_state=random_state)
 
     def __sklearn_clone__(self) -> "AffineModel":
         return self
@@ -335,6 +337,15 @@ class AffineModel:
         parameters, degrees, modes = (f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts)
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
+
+    @property
+    def _unreduced(self) -> "AffineModel":
+        """The model at all degrees of freedom."""
+        return self
+
+    def _expanded(self, shapes: Array) -> Array:
+        """Shapes at all degrees of freedom, from the coordinates that are solved for."""
+        return shapes
 
     def _at_dofs(self, dofs: NDArray[np.intp], shapes: Array) -> Array:
         """What shapes, in the coordinates that are solved for, are at degrees of freedom."""

@@ -111,61 +111,13 @@ class ReducedModel(AffineModel):
         self._grow(np.empty((full.n_dof, 0)), check_random_state(random_state))
 
     @property
-    def n_dof(self) -> int:
-        """Number of degrees of freedom of the full model, at which shapes are given."""
-        return self._full.n_dof
-
-    @property
     def basis_size_(self) -> int:
         """Number of basis vectors."""
         return self._basis.shape[1]
 
-    def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
-        """Natural frequencies, and shapes at all degrees of freedom.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
-
-        Returns
-        -------
-        frequencies : ndarray of shape (n_samples, n_modes)
-            In Hz.
-        shapes : ndarray of shape (n_samples, n_dof, n_modes)
-            With unit modal mass; signs are arbitrary.
-        """
-        frequencies, shapes = super().modes(theta)
-        return frequencies, self._basis @ shapes
-
-    def likeness(self, shapes: Array) -> Array:
-        """Mass-weighted MAC of shapes with the healthy nominal modes.
-
-        Parameters
-        ----------
-        shapes : ndarray of shape (n_samples, n_dof, n_candidates)
-            Mode shapes, of any scale.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_modes, n_candidates)
-            Between 0 and 1.
-        """
-        return self._full.likeness(shapes)
-
-    def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
-        """Stiffness and mass of the full model at one theta.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_parameters,) or (1, n_parameters)
-            Multipliers of the nominal parameters.
-
-        Returns
-        -------
-        stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
-        """
-        return self._full.matrices(theta)
+    @property
+    def _unreduced(self) -> AffineModel:
+        return self._full
 
     def damaged(self, damage: Mapping[str, float]) -> "ReducedModel":
         """A new model with less stiffness (or more) in some groups, on a basis that represents it.
@@ -205,26 +157,6 @@ class ReducedModel(AffineModel):
         twin.check_points_, twin.snapshot_points_ = self.check_points_ / row, self.snapshot_points_ / row
         twin._project(self._basis)
         return twin
-
-    def reduced(
-        self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None
-    ) -> "ReducedModel":
-        """The full model, reduced for other bounds or another tolerance.
-
-        Parameters
-        ----------
-        bounds : float or array-like of shape (n_parameters, 2), default=0.3
-            Box of multipliers.
-        tol : float, default=1e-5
-            Largest relative error of a frequency.
-        random_state : int, RandomState or None, default=None
-            Seed.
-
-        Returns
-        -------
-        ReducedModel
-        """
-        return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
 
     def __repr__(self) -> str:
         return f"ReducedModel({self._full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
@@ -276,6 +208,9 @@ class ReducedModel(AffineModel):
             shapes += [*self._full._modes(theta[elsewhere])[1]] if elsewhere.any() else []
         together = np.hstack(shapes)
         return together[:, np.isfinite(together).all(axis=0)]
+
+    def _expanded(self, shapes: Array) -> Array:
+        return self._basis @ shapes
 
     def _project(self, basis: Array) -> None:
         self._basis = basis
