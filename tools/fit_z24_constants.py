@@ -2,21 +2,22 @@
 
     python tools/fit_z24_constants.py DATA_FILE
 
-DATA_FILE is what load_z24 reads. Four constants are found by least squares on their logarithms, drawn
-mildly to where they start from; modes are paired by kind. Prints the rounded constants, the frequencies they
-give beside the measured means, and how well the model's four parameters can be told apart.
+DATA_FILE is what load_z24 reads. ModelUpdater finds four constants, drawn mildly to where they start from;
+modes are followed from there, where their kinds are checked. Prints the rounded constants, the frequencies
+they give beside the measured means, and how well the model's four parameters can be told apart.
 """
 
 import argparse
 from copy import deepcopy
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from skthermo.datasets import load_z24
 from skthermo.datasets._z24_model import CONSTANTS, PARAMETERS, z24_structure
+from skthermo.fem import Spring, Structure
+from skthermo.updating import ModelUpdater, sensitivity
 
-STARTS = {  # constant: where it starts from, and how far from there it may well be, in logarithms
+STARTS = {  # constant: where it starts from, and how far from there it may well be, as a share
     ("girder", "I_yy"): (0.6, 0.1),
     ("girder", "J"): (1.25, 0.2),
     ("soil", "rx"): (1e10, 0.5),
@@ -55,40 +56,51 @@ def mode_kinds(structure, model):
     return kinds
 
 
-def frequencies_by_kind(constants, n_modes=8):
-    """The lowest frequency of each of the four kinds."""
-    structure = z24_structure(constants)
-    model = structure.assemble(PARAMETERS, n_modes=n_modes)
-    kinds = mode_kinds(structure, model)
-    return model.frequencies(np.ones((1, 4)))[0][[kinds.index(kind) for kind in KINDS]]
-
-
-def with_logs(logs):
-    """All constants, with those that are fitted at exp(logs) times their starts."""
+def with_multipliers(theta):
+    """All constants, with those that are fitted at multiples of their starts."""
     constants = deepcopy(CONSTANTS)
-    for ((part, name), (start, _)), log in zip(STARTS.items(), logs, strict=True):
-        constants[part][name] = start * np.exp(log)
+    for ((part, name), (start, _)), multiplier in zip(STARTS.items(), theta, strict=True):
+        constants[part][name] = start * multiplier
     return constants
+
+
+def fitted_structure():
+    """The bridge at the starts, with a group for the springs of every fitted direction."""
+    structure = z24_structure(with_multipliers(np.ones(len(STARTS))))
+    springs = {
+        f"{part} {direction}": [
+            name
+            for name in structure.groups["abutments" if part == "abutment" else part]
+            if isinstance(structure.members[name], Spring) and structure.members[name].direction == direction
+        ]
+        for part, direction in STARTS
+        if part != "girder"
+    }
+    return Structure(structure.nodes, structure.members, {}, structure.groups | springs)
+
+
+def model_of_constants():
+    """The bridge with the fitted constants as its parameters, and modes of the kinds that were measured."""
+    structure = fitted_structure()
+    parameters = {f"{part} {name}": (name, "girder") if part == "girder" else f"{part} {name}" for part, name in STARTS}
+    model = structure.assemble(parameters, n_modes=4, track=True)
+    assert mode_kinds(structure, model) == list(KINDS)
+    return model
 
 
 def fit(measured):
     """The constants at the optimum, those that are fitted rounded to three digits."""
-    spread = np.array([spread for _, spread in STARTS.values()])
-
-    def residuals(logs):
-        misfit = np.log(frequencies_by_kind(with_logs(logs)) / measured)
-        return np.concatenate([misfit / MISFIT, logs / spread])
-
-    constants = with_logs(least_squares(residuals, np.zeros(len(STARTS)), x_scale=spread, diff_step=1e-4).x)
+    bounds = [[0.3, 3.0]] * len(STARTS)
+    updater = ModelUpdater(model_of_constants(), bounds=bounds, prior=[spread for _, spread in STARTS.values()])
+    constants = with_multipliers(updater.fit(measured, frequency_std=MISFIT * measured).theta_)
     for part, name in STARTS:
         constants[part][name] = float(f"{constants[part][name]:.3g}")
     return constants
 
 
-def relative_sensitivity(model):
-    """d ln f / d ln theta at the nominal state, (n_modes, n_parameters)."""
-    nominal = np.ones((1, len(model.parameter_names)))
-    return model.jacobian(nominal)[0] / model.frequencies(nominal)[0][:, np.newaxis]
+def frequencies(constants):
+    """The four frequencies of the bridge in Hz."""
+    return z24_structure(constants).assemble(PARAMETERS, n_modes=4).frequencies(np.ones((1, 4)))[0]
 
 
 def main():
@@ -104,14 +116,12 @@ def main():
     for (part, name), (start, _) in STARTS.items():
         print(f"{part + ' ' + name:14s} {start:9.3g} {constants[part][name]:9.3g}")
     print(f"\nmode                      model  measured  difference   (mean of {n_records} records, Hz)")
-    for kind, model, mean in zip(KINDS, frequencies_by_kind(constants), measured, strict=True):
+    for kind, model, mean in zip(KINDS, frequencies(constants), measured, strict=True):
         print(f"{kind:24s} {model:6.3f}    {mean:6.3f}     {100 * (model / mean - 1):+.2f} %")
     model = z24_structure(constants).assemble(PARAMETERS, n_modes=4, track=True)
-    sensitivity = relative_sensitivity(model)
-    singular = np.linalg.svd(sensitivity, compute_uv=False)
-    print("\nd ln f / d ln theta   " + "  ".join(f"{name:>14s}" for name in PARAMETERS))
-    for j, row in enumerate(sensitivity):
-        print(f"f{j + 1:<20d} " + "  ".join(f"{value:14.3f}" for value in row))
+    slopes = sensitivity(model)
+    singular = np.linalg.svd(slopes, compute_uv=False)
+    print("\nd ln f / d ln theta", slopes.round(3), sep="\n")
     print("singular values " + ", ".join(f"{s:.3f}" for s in singular))
     print(f"condition number {singular[0] / singular[-1]:.1f}")
 
