@@ -7,7 +7,7 @@ from functools import cache
 from threading import Lock
 from typing import Any, TypeVar
 
-from threadpoolctl import ThreadpoolController  # installed with scikit-learn, which requires it
+import threadpoolctl  # installed with scikit-learn, which requires it
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -18,8 +18,18 @@ _limits: Any = None
 
 
 @cache
-def _controller() -> ThreadpoolController:
-    return ThreadpoolController().select(user_api="blas")
+def _controller() -> threadpoolctl.ThreadpoolController:
+    return threadpoolctl.ThreadpoolController().select(user_api="blas")
+
+
+@contextmanager
+def _in_control() -> Iterator[None]:
+    """Let this thread set limits: since threadpoolctl 3.8 only the one that did so first can, until it lets go."""
+    openblas = getattr(threadpoolctl, "OpenBLASController", None)
+    let_go = getattr(openblas, "clear_controlling_thread", lambda force: None)
+    let_go(force=True)
+    yield
+    let_go(force=True)
 
 
 @contextmanager
@@ -32,7 +42,8 @@ def single_blas_thread() -> Iterator[None]:
     global _depth, _limits
     with _lock:
         if _depth == 0:
-            _limits = _controller().limit(limits=1)
+            with _in_control():
+                _limits = _controller().limit(limits=1)
         _depth += 1
     try:
         yield
@@ -40,7 +51,8 @@ def single_blas_thread() -> Iterator[None]:
         with _lock:
             _depth -= 1
             if _depth == 0:
-                _limits.restore_original_limits()
+                with _in_control():
+                    _limits.restore_original_limits()
                 _limits = None
 
 

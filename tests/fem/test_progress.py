@@ -101,7 +101,7 @@ def test_rows_of_a_program_are_shared_among_more_workers_than_chunks_of_a_model(
 
 
 ENDLESS = """
-import os, sys, time
+import os, signal, sys, time
 from pathlib import Path
 from skthermo.fem import CallableModel, sample
 
@@ -110,6 +110,7 @@ def endless(row):
     time.sleep(3600)
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may inherit deafness
     Path(sys.argv[1], "me").write_text(str(os.getpid()))
     sample(CallableModel(endless, ["E"], 1), 0.2, 1000, n_jobs=2, progress=True, random_state=0)
 """

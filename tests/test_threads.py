@@ -1,0 +1,47 @@
+"""One BLAS thread wherever small matrices are solved, whichever Python thread it is."""
+
+import os
+import subprocess
+import sys
+
+PROGRAM = """
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import scipy.linalg  # brings a BLAS of its own
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from skthermo._threads import map_on_blas_threads, single_blas_thread
+
+def blas_threads():
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+def limited(barrier=None):
+    with single_blas_thread():
+        if barrier:
+            barrier.wait()
+        return blas_threads()
+
+if blas_threads() == {2}:
+    assert limited() == {1}
+    assert blas_threads() == {2}
+    for _ in range(3):
+        with ThreadPoolExecutor(2) as pool:
+            assert list(pool.map(limited, [Barrier(2)] * 2)) == [{1}, {1}]
+        assert blas_threads() == {2}
+    assert list(map_on_blas_threads(lambda _: blas_threads(), range(4))) == [{1}] * 4
+    with threadpool_limits(2, "blas"), ThreadPoolExecutor(1) as pool:
+        assert pool.submit(limited).result() == {1}
+    assert blas_threads() == {2}
+    print("checked")
+else:
+    print("one thread only")
+"""
+
+
+def test_limits_hold_in_every_thread_and_are_lifted_again():
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=os.environ | {"OMP_NUM_THREADS": "2"}, capture_output=True, text=True
+    )
+    assert not done.returncode, done.stderr
+    assert done.stdout.strip() == ("checked" if (os.cpu_count() or 1) > 1 else "one thread only")
