@@ -41,7 +41,10 @@ else:
 
 def test_limits_hold_in_every_thread_and_are_lifted_again():
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=os.environ | {"OMP_NUM_THREADS": "2"}, capture_output=True, text=True
+        [sys.executable, "-c", PROGRAM],
+        env=os.environ | {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"},
+        capture_output=True,
+        text=True,
     )
     assert not done.returncode, done.stderr
     assert done.stdout.strip() == ("checked" if (os.cpu_count() or 1) > 1 else "one thread only")

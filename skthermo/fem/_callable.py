@@ -129,9 +129,10 @@ class CallableModel:
         """
         rows = check_theta(theta, self.parameter_names)
         keys = [row.tobytes() for row in rows.astype("<f8")]
-        solved = {} if self._samples is None else self._samples.read()
-        missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in solved}
+        known = {} if self._samples is None else self._samples.read()
+        missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
         batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
+        solved: dict[bytes, NDArray[np.float64]] = {}
         failures: list[RuntimeError] = []
         for batch in batches:
             try:
@@ -143,7 +144,8 @@ class CallableModel:
             if len(failures) == len(batches) and len(missing) > 1:
                 raise failures[0]
             warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {failures[0]}", UserWarning, stacklevel=2)
-        return np.array([solved[key] for key in keys]).reshape(len(rows), self.n_modes)
+        found = [solved[key] if key in solved else known[key] for key in keys]
+        return np.array(found).reshape(len(rows), self.n_modes)
 
     def _solve(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))

@@ -1,9 +1,10 @@
 """Solved samples on disk, which outlive the process that solved them."""
 
 import json
+import os
 import warnings
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -37,27 +38,46 @@ class SolvedSamples:
         self._header = json.dumps({"skthermo": "solved samples 1"} | self._describes).encode() + b"\n"
         sizes = {"theta": len(parameter_names), "frequencies": n_modes}
         self._record = np.dtype([*((name, "<f8", size) for name, size in sizes.items()), ("checksum", "<u4")])
+        self._known: dict[bytes, Array] = {}
+        self._inode, self._end = 0, 0
 
-    def read(self) -> dict[bytes, Array]:
-        """Frequencies by the bytes of their theta.
+    def read(self) -> Mapping[bytes, Array]:
+        """Frequencies by the bytes of their theta; reads on where the last call stopped.
 
         Raises
         ------
         ValueError
             If the file was written for other parameters or modes, or is something else.
         """
-        content = self.path.read_bytes() if self.path.exists() else b""
-        if not self._is_begun(content):
-            return {}
-        count = (len(content) - len(self._header)) // self._record.itemsize
-        records = np.frombuffer(content, self._record, count, len(self._header))
+        if not self.path.exists():
+            self._forget()
+            return self._known
+        with open(self.path, "rb") as file:
+            state = os.fstat(file.fileno())
+            if state.st_ino != self._inode or state.st_size < self._end:
+                self._forget(state.st_ino)
+            if not self._is_begun(file.read(len(self._header))):
+                return self._known
+            file.seek(max(self._end, len(self._header)))
+            content = file.read()
+        records = np.frombuffer(content, self._record, len(content) // self._record.itemsize)
         whole = records["checksum"] == self._checksums(records)
         if not whole.all():
             warnings.warn(
-                f"{self.path}: {count - whole.sum()} of {count} records are damaged and left out, to be solved again",
+                f"{self.path}: {len(whole) - whole.sum()} of {len(whole)} records are damaged and left out, to be "
+                "solved again",
                 stacklevel=3,
             )
-        return {record["theta"].tobytes(): record["frequencies"] for record in records[whole]}
+        self._known |= {record["theta"].tobytes(): record["frequencies"] for record in records[whole]}
+        self._end = max(self._end, len(self._header)) + records.nbytes
+        return self._known
+
+    def _forget(self, inode: int = 0) -> None:
+        self._known, self._inode, self._end = {}, inode, 0
+
+    def __getstate__(self) -> dict:
+        """Workers read the file themselves."""
+        return vars(self) | {"_known": {}, "_inode": 0, "_end": 0}
 
     def append(self, theta: Array, frequencies: Array) -> None:
         """Write rows behind the last whole record, as the only process that does so."""
