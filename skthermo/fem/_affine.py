@@ -118,14 +118,16 @@ class AffineModel:
         self._track = bool(track)
         self._n_modes = check_n_modes(n_modes)
 
-        terms: type[AffineTerms] = SparseTerms if are_sparse(stiffness_matrices + mass_matrices) else DenseTerms
+        terms: type[AffineTerms] = (
+            SparseTerms if are_sparse(stiffness_matrices + mass_matrices, n_modes) else DenseTerms
+        )
         self._stiffness = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
         self._mass = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         nominal = nominal_theta(len(self._parameter_names))
         dofs = dof_names or [f"degree of freedom {i}" for i in range(self.n_dof)]
         check_supported(self._stiffness.assemble(nominal)[0], dofs)
         available = count_modes(self._mass.assemble(nominal)[0], at_least=n_modes)
-        self._most_candidates = min(available, MOST_CANDIDATES * n_modes)
+        self._most_candidates = min(available, MOST_CANDIDATES * n_modes, max(n_modes, self.n_dof - 1))
         self._form = eigen_form(self._stiffness, self._mass)
         eigenvalues, shapes = self._form.modes(nominal, n_modes)
         self._together = repeated(eigenvalues[0])

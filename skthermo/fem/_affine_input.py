@@ -68,11 +68,11 @@ def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
     return (array + array.T) / 2
 
 
-def are_sparse(matrices: Sequence[Matrix]) -> bool:
-    """Whether shift-invert solves the sum of the matrices sooner than dense batches do."""
+def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
+    """Whether shift-invert finds so many modes of the summed matrices sooner than dense batches do."""
     n_dof = matrices[0].shape[0]
     entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
-    return n_dof > DENSE_DOFS and entries < DENSE_SHARE * n_dof**2
+    return n_dof > max(DENSE_DOFS, 4 * n_modes) and entries < DENSE_SHARE * n_dof**2
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:

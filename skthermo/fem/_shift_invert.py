@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 GUARD_VECTORS = 2
 """Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
 
+FEW_MASSES = 20
+"""Degrees of freedom with mass, beyond three for each eigenpair, from which on a Lanczos iteration has room."""
+
 
 class ShiftInvertForm:
     """Lanczos iteration on K^-1 M in the inner product of M, which may be singular.
@@ -62,17 +65,35 @@ def lowest_modes(
     nothing = np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
     if factors is None:
         return nothing
-    inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
+    massive = np.flatnonzero(mass.diagonal())
     wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
-    try:
-        values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
-    except scipy.sparse.linalg.ArpackError:
-        return nothing
-    lowest = np.argsort(values)[:n_modes]
+    if len(massive) < FEW_MASSES + 3 * wanted:
+        vectors = modes_of_few_masses(factors, mass, massive, n_modes)
+    else:
+        inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
+        try:
+            values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
+        except scipy.sparse.linalg.ArpackError:
+            return nothing
+        vectors = vectors[:, np.argsort(values)[:n_modes]]
     # One more application of K^-1 M takes out what massless degrees of freedom gather of rounding.
-    shapes = factors.solve(mass @ vectors[:, lowest])
+    shapes = factors.solve(mass @ vectors)
     shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
     return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
+
+
+def modes_of_few_masses(
+    factors: scipy.sparse.linalg.SuperLU, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int
+) -> Array:
+    """Lowest shapes, up to their scale, from the dense flexibility R' K^-1 R of the mass M = R R'.
+
+    The Krylov space of K^-1 M is no larger than there are masses, too small for an iteration.
+    """
+    root = np.zeros((mass.shape[0], len(massive)))
+    weights, directions = np.linalg.eigh(mass[massive][:, massive].toarray())
+    root[massive] = directions * np.sqrt(np.maximum(weights, 0.0))
+    flexible = factors.solve(root)
+    return flexible @ np.linalg.eigh(root.T @ flexible)[1][:, ::-1][:, :n_modes]
 
 
 def factorise(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU | None:

@@ -125,6 +125,10 @@ def test_large_indefinite_matrices_are_refused():
         AffineModel({("k",): chain(300) - 0.1 * scipy.sparse.eye_array(300)}, scipy.sparse.eye_array(300))
     with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
         AffineModel({("k",): chain(300)}, chain(300) - 0.1 * scipy.sparse.eye_array(300))
+    hidden = scipy.sparse.diags_array(np.arange(300) < 9, dtype=float).tolil()
+    hidden[200, 201] = hidden[201, 200] = 0.1
+    with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
+        AffineModel({("k",): chain(300)}, hidden, n_modes=2)
     skew = chain(300).tolil()
     skew[3, 7] = 0.5
     with pytest.raises(ValueError, match=r"not symmetric: entries \((3, 7|7, 3)\) and"):
@@ -153,3 +157,38 @@ def test_the_exported_building_frame_has_its_reference_frequencies():
     np.testing.assert_allclose(frequencies, reference, rtol=0, atol=5e-6)  # the reference's last digit
     eigenvalues = scipy.sparse.linalg.eigsh(content["K0"], 6, content["M0"], sigma=0, return_eigenvectors=False)
     np.testing.assert_allclose(frequencies, np.sqrt(np.sort(eigenvalues)) / (2 * np.pi), rtol=1e-8)
+
+
+@pytest.mark.parametrize("n_masses", [3, 6, 12, 19, 30, 41, 80])
+@pytest.mark.parametrize("track", [False, True])
+def test_few_masses_on_many_degrees_of_freedom(n_masses, track):
+    """Storey masses of a building: a Krylov space is no larger than there are masses."""
+    masses = np.zeros(320)
+    masses[:: 320 // n_masses] = np.arange(1.0, len(masses[:: 320 // n_masses]) + 1)
+    n_modes = min(n_masses, 6)
+    model = AffineModel({("k",): chain(320)}, scipy.sparse.diags_array(masses), n_modes=n_modes, track=track)
+    theta = [[0.5], [2.0]]
+    np.testing.assert_allclose(model.frequencies(theta), dense_frequencies(model, theta), rtol=1e-9)
+    reduced = model.reduced(0.3, random_state=0)
+    np.testing.assert_allclose(reduced.frequencies([[0.8]]), model.frequencies([[0.8]]), rtol=1e-5)
+
+
+def test_a_mass_that_couples_few_degrees_of_freedom_has_as_many_modes_as_its_rank():
+    rigid = np.zeros((300, 2))
+    rigid[100:110, 0], rigid[100:110, 1] = 1.0, np.arange(-4.5, 5.0)
+    mass = scipy.sparse.csc_array(rigid @ rigid.T)
+    model = AffineModel({("k",): chain(300)}, mass, n_modes=2)
+    flexibility = rigid.T @ np.linalg.solve(chain(300).toarray(), rigid)
+    expected = 1 / np.sqrt(np.linalg.eigvalsh(flexibility)[::-1]) / (2 * np.pi)
+    np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-9)
+    with pytest.raises(ValueError, match="have only 2 modes"):
+        AffineModel({("k",): chain(300)}, mass, n_modes=3)
+
+
+def test_all_modes_of_a_large_model_are_found():
+    model = AffineModel({("k",): chain(201)}, scipy.sparse.eye_array(201), n_modes=201)
+    expected = np.sin(np.arange(1, 202) * np.pi / 404) / np.pi
+    np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-9)
+    assert np.isfinite(
+        AffineModel({("k",): chain(240)}, np.eye(240), n_modes=59, track=True).frequencies([[1.2]])
+    ).all()
