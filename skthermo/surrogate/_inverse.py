@@ -163,6 +163,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if self.model is not None and y is None:
             frequencies, theta = self._simulate(X, random)
         else:
+            self._simulated_alone = False
             frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
             if self.model is not None:
                 check_theta(theta, self.model.parameter_names, allow_nan=True)
@@ -233,6 +234,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if not is_model(self.model):
             raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
         model = self.model
+        self._simulated_alone = X is None
         names_only = np.ones((1, model.n_modes)) if X is None else X
         n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
         if n_modes != model.n_modes:

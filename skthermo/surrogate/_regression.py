@@ -13,6 +13,7 @@ from sklearn.preprocessing import FunctionTransformer, StandardScaler
 from skthermo._threads import single_blas_thread
 from skthermo._validation import (
     as_columns,
+    as_floats,
     check_array,
     check_is_fitted,
     check_same_rows,
@@ -31,6 +32,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
 
     A subclass stores ``regressor`` and ``random_state`` and calls `_learn`.
     """
+
+    _simulated_alone = False
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Multipliers of the nominal parameters.
@@ -103,7 +106,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
 
     def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
-        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        table = as_floats(X) if self._simulated_alone else X  # no names to compare with
+        inputs = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
         if self._log_inputs and (inputs <= 0).any():
             row, column = np.argwhere(inputs <= 0)[0]
             raise ValueError(

@@ -267,3 +267,9 @@ def test_frequencies_that_are_not_positive_are_named():
     F[1, 2] = 0.0
     with pytest.raises(ValueError, match=r"row 1 of 'f3' is 0; expected positive frequencies in Hz, NaN where"):
         inverse.transform(F)
+
+
+def test_a_frame_is_welcome_after_a_fit_that_saw_no_frequencies():
+    inverse = InverseSurrogate(make_truss(), LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
+    F = pd.DataFrame(make_truss().frequencies(np.ones((3, 4))), columns=list("abcdef"))
+    np.testing.assert_array_equal(inverse.transform(F), inverse.transform(F.to_numpy()))
