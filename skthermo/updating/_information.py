@@ -20,8 +20,10 @@ def cramer_rao(information: Array) -> Array:
     Returns
     -------
     ndarray of shape (n_parameters, n_parameters)
-        Infinite variances and NaN covariances of parameters that cannot be told.
+        Infinite variances and NaN covariances of parameters that cannot be told; all NaN where information is.
     """
+    if not np.isfinite(information).all():
+        return np.full_like(information, np.nan)
     scale = np.sqrt(np.diagonal(information))
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))

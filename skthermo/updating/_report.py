@@ -15,11 +15,15 @@ from skthermo.fem._tracking import SAME_MODE, share_reordered
 from skthermo.updating._comparison import counterparts, macs
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome
+from skthermo.updating._residuals import Residuals
 
 Array = NDArray[np.float64]
 
 SAME_OPTIMUM = 1e-3
 """Largest difference of multipliers at which two starts have ended at the same optimum."""
+
+GOOD_WEIGHT = 100
+"""Weight of shapes below which the objective may be a narrow curved valley."""
 
 
 def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
@@ -61,6 +65,16 @@ def rescaled(model: FEModel, theta: Array) -> FEModel:
 
 def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
     return model.frequencies(origin * theta)
+
+
+def unfinished(outcome: Outcome, residuals: Residuals) -> str:
+    """What is to be said of a best start that has not converged."""
+    weights = residuals.measured.shape_weights[residuals.felt]
+    heavier = f", shape weights of {GOOD_WEIGHT} or more" if (weights < GOOD_WEIGHT).any() else ""
+    return (
+        f"the best start has not converged in {outcome.n_evaluations} evaluations, and theta_ may not be the optimum: "
+        f"expected a higher max_iter{heavier}, or bounds within which the model has modes"
+    )
 
 
 def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:

@@ -52,7 +52,8 @@ def sensitivity(
 
     Notes
     -----
-    Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j.
+    Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j. Where the model has
+    no frequencies on one side, the difference to theta itself takes its place.
 
     References
     ----------
@@ -118,9 +119,13 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
 
 
 def central_jacobian(model: FEModel, row: Array, step: float) -> Array:
-    """d f / d theta by central differences of a relative step, (n_modes, n_parameters)."""
+    """d f / d theta by central differences of a relative step, (n_modes, n_parameters); one-sided beside NaN."""
     if not isinstance(step, Real) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.01")
     steps = np.diag(step * row[0])
-    raised, lowered = np.split(solve(model, np.vstack([row + steps, row - steps])), 2)
-    return ((raised - lowered) / (2 * step * row[0][:, np.newaxis])).T
+    sides = np.array(np.split(solve(model, np.vstack([row + steps, row - steps])), 2))
+    known = ~np.isnan(sides)
+    if not known.all():
+        sides = np.where(known, sides, solve(model, row))
+    widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * step * row[0][:, np.newaxis]
+    return ((sides[0] - sides[1]) / widths).T

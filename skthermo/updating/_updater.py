@@ -27,8 +27,8 @@ from skthermo.fem._sampling import check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._report import false_matches, modes_table, rescaled, starts_table
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._report import false_matches, modes_table, rescaled, starts_table, unfinished
+from skthermo.updating._residuals import Residuals, without_warnings
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,8 @@ class ModelUpdater(BaseEstimator):
     *Method.* A residual of the MAC is quadratic in the error of the shape. The Gauss-Newton matrix is therefore
     that of the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared
     length is 1/MAC - 1, weighted with the slope of the objective. All derivatives are exact, those of shapes
-    included; a model without ``jacobian`` gets central differences.
+    included; a model without ``jacobian`` gets central differences. Both methods step back from theta where the
+    model has no modes; a start that ends beside such theta has not converged.
 
     References
     ----------
@@ -208,8 +209,9 @@ class ModelUpdater(BaseEstimator):
         Warns
         -----
         UserWarning
-            If there are more parameters than residuals and no prior, shapes are complex, or a mode of the
-            optimum is not the one it was matched with.
+            If there are more parameters than residuals and no prior, shapes are complex, the best start has not
+            converged, a mode of the optimum is not the one it was matched with, or the optimum is outside the
+            bounds for which the model was reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
         bounds, prior = self._read_bounds(), self._read_prior()
@@ -221,7 +223,8 @@ class ModelUpdater(BaseEstimator):
                 UserWarning,
                 stacklevel=3,
             )
-        residuals = Residuals(self.model, measured, prior)
+        model = without_warnings(self.model)
+        residuals = Residuals(model, measured, prior)
         outcomes = self._run(residuals, bounds)
         best = min(outcomes, key=lambda outcome: outcome.objective)
         if not np.isfinite(best.objective):
@@ -233,10 +236,17 @@ class ModelUpdater(BaseEstimator):
         self.model_ = rescaled(self.model, best.theta)
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
-        self.table_ = modes_table(self.model, measured, best.theta)
-        for message in false_matches(self.model, measured, best.theta):
+        self.table_ = modes_table(model, measured, best.theta)
+        if not best.success:
+            warnings.warn(unfinished(best, residuals), UserWarning, stacklevel=3)
+        for message in false_matches(model, measured, best.theta):
             warnings.warn(message, UserWarning, stacklevel=3)
+        self._warn_of_bounds(best.theta)
         return self
+
+    def _warn_of_bounds(self, theta: Array) -> None:
+        if isinstance(self.model, AffineModel):
+            self.model._warn_of_bounds(theta[np.newaxis])
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         if not is_model(self.model):

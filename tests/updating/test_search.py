@@ -1,0 +1,106 @@
+"""A search steps back from where the model has no modes, and says when it has not converged."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel
+from skthermo.updating import ModelUpdater, sensitivity
+
+TRUSS = make_truss()
+INSIDE, OUTSIDE = np.array([0.97, 1.1, 0.95, 1.05]), np.array([0.9, 1.1, 0.95, 1.05])
+METHODS = ("least_squares", "lbfgs")
+
+
+def half_truss(lowest=0.95):
+    """The truss, which has no modes where its first multiplier is low."""
+
+    def frequencies(theta):
+        return np.where(theta[:, :1] > lowest, TRUSS.frequencies(theta), np.nan)
+
+    return CallableModel(frequencies, TRUSS.parameter_names, 6, vectorized=True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_optimum_beside_theta_without_modes_is_found(method):
+    updater = ModelUpdater(half_truss(), method=method, n_starts=3, random_state=0).fit(TRUSS.frequencies([INSIDE]))
+    np.testing.assert_allclose(updater.theta_, INSIDE, atol=1e-4)
+    starts = updater.starts_
+    assert starts["success"].tolist() == [start[0] > 0.95 for start in starts["start"]]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_box_that_is_not_positive_definite_throughout(method):
+    model = AffineModel({("a",): [[2, -1], [-1, 2]], ("b",): [[0, 0], [0, -1]]}, np.eye(2), n_modes=2)
+    truth = [0.8, 1.1]
+    options = {"bounds": [[0.5, 1.6], [0.3, 2.0]], "n_starts": 8, "random_state": 0}
+    updater = ModelUpdater(model, method=method, **options).fit(model.frequencies([truth]))
+    starts = updater.starts_
+    np.testing.assert_allclose(updater.theta_, truth, atol=1e-4)
+    assert (starts["objective"][starts["success"]] < 1e-8).all()
+    solvable = [1.5 * a > b for a, b in starts["start"]]  # det K = a (3 a - 2 b)
+    assert starts["success"].tolist() == solvable
+    assert not all(solvable)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_optimum_without_modes_is_not_reached_and_said_to_be_so(method):
+    updater = ModelUpdater(half_truss(), method=method, n_starts=3, random_state=0)
+    with pytest.warns(UserWarning, match="best start has not converged in .* within which the model has modes"):
+        updater.fit(TRUSS.frequencies([OUTSIDE]))
+    starts = updater.starts_
+    assert not starts["success"].any()
+    assert updater.theta_[0] == pytest.approx(0.95, abs=1e-3)
+    ModelUpdater(TRUSS, method=method).fit(TRUSS.frequencies([OUTSIDE]))
+
+
+def test_a_start_without_derivatives_ends_where_it_is():
+    nominal = TRUSS.frequencies(np.ones((1, 4)))
+
+    def only_nominal(theta):
+        return np.where((theta == 1).all(axis=1, keepdims=True), nominal, np.nan)
+
+    model = CallableModel(only_nominal, TRUSS.parameter_names, 6, vectorized=True)
+    for method in METHODS:
+        updater = ModelUpdater(model, method=method, n_starts=2, random_state=0)
+        with pytest.warns(UserWarning, match="has not converged in 1 evaluations"):
+            updater.fit(TRUSS.frequencies([INSIDE]))
+        np.testing.assert_array_equal(updater.theta_, 1)
+        assert not updater.starts_["success"].any()
+        assert np.isnan(updater.covariance_).all()
+
+
+def test_differences_are_one_sided_beside_theta_without_modes():
+    theta = [0.9501, 1.0, 1.0, 1.0]
+    with pytest.warns(UserWarning, match="1 of 8 samples are NaN"):
+        found = sensitivity(half_truss(), theta, method="central", step=1e-3)
+    exact = sensitivity(TRUSS, theta)
+    np.testing.assert_allclose(found, exact, atol=1e-3)
+    np.testing.assert_allclose(found.iloc[:, 1:], exact.iloc[:, 1:], atol=1e-5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_too_few_iterations_warn_and_small_weights_of_shapes_are_named(method):
+    frequencies, shapes = TRUSS.modes([OUTSIDE])
+    updater = ModelUpdater(TRUSS, method=method, max_iter=2)
+    with pytest.warns(UserWarning, match=r"not converged in \d evaluations.* expected a higher max_iter, or"):
+        updater.fit(frequencies)
+    assert not updater.starts_["success"].any()
+    updater.set_params(shape_weight=1.0)
+    with pytest.warns(UserWarning, match="a higher max_iter, shape weights of 100 or more, or"):
+        updater.fit(frequencies, shapes=shapes[0], dofs=range(TRUSS.n_dof))
+
+
+@pytest.mark.parametrize("with_shapes", [False, True], ids=["frequencies", "and shapes"])
+def test_a_reduced_model_warns_once_of_an_optimum_outside_its_box(with_shapes):
+    reduced = TRUSS.reduced(0.05, random_state=0)
+    for truth, n_warnings in ((OUTSIDE, 1), (np.array([0.97, 1.04, 0.98, 1.02]), 0)):
+        frequencies, shapes = TRUSS.modes([truth])
+        measured = {"shapes": shapes[0], "dofs": range(TRUSS.n_dof)} if with_shapes else {}
+        updater = ModelUpdater(reduced, shape_weight=100.0 * with_shapes, n_starts=3, random_state=0)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            updater.fit(frequencies, **measured)
+        assert ["outside the bounds" in str(warning.message) for warning in caught] == [True] * n_warnings
