@@ -1,4 +1,4 @@
-"""Real matrices from MATLAB v5 files, damaged files included.
+"""Matrices from MATLAB v5 files, damaged files included.
 
 SciPy's reader follows the lengths that a file states; where these are damaged it can end the
 interpreter. Here every length is checked against the bytes that are there.
@@ -27,7 +27,7 @@ COMPLEX = 0x0800
 NAME_WITHIN = 1024  # bytes of a variable's beginning, its name included
 
 
-def read_matrices(file: Path) -> dict[str, Matrix | None]:
+def read_matrices(file: Path, *, complex_too: bool = False) -> dict[str, Matrix | None]:
     """Every variable of a MATLAB v5 file; None for what is not a real matrix, full or sparse.
 
     Raises
@@ -54,7 +54,8 @@ def read_matrices(file: Path) -> dict[str, Matrix | None]:
             place = f"variable {name!r}"
             if name in matrices:
                 raise ValueError("it stands there twice")
-            matrices[name] = _matrix(list(_elements(body, order)), order)
+            matrix = _matrix(list(_elements(body, order)), order)
+            matrices[name] = matrix if complex_too or not np.iscomplexobj(matrix) else None
             place = f"what follows variable {name!r}"
     except (ValueError, struct.error, zlib.error) as error:
         raise ValueError(f"{file}: {place} is not readable as MATLAB v5 ({error})") from error
@@ -102,14 +103,20 @@ def _matrix(parts: list[Part], order: str) -> Matrix | None:
     numbers = [_numbers(part, order) for part in parts[3:]]
     if len(numbers) != (3 if kind == SPARSE_CLASS else 1) + is_complex or (shape < 0).any():
         raise ValueError(f"{len(numbers)} arrays of numbers for the dimensions {shape.tolist()}")
-    if is_complex:
-        return None
+    values = _complex(*numbers[-2:]) if is_complex else numbers[-1].astype(float)
     if kind == SPARSE_CLASS:
-        rows, starts, values = numbers
-        return _sparse_matrix(rows, starts, values, *shape.tolist())
-    if numbers[0].size != math.prod(shape.tolist()):
-        raise ValueError(f"{numbers[0].size} values; expected {shape.tolist()}")
-    return numbers[0].reshape(shape, order="F").astype(float)
+        return _sparse_matrix(numbers[0], numbers[1], values, *shape.tolist())
+    if values.size != math.prod(shape.tolist()):
+        raise ValueError(f"{values.size} values; expected {shape.tolist()}")
+    return values.reshape(shape, order="F")
+
+
+def _complex(real: NDArray, imaginary: NDArray) -> NDArray:
+    if real.size != imaginary.size:
+        raise ValueError(f"{imaginary.size} imaginary parts; expected {real.size}")
+    values = np.empty(real.size, dtype=complex)
+    values.real, values.imag = real, imaginary
+    return values
 
 
 def _sparse_matrix(rows: NDArray, starts: NDArray, values: NDArray, n_rows: int, n_columns: int) -> Matrix:
@@ -124,7 +131,7 @@ def _sparse_matrix(rows: NDArray, starts: NDArray, values: NDArray, n_rows: int,
     places = np.repeat(np.arange(n_columns), np.diff(starts)) * n_rows + rows
     if ((rows < 0) | (rows >= n_rows)).any() or (np.diff(places) <= 0).any():
         raise ValueError(f"sparse rows that do not rise within their columns from 0 to at most {n_rows - 1}")
-    return scipy.sparse.csc_array((values[:count].astype(float), rows, starts), shape=(n_rows, n_columns))
+    return scipy.sparse.csc_array((values[:count], rows, starts), shape=(n_rows, n_columns))
 
 
 def _numbers(part: Part, order: str) -> NDArray:

@@ -19,6 +19,7 @@ Key = tuple[str, ...]
 MASS_NAMES = ("m", "m0", "mass")
 TOTAL_NAMES = ("k", "k0", "stiffness")
 SAME = 1e-6
+EXACTLY_SAME = 1e-8
 
 
 def load_affine(
@@ -76,7 +77,9 @@ def load_affine(
     Warns
     -----
     UserWarning
-        If a total that was found by its name is more than the sum of the terms.
+        If, without ``stiffness``, a total that was found by its name is more than the sum of the terms; if a matrix
+        of another name is the sum of all others, and so taken as the total; or if a term is proportional to the
+        mass or to the sum of the other terms.
 
     See Also
     --------
@@ -87,8 +90,10 @@ def load_affine(
     -----
     Which matrix is which is decided by these rules alone:
 
-    - Text, structs, numbers, vectors and matrices that are not square or not real are left alone; a square
-      matrix of another size than the mass is an error unless ``stiffness`` names the terms.
+    - Text, structs, numbers, vectors and matrices that are not square are left alone. A square matrix of another
+      size than the mass, not finite, or of the mass's size and complex, is an error unless ``stiffness`` names
+      the terms; an imaginary part of zeros is left out. Of a folder, only the files of these names are then read.
+    - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
     - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If it is
       more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal,
       that is an error. A matrix K0 that comes on top of the terms is said to be so by
@@ -109,18 +114,25 @@ def load_affine(
     array([[1.967, 5.15 ]])
     """
     file = Path(path)
-    matrices = read_named(file)
+    named = None if stiffness is None else {*_keys(stiffness), mass, total}
+    matrices = read_named(
+        file, lambda name: named is None or name in named or (mass is None and name.lower() in MASS_NAMES)
+    )
     square = _square(matrices)
     mass = mass or _usual(square, MASS_NAMES, "mass", file)
     if mass is None:
-        raise ValueError(f"{file}: no matrix is called {', '.join(MASS_NAMES)}; say mass=..., one of {list(matrices)}")
+        raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
     mass_matrix = _find(matrices, mass, file)
     says_total = total is not None
     if stiffness is None:
-        others = [name for name in square if name != mass]
+        others = {
+            name: _find(matrices, name, file, mass_matrix.shape)
+            for name, matrix in matrices.items()
+            if name != mass and (name in square or _is_complex(matrix, mass_matrix.shape))
+        }
         if total is None and len(others) > 1:
             total = _usual(others, TOTAL_NAMES, "total", file)
-        stiffness = [name for name in others if name != total]
+        stiffness = _terms(others, total, mass, mass_matrix, file)
     keys = _keys(stiffness)
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
@@ -138,9 +150,68 @@ def load_affine(
 
 
 def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
-    """Names of square matrices; of single numbers only if there is nothing larger."""
-    sizes = {name: m.shape[0] for name, m in matrices.items() if m is not None and m.shape[0] == m.shape[1] > 0}
+    """Names of real square matrices; of single numbers only if there is nothing larger."""
+    real = {name: matrix for name, matrix in matrices.items() if matrix is not None and not np.iscomplexobj(matrix)}
+    sizes = {name: m.shape[0] for name, m in real.items() if m.shape[0] == m.shape[1] > 0}
     return [name for name, size in sizes.items() if size > 1] or list(sizes)
+
+
+def _is_complex(matrix: Matrix | None, shape: tuple[int, ...]) -> bool:
+    return matrix is not None and np.iscomplexobj(matrix) and matrix.shape == shape
+
+
+def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
+    """Why nothing is the mass."""
+    for name, matrix in matrices.items():
+        if name.lower() in MASS_NAMES:
+            shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
+            is_complex = matrix is not None and np.iscomplexobj(matrix)
+            return f"{name!r} is {shape}, {'complex' if is_complex else 'not square'}, and so not the mass"
+    return f"no matrix is called {', '.join(MASS_NAMES)}"
+
+
+def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
+    """What remains of all matrices but the mass as terms; what looks like something else is said."""
+    found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
+    has_pattern = mass_matrix.shape[0] > 1
+    like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
+    alike = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
+    springs = {name: term for name, term in found.items() if name not in alike}
+    if total is None and len(springs) > 2:
+        whole = reduce(add, springs.values())
+        sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
+        if len(sums) == 1:
+            del springs[sums[0]], found[sums[0]]
+            warnings.warn(
+                f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
+                f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
+                stacklevel=3,
+            )
+    if len(springs) > 1 and has_pattern:
+        whole = reduce(add, springs.values())
+        for name, term in springs.items():
+            if ratio := _ratio(term, whole - term):
+                alike[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
+    for name, what in alike.items():
+        warnings.warn(
+            f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
+            stacklevel=3,
+        )
+    return list(found)
+
+
+def _ratio(term: Matrix, reference: Matrix) -> float:
+    """How many times the reference a term is; 0 if it is not a multiple."""
+    reference = scipy.sparse.csc_array(reference)
+    ratio = float((term * reference).sum() / max((reference * reference).sum(), np.finfo(float).tiny))
+    return ratio if ratio and _same(term, ratio * reference, SAME) else 0.0
+
+
+def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
+    """Whether no difference is more than a part of the diagonal."""
+    rest = scipy.sparse.coo_array(matrix - expected)
+    diagonal = np.abs(expected.diagonal())
+    return not (np.abs(rest.data) > tolerance * np.sqrt(diagonal[rest.row] * diagonal[rest.col])).any()
 
 
 def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:
@@ -164,6 +235,13 @@ def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: t
     matrix = matrices[name]
     if matrix is None:
         raise ValueError(f"{file}: variable {name!r} is not a matrix of real numbers")
+    if np.iscomplexobj(matrix):
+        raise ValueError(
+            f"{file}: variable {name!r} is not a matrix of real numbers: its imaginary part is not zero; expected real "
+            "ones, or stiffness=[...] that names the terms"
+        )
+    if not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
+        raise ValueError(f"{file}: variable {name!r} holds values that are not finite")
     if shape and matrix.shape != shape:
         raise ValueError(
             f"{file}: variable {name!r} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] "
@@ -174,12 +252,11 @@ def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: t
 
 def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool) -> Matrix | None:
     """What the terms leave of the total, if anything."""
-    rest = scipy.sparse.coo_array(total - reduce(add, terms.values()))
-    diagonal = np.abs(total.diagonal())
-    scale = np.sqrt(diagonal[rest.row] * diagonal[rest.col])
-    if not (np.abs(rest.data) > SAME * scale).any():
+    together = reduce(add, terms.values())
+    if _same(together, total, SAME):
         return None
-    less = rest.diagonal() < -SAME * diagonal
+    rest = scipy.sparse.csc_array(total - together)
+    less = rest.diagonal() < -SAME * np.abs(total.diagonal())
     if less.any():
         row = int(np.argmax(less))
         raise ValueError(
@@ -192,4 +269,4 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
             "total=... says that it is, stiffness=... what else the matrices are",
             stacklevel=3,
         )
-    return scipy.sparse.csc_array(rest)
+    return rest

@@ -3,6 +3,7 @@
 import io
 import re
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,37 +17,39 @@ from skthermo.fem._terms import Matrix
 FORMATS = "a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of .mtx and .npz files"
 
 
-def read_named(path: Path) -> dict[str, Matrix | None]:
-    """Matrices by name, in the file's order; None for what is not a real matrix.
+def read_named(path: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
+    """Matrices by name, in the file's order; None for what is not a matrix of numbers.
+
+    Values may be complex or not finite. Of a folder, only files whose stem is used are read, the others are None.
 
     Raises
     ------
     FileNotFoundError
         If there is nothing at the path.
     ValueError
-        Names the file, and the variable where it is known, that is damaged or not finite.
+        Names the file, and the variable where it is known, that is damaged.
     """
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected {FORMATS}")
     if path.is_dir():
-        matrices = _read_folder(path)
+        matrices = _read_folder(path, is_used)
     elif path.suffix.lower() == ".mat":
-        matrices = read_matrices(path)
+        matrices = read_matrices(path, complex_too=True)
     elif path.suffix.lower() == ".npz":
-        matrices = {name: _real(array) for name, array in _read_npz(path).items()}
+        matrices = {name: _matrix(array) for name, array in _read_npz(path).items()}
     else:
         raise ValueError(f"{path} is none of these: {FORMATS}")
-    for name, matrix in matrices.items():
-        if matrix is not None and not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
-            raise ValueError(f"{path}: variable {name!r} holds values that are not finite")
-    return matrices
+    return {name: _real_if_exact(matrix) for name, matrix in matrices.items()}
 
 
-def _read_folder(folder: Path) -> dict[str, Matrix | None]:
+def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
     """A matrix for every file, E_2 before E_10."""
     files = [file for file in folder.iterdir() if file.suffix.lower() in (".mtx", ".npz")]
     matrices: dict[str, Matrix | None] = {}
     for file in sorted(files, key=lambda file: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", file.name)]):
+        if not is_used(file.stem):
+            matrices[file.stem] = None
+            continue
         if file.stem in matrices:
             raise ValueError(f"{folder} holds {file.stem!r} as .mtx and as .npz; expected one of them")
         is_text = file.suffix.lower() == ".mtx"
@@ -64,7 +67,7 @@ def _read_sparse_npz(file: Path) -> Matrix | None:
             matrix.check_format(full_check=True)
     except Exception as error:  # a damaged file can fail in every way
         raise ValueError(f"{file}: not a sparse matrix of scipy.sparse.save_npz ({error})") from error
-    return _real(matrix)
+    return _matrix(matrix)
 
 
 def _read_npz(file: Path) -> dict[str, NDArray]:
@@ -84,7 +87,16 @@ def _read_npz(file: Path) -> dict[str, NDArray]:
     return arrays
 
 
-def _real(matrix) -> Matrix | None:
-    if matrix.ndim != 2 or matrix.dtype.kind not in "fiub":
+def _matrix(matrix) -> Matrix | None:
+    if matrix.ndim != 2 or matrix.dtype.kind not in "fiubc":
         return None
-    return scipy.sparse.csc_array(matrix, dtype=float) if scipy.sparse.issparse(matrix) else matrix.astype(float)
+    dtype = complex if matrix.dtype.kind == "c" else float
+    return scipy.sparse.csc_array(matrix, dtype=dtype) if scipy.sparse.issparse(matrix) else matrix.astype(dtype)
+
+
+def _real_if_exact(matrix: Matrix | None) -> Matrix | None:
+    """The real part of what has no imaginary one."""
+    if matrix is None or not np.iscomplexobj(matrix):
+        return matrix
+    values = np.asarray(matrix.data if scipy.sparse.issparse(matrix) else matrix)
+    return matrix if values.imag.any() else matrix.real

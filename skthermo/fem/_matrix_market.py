@@ -1,4 +1,4 @@
-"""Real matrices from Matrix Market files, damaged files included.
+"""Matrices from Matrix Market files, damaged files included.
 
 SciPy's reader believes the size that a file states and ends the interpreter where that is damaged.
 """
@@ -13,7 +13,7 @@ from skthermo.fem._terms import Matrix
 
 
 def read_matrix_market(file: Path) -> Matrix | None:
-    """The matrix of a file, dense ("array") or sparse ("coordinate"); None if it is not real.
+    """The matrix of a file, dense ("array") or sparse ("coordinate"); None if it is skew-symmetric.
 
     Raises
     ------
@@ -32,27 +32,32 @@ def _read(text: str) -> Matrix | None:
     if len(header) != 5 or header[:2] != ["%%matrixmarket", "matrix"]:
         raise ValueError(f"the first line is {first[:80]!r}; expected '%%MatrixMarket matrix ...'")
     layout, field, symmetry = header[2:]
-    if field == "complex" or symmetry in ("skew-symmetric", "hermitian"):
+    if symmetry == "skew-symmetric":
         return None
     if (
         layout not in ("array", "coordinate")
-        or field not in ("real", "integer")
-        or symmetry not in ("general", "symmetric")
+        or field not in ("real", "integer", "complex")
+        or symmetry not in ("general", "symmetric", "hermitian")
     ):
-        raise ValueError(f"the first line is {first[:80]!r}; expected array or coordinate, real, general or symmetric")
+        raise ValueError(
+            f"the first line is {first[:80]!r}; expected array or coordinate, real or complex, general or symmetric"
+        )
     if not rest.endswith("\n"):
         raise ValueError("the last line has no end: is it cut off?")
     lines = [line for line in rest.splitlines() if line.strip() and not line.lstrip().startswith("%")]
     size = [int(word) for word in lines[0].split()] if lines else []
-    if (
-        len(size) != (2 if layout == "array" else 3)
-        or min(size) < 0
-        or (symmetry == "symmetric" and size[0] != size[1])
-    ):
+    if len(size) != (2 if layout == "array" else 3) or min(size) < 0 or (symmetry != "general" and size[0] != size[1]):
         raise ValueError(f"the size is {size}; expected rows and columns, of a sparse matrix also entries")
     numbers = np.array(" ".join(lines[1:]).split(), dtype=float)
     read = _dense if layout == "array" else _sparse
-    return read(numbers, size, symmetry == "symmetric")
+    if field != "complex":
+        return read(numbers, size, symmetry != "general")
+    width = 2 if layout == "array" else 4
+    if numbers.size % width:
+        raise ValueError(f"{numbers.size} numbers; expected a real and an imaginary part of each value")
+    entries = numbers.reshape(-1, width)
+    real, imaginary = (np.delete(entries, column, axis=1).ravel() for column in (-1, -2))
+    return read(real, size, symmetry != "general") + 1j * read(imaginary, size, symmetry != "general")
 
 
 def _dense(numbers: NDArray[np.float64], size: list[int], is_symmetric: bool) -> Matrix:

@@ -164,6 +164,63 @@ def test_matrices_may_share_a_parameter_and_damage_groups_cut_through_it(tmp_pat
     np.testing.assert_allclose(damaged, EXPECTED.damaged({"E_2": 0.4}).frequencies([[1.0] * 3]), rtol=1e-12)
 
 
+@pytest.mark.parametrize("form", WRITERS)
+@pytest.mark.parametrize("name", ["K_0", "Ktot"])
+def test_a_total_of_any_name_is_told_by_its_values(tmp_path, form, name):
+    file = WRITERS[form](tmp_path, {name: TOTAL} | TERMS | {"M": M})
+    with pytest.warns(UserWarning, match=rf"'{name}' is the sum of \['E_2', .* taken as the total.*total='{name}'"):
+        assert_same(load_affine(file, n_modes=4), EXPECTED)
+    assert_same(load_affine(file, n_modes=4, total=name), EXPECTED)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+
+
+@pytest.mark.parametrize(
+    ("name", "matrix", "what"),
+    [
+        ("M1", M / 2, "0.5 times the mass 'M'"),
+        ("C", 0.02 * TOTAL, r"0.02 times the sum of \['E_2', 'E_10', 'k_base'\]"),
+    ],
+)
+@pytest.mark.parametrize("form", ["mat sparse", "npz"])
+def test_a_term_that_looks_like_mass_or_damping_is_said(tmp_path, form, name, matrix, what):
+    file = WRITERS[form](tmp_path, TERMS | {name: matrix, "M": M})
+    with pytest.warns(UserWarning, match=rf"model\..*'{name}' is {what}.*stiffness=\[\.\.\.\]"):
+        model = load_affine(file, n_modes=4)
+    assert model.parameter_names == (*TERMS, name)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_complex_matrices_are_real_or_refused(tmp_path, form):
+    file = WRITERS[form](tmp_path, MATRICES | {"E_2": TERMS["E_2"].astype(complex)})
+    assert_same(load_affine(file, n_modes=4), EXPECTED)
+    WRITERS[form](tmp_path, MATRICES | {"hysteretic": 0.1j * TOTAL})
+    with pytest.raises(ValueError, match=r"variable 'hysteretic' is not a matrix of real .*imaginary part is not zero"):
+        load_affine(file, n_modes=4)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+
+
+@pytest.mark.parametrize("form", ["mat", "npz", "mtx"])
+def test_what_is_not_used_does_no_harm(tmp_path, form):
+    unused = {"bad": np.full((N, N), np.nan), "small": np.eye(3)}
+    file = WRITERS[form](tmp_path, MATRICES | unused | {"coords": np.full((N, 3), np.nan)})
+    if file.is_dir():
+        (file / "pattern.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n")
+        np.savez(file / "foreign.npz", a=np.ones(2), b="text")
+        (file / "damaged.npz").write_bytes(b"PK")
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS), mass="M0", total="K0"), EXPECTED)
+    with pytest.raises(ValueError, match="variable 'bad' holds values that are not finite"):
+        load_affine(file, stiffness=["E_2", "bad"])
+    if file.is_dir():
+        with pytest.raises(ValueError, match=r"damaged\.npz"):
+            load_affine(file, stiffness=["E_2", "damaged"])
+
+
+def test_coordinates_that_are_not_finite_are_left_alone(tmp_path):
+    assert_same(load_affine(write_npz(tmp_path, MATRICES | {"coords": np.full((N, 3), np.nan)}), n_modes=4), EXPECTED)
+
+
 def test_a_folder_is_read_in_natural_order(tmp_path):
     assert load_affine(write_mtx(tmp_path, MATRICES), n_modes=4).parameter_names == ("E_2", "E_10", "k_base")
 
@@ -172,6 +229,8 @@ def test_a_folder_is_read_in_natural_order(tmp_path):
     ("changes", "arguments", "message"),
     [
         ({"M0": None}, {}, "no matrix is called m, m0, mass; say mass=..., one of"),
+        ({"M0": np.ones((1, N))}, {}, r"'M0' is 1 x 6, not square, and so not the mass; say mass=.*'k_base'\]$"),
+        ({"M0": M * 1j}, {}, "'M0' is 6 x 6, complex, and so not the mass"),
         ({"mass": M}, {}, r"\['M0', 'mass'\] could each be the mass; say mass="),
         ({"K": TOTAL}, {}, r"\['K0', 'K'\] could each be the total; say total="),
         ({"E_2": np.eye(3)}, {}, r"variable 'E_2' has shape \(3, 3\); expected \(6, 6\) like the mass"),
