@@ -24,7 +24,7 @@ class CallableModel:
     ----------
     function : callable
         Takes one row of multipliers, an array of shape (n_parameters,), and returns the
-        frequencies in Hz, (n_modes,). With ``vectorized=True`` it takes (n_samples,
+        frequencies in Hz, (n_modes,), NaN where one is not known. With ``vectorized=True`` it takes (n_samples,
         n_parameters) and returns (n_samples, n_modes).
     parameter_names : sequence of str
         Columns of theta.
@@ -44,13 +44,14 @@ class CallableModel:
     Raises
     ------
     ValueError
-        If a name repeats, ``n_modes`` is not a positive integer, or the cache belongs to other
-        parameters or another number of modes.
+        If a name repeats, ``n_modes`` is not a positive integer, or the cache is a folder or belongs to
+        other parameters or another number of modes.
 
     Warns
     -----
     UserWarning
-        If records of the cache are damaged: these rows are solved again.
+        If records of the cache are damaged: these rows are solved again, and the next row that is
+        written replaces the records.
 
     See Also
     --------
@@ -120,7 +121,8 @@ class CallableModel:
             If theta has the wrong width or values, the function returns another shape, or the
             cache belongs to other parameters.
         RuntimeError
-            If the function fails at all of several rows; the error says at which theta first.
+            If the function fails at all of several rows, by an error or by a frequency that is neither
+            NaN nor finite and positive; the error says at which theta first.
 
         Warns
         -----
@@ -133,17 +135,26 @@ class CallableModel:
         missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
         batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
         solved: dict[bytes, NDArray[np.float64]] = {}
-        failures: list[RuntimeError] = []
+        failures: dict[bytes, RuntimeError] = {}
         for batch in batches:
+            asked = np.array([missing[key] for key in batch])
             try:
-                solved |= zip(batch, self._solve(np.array([missing[key] for key in batch])), strict=True)
+                frequencies = self._solve(asked)
             except RuntimeError as failure:
-                failures.append(failure)
-                solved |= dict.fromkeys(batch, np.full(self.n_modes, np.nan))
+                failures |= dict.fromkeys(batch, failure)
+                continue
+            impossible = self._impossible(asked, frequencies)
+            failures |= {batch[row]: failure for row, failure in impossible.items()}
+            good = [row for row in range(len(batch)) if row not in impossible]
+            if self._samples is not None and good:
+                self._samples.append(asked[good], frequencies[good])
+            solved |= {batch[row]: frequencies[row] for row in good}
         if failures:
-            if len(failures) == len(batches) and len(missing) > 1:
-                raise failures[0]
-            warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {failures[0]}", UserWarning, stacklevel=2)
+            first = next(iter(failures.values()))
+            if len(failures) == len(missing) > 1:
+                raise first
+            warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {first}", UserWarning, stacklevel=2)
+            solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
         found = [solved[key] if key in solved else known[key] for key in keys]
         return np.array(found).reshape(len(rows), self.n_modes)
 
@@ -157,10 +168,18 @@ class CallableModel:
                 + ("" if self.vectorized else " for one row of theta (for many rows: vectorized=True)")
                 + f", at theta = {by_name(rows[0], self.parameter_names)}"
             )
-        frequencies = result.reshape(len(rows), self.n_modes)
-        if self._samples is not None:
-            self._samples.append(rows, frequencies)
-        return frequencies
+        return result.reshape(len(rows), self.n_modes)
+
+    def _impossible(self, rows: NDArray[np.float64], frequencies: NDArray[np.float64]) -> dict[int, RuntimeError]:
+        """Rows with what is no frequency."""
+        wrong = ~np.isnan(frequencies) & ~(np.isfinite(frequencies) & (frequencies > 0))
+        return {
+            int(row): RuntimeError(
+                f"the model's function returned {frequencies[row][wrong[row]][0]} Hz at theta = "
+                f"{by_name(rows[row], self.parameter_names)}; expected frequencies that are finite and positive, or NaN"
+            )
+            for row in np.flatnonzero(wrong.any(axis=1))
+        }
 
     def __sklearn_clone__(self) -> "CallableModel":
         return self

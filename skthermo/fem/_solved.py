@@ -39,6 +39,7 @@ class SolvedSamples:
         sizes = {"theta": len(parameter_names), "frequencies": n_modes}
         self._record = np.dtype([*((name, "<f8", size) for name, size in sizes.items()), ("checksum", "<u4")])
         self._known: dict[bytes, Array] = {}
+        self._damaged: list[int] = []
         self._inode, self._end = 0, 0
 
     def read(self) -> Mapping[bytes, Array]:
@@ -47,8 +48,10 @@ class SolvedSamples:
         Raises
         ------
         ValueError
-            If the file was written for other parameters or modes, or is something else.
+            If the file was written for other parameters or modes, or is something else, such as a folder.
         """
+        if self.path.is_dir():
+            raise ValueError(f"{self.path}: the cache is a folder; expected a file, such as {self.path / 'solved'}")
         if not self.path.exists():
             self._forget()
             return self._known
@@ -68,16 +71,18 @@ class SolvedSamples:
                 "solved again",
                 stacklevel=3,
             )
+        start = max(self._end, len(self._header))
+        self._damaged += (start + np.flatnonzero(~whole) * self._record.itemsize).tolist()
         self._known |= {record["theta"].tobytes(): record["frequencies"] for record in records[whole]}
-        self._end = max(self._end, len(self._header)) + records.nbytes
+        self._end = start + records.nbytes
         return self._known
 
     def _forget(self, inode: int = 0) -> None:
-        self._known, self._inode, self._end = {}, inode, 0
+        self._known, self._damaged, self._inode, self._end = {}, [], inode, 0
 
     def __getstate__(self) -> dict:
         """Workers read the file themselves."""
-        return vars(self) | {"_known": {}, "_inode": 0, "_end": 0}
+        return vars(self) | {"_known": {}, "_damaged": [], "_inode": 0, "_end": 0}
 
     def append(self, theta: Array, frequencies: Array) -> None:
         """Write rows behind the last whole record, as the only process that does so."""
@@ -95,6 +100,21 @@ class SolvedSamples:
                 file.truncate(0)
                 file.write(self._header)
             file.write(records.tobytes())
+        if self._damaged and len(records):
+            self._mend(records[:1].tobytes())
+
+    def _mend(self, record: bytes) -> None:
+        """Repeat a record where damaged ones stand; others keep their place, for those who read meanwhile."""
+        with open(self.path, "r+b") as file:
+            lock(file)
+            for position in self._damaged:
+                file.seek(position)
+                content = file.read(len(record))
+                found = np.frombuffer(content, self._record, len(content) // len(record))
+                if (found["checksum"] != self._checksums(found)).any():
+                    file.seek(position)
+                    file.write(record)
+        self._damaged = []
 
     def _is_begun(self, content: bytes) -> bool:
         """Whether the header is there; what is another's is refused."""

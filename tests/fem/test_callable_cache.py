@@ -75,10 +75,38 @@ def test_repeated_rows_are_solved_once(file, cached, vectorized):
 
 
 def test_what_is_not_a_number_is_kept_bit_by_bit(file):
-    model = CallableModel(lambda row: [-0.0, np.nan, np.inf], NAMES, 3, cache=file)
+    model = CallableModel(lambda row: [-np.nan, np.nan, 5e-324], NAMES, 3, cache=file)
     first, second = model.frequencies(THETA), model.frequencies(THETA)
     assert first.tobytes() == second.tobytes()
-    assert np.signbit(second[:, 0]).all()
+    assert np.isnan(second[:, :2]).all()
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize("value", [-1.0, 0.0, np.inf])
+def test_what_is_no_frequency_is_a_failure_of_its_row(file, value, vectorized):
+    def wrong_at_the_eighth(theta):
+        result = np.array([three_modes(row) for row in np.atleast_2d(theta)])
+        result[(np.atleast_2d(theta) == THETA[7]).all(axis=1), 1] = value
+        return result if vectorized else result[0]
+
+    model = CallableModel(wrong_at_the_eighth, NAMES, 3, vectorized=vectorized, cache=file)
+    theta = dict(zip(NAMES, THETA[7].tolist(), strict=True))
+    with pytest.warns(UserWarning, match=re.escape(f"1 of 20 rows are NaN: the model's function returned {value} Hz")):
+        frequencies = model.frequencies(THETA)
+    expected = PLAIN.copy()
+    expected[7] = np.nan
+    np.testing.assert_array_equal(frequencies, expected)
+    counted = Counted()
+    CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
+    np.testing.assert_array_equal(counted.rows, THETA[[7]])
+    always = CallableModel(lambda row: [1.0, value, 2.0], NAMES, 3)
+    with pytest.raises(RuntimeError, match=re.escape(f"returned {value} Hz at theta = {theta}")):
+        always.frequencies(THETA[7:])
+
+
+def test_a_folder_is_no_cache(tmp_path):
+    with pytest.raises(ValueError, match="the cache is a folder; expected a file"):
+        CallableModel(three_modes, NAMES, 3, cache=tmp_path)
 
 
 def test_neighbouring_numbers_are_different_rows(file):
@@ -124,6 +152,9 @@ def test_damaged_records_are_solved_again_and_said(file):
         result = CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
     np.testing.assert_array_equal(result, PLAIN)
     np.testing.assert_array_equal(counted.rows, THETA[[-5]])
+    again = CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)  # and warns no more
+    np.testing.assert_array_equal(again, PLAIN)
+    assert len(counted.rows) == 1
 
 
 @pytest.mark.parametrize(
