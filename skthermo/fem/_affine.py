@@ -127,7 +127,8 @@ class AffineModel:
         dofs = dof_names or [f"degree of freedom {i}" for i in range(self.n_dof)]
         check_supported(self._stiffness.assemble(nominal)[0], dofs)
         available = count_modes(self._mass.assemble(nominal)[0], at_least=n_modes)
-        self._most_candidates = min(available, MOST_CANDIDATES * n_modes, max(n_modes, self.n_dof - 1))
+        solvable = self.n_dof - 1 if terms is SparseTerms else self.n_dof
+        self._most_candidates = min(available, MOST_CANDIDATES * n_modes, solvable)
         self._form = eigen_form(self._stiffness, self._mass)
         eigenvalues, shapes = self._form.modes(nominal, n_modes)
         self._together = repeated(eigenvalues[0])
