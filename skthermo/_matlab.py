@@ -55,7 +55,8 @@ def read_matrices(file: Path, *, complex_too: bool = False) -> dict[str, Matrix 
             if name in matrices:
                 raise ValueError("it stands there twice")
             matrix = _matrix(list(_elements(body, order)), order)
-            matrices[name] = matrix if complex_too or not np.iscomplexobj(matrix) else None
+            is_wanted = matrix is not None and (complex_too or not np.iscomplexobj(matrix))
+            matrices[name] = matrix if is_wanted else None
             place = f"what follows variable {name!r}"
     except (ValueError, struct.error, zlib.error) as error:
         raise ValueError(f"{file}: {place} is not readable as MATLAB v5 ({error})") from error
