@@ -144,14 +144,17 @@ def standardised_regression(
 
 
 def is_positive(values: NDArray) -> bool:
+    """Whether all values have a logarithm."""
     return bool((values > 0).all())
 
 
 def standardiser() -> StandardScaler:
+    """To mean zero and unit variance, as an array whatever the user's configuration says."""
     return StandardScaler().set_output(transform="default")
 
 
 def logarithm() -> FunctionTransformer:
+    """To natural logarithms and back."""
     return FunctionTransformer(np.log, np.exp, check_inverse=False).set_output(transform="default")
 
 

@@ -27,6 +27,7 @@ GOOD_WEIGHT = 100
 
 
 def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
+    """Measured modes beside the model's at the nominal parameters and at theta: Hz, percent and MAC."""
     table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
     states = {
         "before": counterparts(model, measured, np.ones_like(theta)),
@@ -43,6 +44,7 @@ def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFram
 
 
 def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
+    """One row for each start, with the number of its optimum: 0 is the best, equal theta share a number."""
     table = pd.DataFrame(outcomes)
     optima: list[Array] = []
     numbers = np.empty(len(outcomes), dtype=int)
@@ -57,6 +59,7 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
 
 
 def rescaled(model: FEModel, theta: Array) -> FEModel:
+    """The model whose nominal state is the given one at theta."""
     if isinstance(model, AffineModel):
         return model.rescaled(theta)
     function = partial(_frequencies_from, model, theta)
