@@ -38,6 +38,7 @@ from skthermo.fem import sample
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.updating import sensitivity
 
 FILES = ("z24_monitoring.csv", "z24/z24_monitoring.csv", "z24.mat", "z24/z24.mat")
 NO_DATA = f"""No Z24 data at {{}}.
@@ -106,9 +107,8 @@ class Bridge:
 def report_model():
     """What the inverse problem looks like before any data are seen."""
     model = bridge_model()
-    nominal = np.ones((1, len(model.parameter_names)))
-    slopes = model.jacobian(nominal)[0] / model.frequencies(nominal).T
-    print(pd.DataFrame(slopes, [f"d ln f{i + 1}" for i in range(4)], model.parameter_names).round(3))
+    slopes = sensitivity(model)
+    print("d ln f / d ln theta", slopes.round(3), sep="\n")
     print(f"condition number of d ln f / d ln theta: {np.linalg.cond(slopes):.1f}")
     drawn = sample(model, 0.3, 1000, random_state=0)
     swapped = (np.diff(drawn.frequencies, axis=1) < 0).any(axis=1)

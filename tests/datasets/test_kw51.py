@@ -10,6 +10,7 @@ from scipy.integrate import quad
 
 from skthermo.datasets import kw51_structure, make_kw51
 from skthermo.fem import Membrane
+from skthermo.updating import sensitivity
 
 PATH = Path(__file__).parents[1] / "benchmarks" / "kw51_model.py"
 SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
@@ -40,7 +41,7 @@ def test_unupdated_frequencies_are_the_papers(model):
 
 
 def test_sensitivities_rank_as_the_papers(full_model):
-    found = PAPER.sensitivities(full_model)
+    found = sensitivity(full_model).T
     assert tuple(found.index) == tuple(PAPER.SENSITIVITIES.index) == full_model.parameter_names
     assert PAPER.rank_correlation(found, PAPER.THERMAL) > 0.9
     assert PAPER.rank_correlation(found, list(found.index)) > 0.85
@@ -49,7 +50,7 @@ def test_sensitivities_rank_as_the_papers(full_model):
 
 
 def test_six_moduli_are_the_whole_stiffness(full_model):
-    found = PAPER.sensitivities(full_model)
+    found = sensitivity(full_model).T
     assert_allclose(found.loc[[*PAPER.THERMAL, "E_b"]].sum(), 0.5, rtol=1e-6)
     assert (found.loc[["M_a", "M_g"]] <= 1e-9).all(axis=None)
     assert (found.drop(["M_a", "M_g"]) >= -1e-9).all(axis=None)
