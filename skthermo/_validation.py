@@ -1,11 +1,8 @@
-"""The one import point for scikit-learn's private helpers, and input checks shared by estimators."""
+"""The one import point for scikit-learn's private helpers; FE models and seeds inside estimators."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, _fit_context, clone
 from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
@@ -24,96 +21,20 @@ __all__ = [
     "_fit_context",
     "_get_weights",
     "_num_samples",
-    "as_columns",
-    "as_floats",
     "check_array",
     "check_is_fitted",
-    "check_columns",
-    "check_same_rows",
     "clone_sharing_models",
-    "column_names",
     "is_model",
-    "like",
     "seed_parts",
     "seeded",
     "validate_data",
 ]
 
 
-PREFIXES = {"temperature": "T", "frequency": "f"}
-
-
 def is_model(candidate: Any) -> bool:
     """Whether an object is an FE model, judged by what it can do."""
     wanted = ("parameter_names", "n_modes", "frequencies")
     return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in wanted)
-
-
-def like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
-    """Values as a frame with X's index where X is a frame, else as they are."""
-    if not isinstance(X, pd.DataFrame):
-        return values
-    return pd.DataFrame(values, index=X.index, columns=list(columns), copy=False)
-
-
-def as_floats(values: ArrayLike) -> NDArray[np.float64]:
-    """An array of floats; what a nullable pandas column misses becomes NaN."""
-    if isinstance(values, pd.DataFrame | pd.Series):
-        return values.to_numpy(dtype=float, na_value=np.nan)
-    return np.asarray(values, dtype=float)
-
-
-def as_columns(values: ArrayLike) -> NDArray[np.float64]:
-    """A table of floats; a vector becomes its only column."""
-    array = as_floats(values)
-    return array[:, np.newaxis] if array.ndim == 1 else array
-
-
-def column_names(X: Any, default: str) -> list[str]:
-    """Names of X's columns, for messages and outputs: a frame's own, else default1, default2, ..."""
-    if isinstance(X, pd.DataFrame):
-        return [str(name) for name in X.columns]
-    return [f"{default}{i + 1}" for i in range(np.shape(X)[1])]
-
-
-def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Refuse columns that hold no value, or (``varying``) only one value in two or more rows.
-
-    Raises
-    ------
-    ValueError
-        Names the column.
-    """
-    for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
-        present = column[~np.isnan(column)]
-        if not present.size:
-            raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
-        if varying and len(column) > 1 and np.ptp(present) == 0:
-            raise ValueError(
-                f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
-                "expected one that varies: leave it out"
-            )
-
-
-def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
-    """Refuse two tables of different length or, where both are frames, of different index.
-
-    Raises
-    ------
-    ValueError
-        Names the first row that differs.
-    """
-    if _num_samples(X) != _num_samples(y):
-        raise ValueError(
-            f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
-        )
-    if not isinstance(X, pd.DataFrame) or not isinstance(y, pd.DataFrame | pd.Series) or X.index.equals(y.index):
-        return
-    for row, (left, right) in enumerate(zip(X.index, y.index, strict=True)):
-        if left != right:
-            raise ValueError(
-                f"{names[0]} and {names[1]} have different indices (row {row}: {left} and {right}); expected the same"
-            )
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:

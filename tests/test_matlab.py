@@ -9,7 +9,7 @@ import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from skthermo._matlab import read_matrices
+from skthermo._io import read_matlab
 
 SPARSE = scipy.sparse.csc_array(np.array([[2.0, -1.0, 0], [-1.0, 2.0, 0], [0, 0, 0], [0.5, 0, 0]]))
 NO_MATRICES = {"text": "abc", "cell": np.array([1, "a"], dtype=object), "complex": np.array([[1j]])}
@@ -25,7 +25,7 @@ def test_full_matrices_are_read_as_scipy_reads_them(tmp_path, compressed, dtype)
     fields = {"tall": (np.arange(6).reshape(3, 2) % 2 * 100).astype(dtype), "x": np.array([[1]], dtype=dtype)}
     others = NO_MATRICES | {"cube": np.ones((2, 2, 2)), "record": {"a": 1}, "complex_sparse": SPARSE * 1j}
     scipy.io.savemat(tmp_path / "any.mat", fields | others, do_compression=compressed)
-    matrices = read_matrices(tmp_path / "any.mat")
+    matrices = read_matlab(tmp_path / "any.mat")
     assert list(matrices) == [*fields, *others]
     for name, expected in fields.items():
         np.testing.assert_array_equal(matrices[name], expected)
@@ -41,7 +41,7 @@ def test_sparse_matrices_stay_sparse(tmp_path, compressed, dtype):
         "none": scipy.sparse.csc_array((2, 0)),
     }
     scipy.io.savemat(tmp_path / "any.mat", fields, do_compression=compressed)
-    for name, matrix in read_matrices(tmp_path / "any.mat").items():
+    for name, matrix in read_matlab(tmp_path / "any.mat").items():
         assert scipy.sparse.issparse(matrix)
         assert matrix.dtype == float
         np.testing.assert_array_equal(matrix.toarray(), fields[name].toarray().astype(float))
@@ -70,7 +70,7 @@ def test_both_byte_orders_and_objects_that_have_no_dimensions(tmp_path, order):
     file = tmp_path / "any.mat"
     objects = [variable(order, 17, *(element(1, word, order) for word in (n, b"MCOS", b"table"))) for n in (b"a", b"b")]
     file.write_bytes(mat_file(order, *objects, matrix_2x1(order, b"x")))
-    matrices = read_matrices(file)
+    matrices = read_matlab(file)
     assert matrices["a"] is matrices["b"] is None
     np.testing.assert_array_equal(matrices["x"], [[1.0], [2.0]])
 
@@ -86,7 +86,7 @@ def test_what_is_no_mat_file_or_holds_a_name_twice_is_refused(tmp_path):
     ]:
         file.write_bytes(content)
         with pytest.raises(ValueError, match=rf"any\.mat: .*{message}"):
-            read_matrices(file)
+            read_matlab(file)
 
 
 def sparse_2x2(rows, starts, values=(1.0, 2.0), shape=(2, 2)):
@@ -98,7 +98,7 @@ def sparse_2x2(rows, starts, values=(1.0, 2.0), shape=(2, 2)):
 def test_sparse_storage_may_be_longer_than_what_is_used(tmp_path):
     file = tmp_path / "any.mat"
     file.write_bytes(mat_file("<", sparse_2x2([0, 1, 7], [0, 1, 2], (1.0, 2.0, 9.0))))
-    np.testing.assert_array_equal(read_matrices(file)["K"].toarray(), np.diag([1.0, 2.0]))
+    np.testing.assert_array_equal(read_matlab(file)["K"].toarray(), np.diag([1.0, 2.0]))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_inconsistent_sparse_storage_is_refused(tmp_path, storage, message):
     file = tmp_path / "any.mat"
     file.write_bytes(mat_file("<", sparse_2x2(*storage)))
     with pytest.raises(ValueError, match=rf"any\.mat: variable 'K' .*{message}"):
-        read_matrices(file)
+        read_matlab(file)
 
 
 FIELDS = {"K0": SPARSE, "M0": np.eye(3)} | NO_MATRICES
@@ -131,7 +131,7 @@ def outcome(file, content):
     """The matrices, or what the error says."""
     file.write_bytes(content)
     try:
-        return read_matrices(file)
+        return read_matlab(file)
     except ValueError as error:
         return str(error)
 
@@ -173,4 +173,4 @@ def test_a_damaged_compressed_variable_is_named(tmp_path, place):
     content[-place] ^= 1
     file.write_bytes(content)
     with pytest.raises(ValueError, match=r"any\.mat: variable 'stiffness' is not readable"):
-        read_matrices(file)
+        read_matlab(file)

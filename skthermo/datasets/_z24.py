@@ -9,7 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
-from skthermo._matlab import Matrix, read_matrices
+from skthermo._arrays import Matrix
+from skthermo._io import read_matlab
 
 EPOCH = pd.Timestamp("1997-11-11")
 MODES = ["f1", "f2", "f3", "f4"]
@@ -130,7 +131,7 @@ def _numbers(texts: tuple[str, ...], what: str) -> NDArray[np.float64]:
 
 
 def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
-    content = read_matrices(file)
+    content = read_matlab(file)
     data = _matlab_field(content, "data", file)
     if data.ndim != 2 or data.shape[1] != len(MODES) or not len(data):
         raise ValueError(f"{file}: field 'data' has shape {data.shape}; expected (n, {len(MODES)})")

@@ -10,15 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
-from skthermo._validation import (
-    HasMethods,
-    _check_feature_names_in,
-    _fit_context,
-    check_columns,
-    check_is_fitted,
-    like,
-    validate_data,
-)
+from skthermo._frames import check_columns, frame_like
+from skthermo._validation import HasMethods, _check_feature_names_in, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._complete_rows import CompleteRowsRegressor
 
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
@@ -168,7 +161,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         folds = self._folds(temperatures)
         predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=folds)
         self.fit(X)
-        return like(X, np.asarray(frequencies) - predicted, self.get_feature_names_out())
+        return frame_like(X, np.asarray(frequencies) - predicted, self.get_feature_names_out())
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Residuals of new records.
@@ -191,7 +184,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
         residuals = np.asarray(frequencies) - self._regression.predict(temperatures)
-        return like(X, residuals, self.get_feature_names_out())
+        return frame_like(X, residuals, self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the targets.
@@ -219,7 +212,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         """The other columns and the targets, as frames where X is one."""
         columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
         others = np.delete(np.arange(len(columns)), self.targets_)
-        return tuple(like(X, values[:, part], columns[part]) for part in (others, self.targets_))
+        return tuple(frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
 
     def _folds(self, X: Any) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         folds = list(check_cv(self.cv).split(X))

@@ -10,7 +10,8 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._validation import BaseSearchCV, _BaseImputer, as_columns, as_floats, is_model
+from skthermo._arrays import as_columns, as_floats
+from skthermo._validation import BaseSearchCV, _BaseImputer, is_model
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):

@@ -1,35 +1,48 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
-from skthermo.fem._affine import AffineModel
-from skthermo.fem._beam import Beam
-from skthermo.fem._callable import CallableModel
-from skthermo.fem._elements import Bar, PointMass, Spring
-from skthermo.fem._exported import load_affine
-from skthermo.fem._local_modes import shape_jacobian
-from skthermo.fem._membrane import Membrane
-from skthermo.fem._noise import add_noise
-from skthermo.fem._probe import probe
-from skthermo.fem._protocol import FEModel
-from skthermo.fem._reduced import ReducedModel
-from skthermo.fem._sampling import sample
-from skthermo.fem._structure import Structure
-from skthermo.fem._tracking import mac
+from skthermo.fem._protocol import (
+    BatchModel,
+    DamageableModel,
+    DifferentiableModel,
+    FEModel,
+    LocalModel,
+    ModalModel,
+)
+from skthermo.fem._theta import check_bounds, check_theta
+from skthermo.fem.affine import AffineModel, ReducedModel
+from skthermo.fem.assembly import Structure
+from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
+from skthermo.fem.external import CallableModel, load_affine, probe
+from skthermo.fem.modal import LocalModes, mac, shape_jacobian, share_reordered
+from skthermo.fem.sampling import add_noise, check_noise, evaluate, sample
 
 __all__ = [
     "AffineModel",
     "Bar",
+    "BatchModel",
     "Beam",
     "CallableModel",
+    "DamageableModel",
+    "DifferentiableModel",
+    "Element",
     "FEModel",
+    "LocalModel",
+    "LocalModes",
     "Membrane",
+    "ModalModel",
     "PointMass",
     "ReducedModel",
     "Spring",
     "Structure",
     "add_noise",
+    "check_bounds",
+    "check_noise",
+    "check_theta",
+    "evaluate",
     "load_affine",
     "mac",
     "probe",
     "sample",
     "shape_jacobian",
+    "share_reordered",
 ]

@@ -1,9 +1,11 @@
-"""What an FE model must offer."""
+"""What an FE model must offer, and what it may offer beyond that."""
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import Array
 
 
 @runtime_checkable
@@ -17,18 +19,22 @@ class FEModel(Protocol):
     n_modes : int
         Columns of the frequencies.
 
+    See Also
+    --------
+    ModalModel : Gives mode shapes.
+    DifferentiableModel : Gives derivatives of its frequencies.
+    DamageableModel : Takes damage.
+    LocalModel : Gives everything about its modes at one theta.
+    BatchModel : Says how many rows are best solved together.
+
     Notes
     -----
-    A model that can do more is used for more, and each stage says which of these it needs:
+    A model that offers more is used for more. Each stage looks for the method that it needs, not for a class, and an
+    error names the method that is missing. Beside the protocols above, these are looked for:
 
-    - ``modes(theta) -> (frequencies, shapes)``, shapes (n_samples, n_dof, n_modes) with unit modal mass;
-    - ``jacobian(theta)``, d f / d theta in Hz, (n_samples, n_modes, n_parameters);
-    - ``damaged({group: severity})``, a new model with the groups' stiffness times (1 - severity);
-    - ``groups``, the names that ``damaged`` knows;
     - ``track``, whether a column follows its mode (True) or its rank (False);
     - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box;
-    - ``rows_per_chunk`` and ``prefer``, how many samples make a task, and joblib's hint what tasks are best spread
-      over.
+    - ``rescaled(theta)``, a model whose nominal state is this one's at theta.
 
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.
     """
@@ -41,12 +47,119 @@ class FEModel(Protocol):
     def n_modes(self) -> int:
         """Columns of the frequencies."""
 
-    def frequencies(self, theta: ArrayLike) -> NDArray[np.float64]:
+    def frequencies(self, theta: ArrayLike) -> Array:
         """Natural frequencies in Hz, (n_samples, n_modes), of theta (n_samples, n_parameters)."""
 
 
 class ModalModel(FEModel, Protocol):
-    """An FE model that gives mode shapes."""
+    """An FE model that gives mode shapes.
 
-    def modes(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+    """
+
+    def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
         """Frequencies, and shapes (n_samples, n_dof, n_modes) of unit modal mass."""
+
+
+class DifferentiableModel(FEModel, Protocol):
+    """An FE model that gives derivatives of its frequencies.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+    """
+
+    def jacobian(self, theta: ArrayLike) -> Array:
+        """d f / d theta in Hz, (n_samples, n_modes, n_parameters)."""
+
+
+class DamageableModel(FEModel, Protocol):
+    """An FE model that damage can be put into.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+    groups : mapping of str
+        The damage groups.
+    """
+
+    @property
+    def groups(self) -> Mapping[str, Any]:
+        """The damage groups by name."""
+
+    def damaged(self, damage: Mapping[str, float]) -> "DamageableModel":
+        """A new model with the stiffness of each group times (1 - severity)."""
+
+
+class LocalModel(FEModel, Protocol):
+    """An FE model that gives everything about its modes at one theta, for model updating.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+    n_dof : int
+        Number of degrees of freedom.
+    track : bool
+        Whether a column follows its mode rather than its rank.
+    """
+
+    @property
+    def n_dof(self) -> int:
+        """Number of degrees of freedom."""
+
+    @property
+    def track(self) -> bool:
+        """Whether a column follows its mode rather than its rank."""
+
+    def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
+        """A `LocalModes` of the lowest modes at one theta; with ``follow``, of enough to hold every nominal mode."""
+
+
+class BatchModel(FEModel, Protocol):
+    """An FE model that says how many rows are best solved together, and warns of all of them at once.
+
+    Attributes
+    ----------
+    parameter_names : tuple of str
+        Columns of theta.
+    n_modes : int
+        Columns of the frequencies.
+    rows_per_chunk : int
+        How many rows are solved together.
+    prefer : str
+        Hint to joblib: "threads" or "processes".
+    thread_safe : bool
+        Whether several threads may ask it at the same time.
+    """
+
+    @property
+    def rows_per_chunk(self) -> int:
+        """How many rows are solved together."""
+
+    @property
+    def prefer(self) -> str:
+        """Hint to joblib: "threads" or "processes"."""
+
+    @property
+    def thread_safe(self) -> bool:
+        """Whether several threads may ask it at the same time."""
+
+    def quiet(self) -> FEModel:
+        """The same model without warnings."""
+
+    def warn_of(self, theta: Array, frequencies: NDArray) -> None:
+        """Give the model's warnings about a whole table and its solution."""

@@ -1,21 +1,26 @@
-"""Rows of parameter multipliers."""
+"""Rows of parameter multipliers and their bounds."""
 
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from skthermo._validation import as_floats
+from skthermo._arrays import Array, as_floats
+
+ROWS_PER_CHUNK = 256
+"""Largest number of samples solved together."""
 
 
-def nominal_theta(n_parameters: int) -> NDArray[np.float64]:
+def nominal_theta(n_parameters: int) -> Array:
     """One row of ones: every parameter at its nominal value."""
     return np.ones((1, n_parameters))
 
 
-def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: bool = False) -> NDArray[np.float64]:
+def check_theta(
+    theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: bool = False, one_row: bool = False
+) -> Array:
     """Rows of finite, positive multipliers, one column for each parameter.
 
     Parameters
@@ -27,6 +32,8 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
         The parameters.
     allow_nan : bool, default=False
         Whether NaN may stand for what is not known.
+    one_row : bool, default=False
+        Whether exactly one row is expected.
 
     Returns
     -------
@@ -35,7 +42,18 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
     Raises
     ------
     ValueError
-        If the width or the names differ, or a value is not finite and positive.
+        If the width or the names differ, a value is not finite and positive, or there are
+        several rows where one is expected.
+
+    Examples
+    --------
+    >>> from skthermo.fem import check_theta
+    >>> check_theta([1.0, 0.9], ["E_deck", "E_arch"])
+    array([[1. , 0.9]])
+    >>> check_theta([[1.0, 0.9], [1.0, -0.1]], ["E_deck", "E_arch"])
+    Traceback (most recent call last):
+    ...
+    ValueError: theta must be finite and positive; row 1, parameter 'E_arch' is -0.1 (1 such values in all)
     """
     names = list(parameter_names)
     if hasattr(theta, "columns") and list(theta.columns) != names:
@@ -54,18 +72,55 @@ def check_theta(theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: 
             f"theta must be finite and positive; row {row}, parameter {names[column]!r} "
             f"is {rows[row, column]} ({np.count_nonzero(wrong)} such values in all)"
         )
+    if one_row and len(rows) != 1:
+        raise ValueError(f"theta has {len(rows)} rows; expected one")
     return rows
 
 
-def check_one_theta(theta: ArrayLike, parameter_names: Sequence[str]) -> NDArray[np.float64]:
-    """A single row of finite, positive multipliers, (1, n_parameters)."""
-    row = check_theta(theta, parameter_names)
-    if len(row) != 1:
-        raise ValueError(f"theta has {len(row)} rows; expected one")
-    return row
+def check_bounds(bounds: ArrayLike, parameter_names: Sequence[str]) -> Array:
+    """Lowest and highest multiplier of every parameter.
+
+    Parameters
+    ----------
+    bounds : float or array-like of shape (n_parameters, 2)
+        A half-width (0.2 means 1 +- 20 %), or lowest and highest multipliers.
+    parameter_names : sequence of str
+        The parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_parameters, 2)
+
+    Raises
+    ------
+    ValueError
+        If a half-width is not between 0 and 1, the shape is another, or a lowest multiplier is
+        not positive or not below the highest.
+
+    Examples
+    --------
+    >>> from skthermo.fem import check_bounds
+    >>> check_bounds(0.2, ["E_deck", "E_arch"])
+    array([[0.8, 1.2],
+           [0.8, 1.2]])
+    """
+    array = np.asarray(bounds, dtype=float)
+    if array.ndim == 0:
+        if not 0 < array < 1:
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
+        return np.tile([1 - array, 1 + array], (len(parameter_names), 1))
+    if array.shape != (len(parameter_names), 2):
+        raise ValueError(
+            f"bounds has shape {array.shape}; expected a half-width or ({len(parameter_names)}, 2), lowest "
+            f"and highest multipliers of {list(parameter_names)}"
+        )
+    for name, (lowest, highest) in zip(parameter_names, array, strict=True):
+        if not 0 < lowest < highest < np.inf:
+            raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
+    return array
 
 
-def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64], *, stacklevel: int = 4) -> None:
+def warn_of_failures(theta: Array, solved: Array, *, stacklevel: int = 4) -> None:
     """Say how many known rows have no solution, and at which theta the first of them is."""
     failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
     if failed.any():
@@ -78,14 +133,14 @@ def warn_of_failures(theta: NDArray[np.float64], solved: NDArray[np.float64], *,
         )
 
 
-def by_name(row: NDArray[np.float64], parameter_names: Sequence[str]) -> dict[str, float]:
+def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:
     """Multipliers as they are shown in messages."""
     return dict(zip(parameter_names, row.tolist(), strict=True))
 
 
 @contextmanager
-def failures_named(rows: NDArray[np.float64], parameter_names: Sequence[str]) -> Iterator[None]:
-    """Say at which theta somebody else's program fails."""
+def failures_named(rows: Array, parameter_names: Sequence[str]) -> Iterator[None]:
+    """Re-raise a user function's error with its theta."""
     try:
         yield
     except Exception as error:

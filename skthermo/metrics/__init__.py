@@ -5,9 +5,10 @@ from skthermo.metrics._detectability import (
     probability_of_detection,
     probability_of_false_alarm,
 )
-from skthermo.metrics._errors import error_table, frequency_scorer, mape
+from skthermo.metrics._errors import complete_r2, error_table, frequency_scorer, mape
 
 __all__ = [
+    "complete_r2",
     "error_table",
     "frequency_scorer",
     "mape",

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._validation import as_floats
+from skthermo._arrays import as_floats
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:

@@ -8,7 +8,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
-from skthermo._validation import as_columns, check_same_rows, column_names
+from skthermo._arrays import as_columns
+from skthermo._frames import check_same_rows, column_names
 
 AVERAGE = "Average"
 
@@ -94,7 +95,31 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
 
 
 def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
-    """R2 over the rows without NaN, averaged over modes; NaN with fewer than two such rows."""
+    """Coefficient of determination R2 over complete rows, averaged over columns.
+
+    Parameters
+    ----------
+    y_true : array-like or DataFrame of shape (n_samples, n_columns)
+        Measured values.
+    y_pred : array-like or DataFrame of shape (n_samples, n_columns)
+        Predicted values. Rows in which either holds NaN are ignored.
+
+    Returns
+    -------
+    float
+        At most 1; NaN with fewer than two complete rows.
+
+    Raises
+    ------
+    ValueError
+        If the shapes or the indices differ.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import complete_r2
+    >>> complete_r2([[4.0], [4.2], [4.4]], [[4.0], [4.2], [float("nan")]])
+    1.0
+    """
     measured, predicted = _paired(y_true, y_pred)
     complete = _complete(measured, predicted)
     return float(r2_score(measured[complete], predicted[complete])) if complete.sum() > 1 else float("nan")

@@ -7,17 +7,16 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 
+from skthermo._arrays import as_floats
+from skthermo._frames import check_columns, frame_like
 from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
-    as_floats,
     check_array,
-    check_columns,
     check_is_fitted,
     clone_sharing_models,
     is_model,
-    like,
     validate_data,
 )
 
@@ -90,7 +89,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             to scale by is zero.
         """
         F = self._validated(X, reset=True)
-        check_columns(like(X, F, self.get_feature_names_out()), "frequency")
+        check_columns(frame_like(X, F, self.get_feature_names_out()), "frequency")
         self.mean_ = np.nanmean(F, axis=0)
         self.reference_ = self._read_reference(F.shape[1])
         if self.method == "scale":
@@ -115,8 +114,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         F = self._validated(X, reset=False)
         if self.method == "scale":
-            return like(X, F / self.mean_ * self.reference_, self.get_feature_names_out())
-        return like(X, F - self.mean_ + self.reference_, self.get_feature_names_out())
+            return frame_like(X, F / self.mean_ * self.reference_, self.get_feature_names_out())
+        return frame_like(X, F - self.mean_ + self.reference_, self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """The model's frequencies to the measured domain.
@@ -138,8 +137,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
         if self.method == "scale":
-            return like(X, F / self.reference_ * self.mean_, self.get_feature_names_out())
-        return like(X, F - self.reference_ + self.mean_, self.get_feature_names_out())
+            return frame_like(X, F / self.reference_ * self.mean_, self.get_feature_names_out())
+        return frame_like(X, F - self.reference_ + self.mean_, self.get_feature_names_out())
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")

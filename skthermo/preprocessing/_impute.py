@@ -7,13 +7,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
+from skthermo._frames import frame_like
 from skthermo._validation import (
     _check_feature_names_in,
     _get_weights,
     _num_samples,
     check_array,
     check_is_fitted,
-    like,
     validate_data,
 )
 from skthermo.preprocessing._nearest import Donors, row_patterns
@@ -142,11 +142,11 @@ class KNNGapImputer(KNNImputer):
         if self._donors is not None:
             values = validate_data(self, X, dtype=FLOATS, ensure_all_finite="allow-nan", reset=False)
         if values is None or not self._donors.are_worth_trees(np.isnan(values)):
-            return like(X, super().transform(X), self.get_feature_names_out())
+            return frame_like(X, super().transform(X), self.get_feature_names_out())
         filled = self._filled(values)
         if self.add_indicator:
             filled = np.hstack([filled, self.indicator_.transform(np.isnan(values))])
-        return like(X, filled, self.get_feature_names_out())
+        return frame_like(X, filled, self.get_feature_names_out())
 
     def _filled(self, values: NDArray) -> NDArray:
         """Weighted means of the nearest donors, for each pattern of missing columns and each of these."""

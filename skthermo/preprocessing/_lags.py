@@ -10,13 +10,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 
+from skthermo._frames import frame_like
 from skthermo._validation import (
     Interval,
     StrOptions,
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
-    like,
     validate_data,
 )
 
@@ -165,7 +165,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
         lagged = self._by_row(values, self.lags_) if stamps is None else self._by_time(stamps, values)
-        return like(X, lagged, self.get_feature_names_out())
+        return frame_like(X, lagged, self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the columns: sensor_lag0, sensor_lag1, ...

@@ -9,27 +9,22 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
+from skthermo._arrays import as_columns, as_floats
+from skthermo._frames import check_columns, check_same_rows, column_names, frame_like
 from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
-    as_columns,
-    as_floats,
     check_array,
-    check_columns,
     check_is_fitted,
-    check_same_rows,
     clone_sharing_models,
-    column_names,
     is_model,
-    like,
     seed_parts,
     seeded,
     validate_data,
 )
-from skthermo.fem import FEModel, add_noise
-from skthermo.fem._sampling import solve
-from skthermo.metrics._errors import complete_r2
+from skthermo.fem import FEModel, add_noise, evaluate
+from skthermo.metrics import complete_r2
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._regression import identity
@@ -160,7 +155,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self._parameter_names):
             raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self._parameter_names}")
-        self.parameters_ = like(T, theta, self._parameter_names)
+        self.parameters_ = frame_like(T, theta, self._parameter_names)
         self.mapper_.fit(T, self.parameters_)
         return self
 
@@ -191,7 +186,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
                 stacklevel=2,
             )
             theta[impossible] = np.nan
-        return like(X, theta, self._parameter_names)
+        return frame_like(X, theta, self._parameter_names)
 
     def predict(self, X: ArrayLike) -> Table:
         """Frequencies of the healthy structure at given temperatures.
@@ -244,7 +239,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         model = self.model.damaged(damage) if damage else self.model
         frequencies = self._frequencies(model, X)
         noisy = add_noise(frequencies, noise, random_state=random_state)
-        return like(X, noisy, self._mode_names)
+        return frame_like(X, noisy, self._mode_names)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -266,8 +261,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         return complete_r2(y, self.predict(X))
 
     def _frequencies(self, model: FEModel, X: ArrayLike) -> Table:
-        simulated = solve(model, as_floats(self.predict_parameters(X)))
-        return like(X, as_floats(self.aligner_.inverse_transform(simulated)), self._mode_names)
+        simulated = evaluate(model, as_floats(self.predict_parameters(X)))
+        return frame_like(X, as_floats(self.aligner_.inverse_transform(simulated)), self._mode_names)
 
     def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies, checked; frames stay frames."""
@@ -276,8 +271,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         if y is None:
             raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
-        T = like(X, values, getattr(X, "columns", ()))
-        F = like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
+        T = frame_like(X, values, getattr(X, "columns", ()))
+        F = frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
         check_same_rows(X, y, ("temperatures", "frequencies"))
         if F.shape[1] != self.model.n_modes:
             raise ValueError(
@@ -311,7 +306,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
     def _imputed(self, T: Any, F: Any) -> Any:
         n_sensors, n_modes = T.shape[1], F.shape[1]
         completed = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-        return like(F, completed[:, n_sensors : n_sensors + n_modes], self._mode_names)
+        return frame_like(F, completed[:, n_sensors : n_sensors + n_modes], self._mode_names)
 
     def __sklearn_clone__(self) -> "DataInformedFEM":
         return clone_sharing_models(self)

@@ -11,18 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._validation import (
-    HasMethods,
-    Interval,
-    _fit_context,
-    check_is_fitted,
-    is_model,
-    like,
-    validate_data,
-)
-from skthermo.fem import FEModel, add_noise
-from skthermo.fem._sampling import solve
-from skthermo.fem._theta import check_theta
+from skthermo._frames import frame_like
+from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
+from skthermo.fem import FEModel, add_noise, check_theta, evaluate
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
 
@@ -186,7 +177,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         ndarray or DataFrame of shape (n_samples, n_parameters)
             NaN in rows where a mode is missing. A frame gives a frame on its own index.
         """
-        return like(X, self._predict_array(X), self.get_feature_names_out())
+        return frame_like(X, self._predict_array(X), self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Frequencies of parameters, by the FE model.
@@ -211,7 +202,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if self.model is None:
             raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
         modes = getattr(self, "feature_names_in_", [f"f{i + 1}" for i in range(self.model.n_modes)])
-        return like(X, solve(self.model, X, n_jobs=self.n_jobs), modes)
+        return frame_like(X, evaluate(self.model, X, n_jobs=self.n_jobs), modes)
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the parameters.

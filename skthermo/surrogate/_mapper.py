@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._validation import HasMethods, _fit_context, check_columns, like, seeded
+from skthermo._frames import check_columns, frame_like
+from skthermo._validation import HasMethods, _fit_context, seeded
 from skthermo.surrogate._regression import MultiplierRegressor
 
 
@@ -86,7 +87,7 @@ class TemperatureMapper(MultiplierRegressor):
             than two rows are complete.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        check_columns(like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
+        check_columns(frame_like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
         self._n_parameters = theta.shape[1]
         self._learn(T, theta, seeded(self.random_state))
         return self

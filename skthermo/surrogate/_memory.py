@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
-from skthermo._locks import lock
-from skthermo.fem import FEModel, sample
-from skthermo.fem._tracking import share_reordered
+from skthermo._io import lock
+from skthermo.fem import FEModel, sample, share_reordered
 
 ORDER_CHECKS = 256
 

@@ -10,20 +10,11 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
+from skthermo._arrays import as_columns, as_floats
+from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._threads import single_blas_thread
-from skthermo._validation import (
-    as_columns,
-    as_floats,
-    check_array,
-    check_is_fitted,
-    check_same_rows,
-    clone_sharing_models,
-    column_names,
-    like,
-    seed_parts,
-    validate_data,
-)
-from skthermo.metrics._errors import complete_r2
+from skthermo._validation import check_array, check_is_fitted, clone_sharing_models, seed_parts, validate_data
+from skthermo.metrics import complete_r2
 from skthermo.surrogate._networks import default_network
 
 
@@ -52,7 +43,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         theta = self._predict_array(X)
         if self._y_is_vector:
             return theta[:, 0]
-        return theta if self._parameter_names is None else like(X, theta, self._parameter_names)
+        return theta if self._parameter_names is None else frame_like(X, theta, self._parameter_names)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.

@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo.fem import AffineModel, FEModel
-from skthermo.fem._local_modes import LocalModes
-from skthermo.fem._sampling import solve
+from skthermo.fem import FEModel, LocalModel, evaluate
 from skthermo.updating._measured import Measured
 from skthermo.updating._sensitivity import central_jacobian
 
@@ -46,7 +44,7 @@ class Counterparts:
 
 def counterparts(model: FEModel, measured: Measured, theta: Array) -> Counterparts:
     """Modes paired by their shapes where some were measured, else column by column."""
-    if measured.dofs.size and isinstance(model, AffineModel):
+    if measured.dofs.size and hasattr(model, "local_modes"):
         return _by_shape(model, measured, theta)
     return _by_column(model, measured, theta[np.newaxis])
 
@@ -68,14 +66,14 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> Counterparts:
         gradient = jacobian(row)[0] if jacobian else central_jacobian(model, row, DIFFERENCE_STEP)
         return gradient[measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
-    frequencies = solve(model, row)[0, measured.columns]
+    frequencies = evaluate(model, row)[0, measured.columns]
     return Counterparts(frequencies, np.empty((0, len(frequencies))), None, derivatives)
 
 
-def _by_shape(model: AffineModel, measured: Measured, theta: Array) -> Counterparts:
-    modes = LocalModes(model, theta)
+def _by_shape(model: LocalModel, measured: Measured, theta: Array) -> Counterparts:
+    modes = model.local_modes(theta)
     shapes = modes.shapes(measured.dofs)
-    alike = NOMINAL_SHARE * modes.likeness[measured.columns]
+    alike = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
     with_shape = measured.has_shape
     alike[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
     ranks = linear_sum_assignment(np.nan_to_num(alike), maximize=True)[1]

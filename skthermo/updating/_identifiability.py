@@ -8,12 +8,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
-from skthermo.fem import AffineModel, FEModel, shape_jacobian
-from skthermo.fem._noise import check_noise
-from skthermo.fem._theta import nominal_theta
+from skthermo.fem import FEModel, check_noise, shape_jacobian
 from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
 from skthermo.updating._measured import check_dofs
-from skthermo.updating._sensitivity import sensitivity
+from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 
 Array = NDArray[np.float64]
 
@@ -126,12 +124,12 @@ def identifiability(
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes by ln theta over their noise."""
-    if not isinstance(model, AffineModel):
+    if not hasattr(model, "local_modes"):
         raise ValueError(f"shapes of {model!r} cannot be differentiated; expected an AffineModel")
     if shape_noise is None or not 0 < shape_noise < np.inf:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     places = check_dofs(dofs, model.n_dof)
-    row = nominal_theta(len(model.parameter_names)) if theta is None else np.atleast_2d(np.asarray(theta, dtype=float))
+    row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, places)
     slopes = tangent_derivatives(shapes, d_shapes, shape_directions(shapes)) * row[0]
     return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(places)) / shape_noise

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._validation import as_floats
+from skthermo._arrays import as_floats
 
 Array = NDArray[np.float64]
 

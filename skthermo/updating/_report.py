@@ -8,16 +8,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo.fem import AffineModel, CallableModel, FEModel
-from skthermo.fem._local_modes import LocalModes
-from skthermo.fem._protocol import ModalModel
-from skthermo.fem._tracking import SAME_MODE, share_reordered
+from skthermo.fem import CallableModel, FEModel, ModalModel, share_reordered
 from skthermo.updating._comparison import counterparts, macs
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome
 from skthermo.updating._residuals import Residuals
 
 Array = NDArray[np.float64]
+
+UNLIKE = 0.5
+"""MAC with every mode below which a measured shape is like none of them."""
 
 SAME_OPTIMUM = 1e-3
 """Largest difference of multipliers at which two starts have ended at the same optimum."""
@@ -60,7 +60,7 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
 
 def rescaled(model: FEModel, theta: Array) -> FEModel:
     """The model whose nominal state is the given one at theta."""
-    if isinstance(model, AffineModel):
+    if hasattr(model, "rescaled"):
         return model.rescaled(theta)
     function = partial(_frequencies_from, model, theta)
     return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
@@ -83,7 +83,7 @@ def unfinished(outcome: Outcome, residuals: Residuals) -> str:
 def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
     """What is to be said of measured modes that are other modes than the updated model's columns."""
     names = np.array(measured.names)
-    if not (measured.dofs.size and isinstance(model, AffineModel)):
+    if not (measured.dofs.size and hasattr(model, "local_modes")):
         swapped = names[_swapped(model, theta)[measured.columns]]
         if swapped.size:
             yield (
@@ -92,10 +92,10 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
             )
         return
     modes = counterparts(model, measured, theta)
-    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < SAME_MODE)]
+    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < UNLIKE)]
     if unlike.size:
-        yield f"no mode of the optimum is like the measured shapes of {unlike.tolist()} (MAC below {SAME_MODE})"
-    columns = LocalModes.followed(model, theta)[1] if model.track else np.arange(model.n_modes)
+        yield f"no mode of the optimum is like the measured shapes of {unlike.tolist()} (MAC below {UNLIKE})"
+    columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
     other = names[modes.ranks != columns[measured.columns]]
     if other.size:
         yield (
@@ -108,6 +108,6 @@ def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
     """Columns that hold another mode at theta than at the nominal parameters."""
     if getattr(model, "track", True) or not hasattr(model, "modes"):
         return np.zeros(model.n_modes, bool)
-    if isinstance(model, AffineModel):
-        return np.asarray(LocalModes.followed(model, theta)[1] != np.arange(model.n_modes))
+    if hasattr(model, "local_modes"):
+        return np.asarray(model.local_modes(theta, follow=True).ranks != np.arange(model.n_modes))
     return np.full(model.n_modes, share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)

@@ -1,11 +1,9 @@
 """What model updating makes small."""
 
-import copy
-
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo.fem import AffineModel, CallableModel, FEModel
+from skthermo.fem import FEModel
 from skthermo.updating._comparison import Counterparts, counterparts
 from skthermo.updating._information import tangent_derivatives, tangents
 from skthermo.updating._measured import Measured
@@ -15,15 +13,7 @@ Array = NDArray[np.float64]
 
 def without_warnings(model: FEModel) -> FEModel:
     """The model to search with: it says nothing of single theta, which an optimisation leaves again."""
-    if not isinstance(model, AffineModel | CallableModel):
-        return model
-    silent = copy.copy(model)
-    vars(silent).update(_warn_of=_say_nothing, _warn_of_bounds=_say_nothing)
-    return silent
-
-
-def _say_nothing(*_) -> None:
-    pass
+    return model.quiet() if hasattr(model, "quiet") else model
 
 
 class Residuals:

@@ -7,9 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo.fem import FEModel
-from skthermo.fem._sampling import solve
-from skthermo.fem._theta import check_one_theta, nominal_theta
+from skthermo.fem import FEModel, check_theta, evaluate
 
 Array = NDArray[np.float64]
 
@@ -70,8 +68,8 @@ def sensitivity(
     vertical    0.001
     Name: f1, dtype: float64
     """
-    row = nominal_theta(len(model.parameter_names)) if theta is None else check_one_theta(theta, model.parameter_names)
-    frequencies = solve(model, row)[0]
+    row = theta_or_nominal(model, theta)
+    frequencies = evaluate(model, row)[0]
     if not np.isfinite(frequencies).all():
         raise ValueError(f"the model has the frequencies {frequencies} at theta = {row[0].tolist()}; expected numbers")
     if method == "exact":
@@ -118,14 +116,20 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
     return [*S.columns[(S.abs() >= threshold).any(axis=0)]]
 
 
+def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
+    """One checked row of multipliers, all of them 1 by default."""
+    names = model.parameter_names
+    return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
+
+
 def central_jacobian(model: FEModel, row: Array, step: float) -> Array:
     """d f / d theta by central differences of a relative step, (n_modes, n_parameters); one-sided beside NaN."""
     if not isinstance(step, Real) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.01")
     steps = np.diag(step * row[0])
-    sides = np.array(np.split(solve(model, np.vstack([row + steps, row - steps])), 2))
+    sides = np.array(np.split(evaluate(model, np.vstack([row + steps, row - steps])), 2))
     known = ~np.isnan(sides)
     if not known.all():
-        sides = np.where(known, sides, solve(model, row))
+        sides = np.where(known, sides, evaluate(model, row))
     widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * step * row[0][:, np.newaxis]
     return ((sides[0] - sides[1]) / widths).T

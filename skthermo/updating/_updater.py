@@ -11,19 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
+from skthermo._arrays import as_floats
+from skthermo._frames import column_names
 from skthermo._validation import (
     HasMethods,
     Interval,
     StrOptions,
     _fit_context,
-    as_floats,
     clone_sharing_models,
-    column_names,
     is_model,
     validate_data,
 )
-from skthermo.fem import AffineModel, FEModel
-from skthermo.fem._sampling import check_bounds
+from skthermo.fem import FEModel, check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
@@ -241,12 +240,9 @@ class ModelUpdater(BaseEstimator):
             warnings.warn(unfinished(best, residuals), UserWarning, stacklevel=3)
         for message in false_matches(model, measured, best.theta):
             warnings.warn(message, UserWarning, stacklevel=3)
-        self._warn_of_bounds(best.theta)
+        if hasattr(self.model, "warn_of"):
+            self.model.warn_of(best.theta[np.newaxis], self.table_[["after"]].to_numpy().T)
         return self
-
-    def _warn_of_bounds(self, theta: Array) -> None:
-        if isinstance(self.model, AffineModel):
-            self.model._warn_of_bounds(theta[np.newaxis])
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         if not is_model(self.model):
@@ -259,7 +255,7 @@ class ModelUpdater(BaseEstimator):
                 f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, "
                 "NaN where one was not measured"
             )
-        if shapes is not None and not isinstance(self.model, AffineModel):
+        if shapes is not None and not hasattr(self.model, "local_modes"):
             raise ValueError(
                 f"shapes were given, but {self.model!r} cannot differentiate its own; expected an AffineModel"
             )

@@ -4,14 +4,14 @@
 """
 
 import argparse
+from functools import partial
 
 import numpy as np
 from measure import median_seconds
 
 from skthermo.fem import Beam, Structure
-from skthermo.fem._eigen import dense_form
-from skthermo.fem._shift_invert import ShiftInvertForm
-from skthermo.fem._terms import DenseTerms, SparseTerms
+from skthermo.fem.affine._terms import DenseTerms, SparseTerms
+from skthermo.fem.modal import ShiftInvertSolver, dense_solver
 
 SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
 
@@ -58,7 +58,8 @@ def both_forms(model):
     """The model's eigenproblem, dense and sparse, whichever it chose."""
     (nominal, mass), (first, _), (other, _) = (model.matrices(theta) for theta in ([1, 1], [2, 1], [1, 2]))
     stiffness, forms = [first - nominal, other - nominal], {}
-    for name, kind, form in (("dense", DenseTerms, dense_form), ("sparse", SparseTerms, ShiftInvertForm)):
+    dense = partial(dense_solver, nominal=np.ones((1, 2)))
+    for name, kind, form in (("dense", DenseTerms, dense), ("sparse", SparseTerms, ShiftInvertSolver)):
         exponents = np.eye(2, dtype=int), np.zeros((1, 2), dtype=int)
         forms[name] = form(kind.from_matrices(stiffness, exponents[0]), kind.from_matrices([mass], exponents[1]))
     return forms

@@ -19,7 +19,7 @@ from skthermo.fem import sample
 
 def loop(model, theta, **options):
     """One assembly and one scipy.linalg.eigh for each sample."""
-    terms, mass = model._stiffness, model.matrices(theta[0])[1].toarray()
+    terms, mass = model._core.stiffness, model.matrices(theta[0])[1].toarray()
     for coefficients in terms.coefficients(theta):
         stiffness = sum(c * matrix for c, matrix in zip(coefficients, terms.matrices, strict=True))
         scipy.linalg.eigh(stiffness, mass, **options)

@@ -114,7 +114,7 @@ def test_columns_of_a_rescaled_model_stay_the_nominal_modes_where_modes_swap():
     twin = model.rescaled([2.0, 1.0, 0.5])
     nominal = np.ones((1, 3))
     np.testing.assert_allclose((2 * np.pi * twin.frequencies(nominal)) ** 2, [[4.0, 3.0]])
-    np.testing.assert_allclose(np.diagonal(twin.likeness(twin.modes(nominal)[1])[0]), 1)
+    np.testing.assert_allclose(np.diagonal(twin.nominal_mac(twin.modes(nominal)[1])[0]), 1)
 
 
 def test_rescaling_takes_one_theta():

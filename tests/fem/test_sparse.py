@@ -11,9 +11,9 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
-from skthermo.fem._affine_input import DENSE_DOFS
-from skthermo.fem._shift_invert import ShiftInvertForm
-from skthermo.fem._terms import DenseTerms, SparseTerms
+from skthermo.fem.affine._read_terms import DENSE_DOFS
+from skthermo.fem.affine._terms import DenseTerms, SparseTerms
+from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, SECTION, portal
 
 THETA = np.random.default_rng(0).uniform(0.6, 1.5, (6, 4))
@@ -31,7 +31,7 @@ def dense_frequencies(model, theta):
 
 def test_the_frame_is_solved_sparsely():
     assert FRAME.n_dof > DENSE_DOFS
-    assert isinstance(FRAME._form, ShiftInvertForm)
+    assert isinstance(FRAME._core.solver, ShiftInvertSolver)
 
 
 def test_sparse_frequencies_agree_with_a_dense_solver():
@@ -73,8 +73,8 @@ def test_sparse_and_dense_terms_are_one_sum():
     for law in ("gradients", "product"):
         np.testing.assert_allclose(getattr(sparse, law)(theta, shapes), getattr(dense, law)(theta, shapes), atol=1e-12)
     basis = random.standard_normal((9, 4))
-    reduced = sparse.congruent(basis).assemble(theta)
-    np.testing.assert_allclose(reduced, dense.congruent(basis).assemble(theta), atol=1e-12)
+    reduced = sparse.projected(basis).assemble(theta)
+    np.testing.assert_allclose(reduced, dense.projected(basis).assemble(theta), atol=1e-12)
 
 
 def chain(n_dof):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo.fem import AffineModel, Beam, Structure, mac
-from skthermo.fem._tracking import pair_modes, share_reordered
+from skthermo.fem import AffineModel, Beam, Structure, mac, share_reordered
+from skthermo.fem.modal import pair_modes
 
 
 def crossing(**options):
@@ -66,7 +66,7 @@ def test_many_intruders_do_not_push_out_a_tracked_mode():
     terms = {("own",): np.diag(stiffness * ~local), ("local",): np.diag(stiffness * local)}
     model = AffineModel(terms, np.eye(13), n_modes=2, track=True)
     np.testing.assert_allclose(model.frequencies([[400.0, 1.0], [1.0, 0.001]]), [[20, 2], [1, 2 * 0.001**0.5]])
-    assert np.diagonal(model.likeness(model.modes([[400.0, 1.0]])[1])[0]).min() > 0.99
+    assert np.diagonal(model.nominal_mac(model.modes([[400.0, 1.0]])[1])[0]).min() > 0.99
 
 
 def square_mast(**options):
@@ -88,9 +88,9 @@ def test_modes_of_a_repeated_frequency_are_followed_together():
 
 
 def test_a_pair_that_swaps_with_another_mode_is_followed_as_a_pair():
-    together = np.array([[True, False, False], [False, True, True], [False, True, True]])
-    likeness = np.array([[[0.02, 0.95, 0.03], [0.48, 0.02, 0.5], [0.5, 0.03, 0.47]]])
-    np.testing.assert_array_equal(pair_modes(likeness, together), [[1, 0, 2]])
+    repeated = np.array([[True, False, False], [False, True, True], [False, True, True]])
+    macs = np.array([[[0.02, 0.95, 0.03], [0.48, 0.02, 0.5], [0.5, 0.03, 0.47]]])
+    np.testing.assert_array_equal(pair_modes(macs, repeated), [[1, 0, 2]])
 
 
 def test_share_of_reordered_samples():
@@ -108,12 +108,14 @@ def test_modes_are_followed_where_mass_changes():
     model = AffineModel(springs, masses, n_modes=3, track=True, parameter_names=["k", *"abc"])
     theta = np.array([[1.0, 9.0, 1.0, 1.0], [1.0, 1.0, 16.0, 0.04], [1.0, 0.01, 1.0, 25.0]])
     np.testing.assert_allclose(model.frequencies(theta), [1, 2, 3] / np.sqrt(theta[:, 1:]), rtol=1e-12)
-    np.testing.assert_allclose(model.likeness(model.modes(theta)[1]), np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12)
+    np.testing.assert_allclose(
+        model.nominal_mac(model.modes(theta)[1]), np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12
+    )
 
 
 def test_no_candidate_serves_two_modes():
-    likeness = np.array([[[0.9, 0.1, 0.0], [0.8, 0.15, 0.05]]])
-    np.testing.assert_array_equal(pair_modes(likeness), [[0, 1]])
+    macs = np.array([[[0.9, 0.1, 0.0], [0.8, 0.15, 0.05]]])
+    np.testing.assert_array_equal(pair_modes(macs), [[0, 1]])
 
 
 shapes = st.integers(0, 2**31).map(lambda seed: np.random.default_rng(seed).standard_normal((5, 3, 2)) @ [1, 1j])

@@ -1,0 +1,36 @@
+"""Arrays, matrices and seeds, without scikit-learn or pandas."""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import ArrayLike, NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Matrix: TypeAlias = Array | scipy.sparse.csc_array
+RandomState: TypeAlias = int | np.random.RandomState | None
+
+
+def as_floats(values: ArrayLike) -> Array:
+    """An array of floats; missing values of a nullable pandas column become NaN."""
+    if hasattr(values, "iloc"):  # a pandas frame or series
+        return values.to_numpy(dtype=float, na_value=np.nan)
+    return np.asarray(values, dtype=float)
+
+
+def as_columns(values: ArrayLike) -> Array:
+    """A table of floats; a vector becomes its only column."""
+    array = as_floats(values)
+    return array[:, np.newaxis] if array.ndim == 1 else array
+
+
+def as_dense(matrix: Matrix) -> Array:
+    """A matrix as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
+def as_random_state(seed: Any) -> np.random.RandomState:
+    """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas."""
+    from sklearn.utils import check_random_state
+
+    return check_random_state(seed)

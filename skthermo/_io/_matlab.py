@@ -1,0 +1,142 @@
+"""Matrices from MATLAB v5 files, damaged files included.
+
+SciPy's reader follows the lengths that a file states; where these are damaged it can end the
+interpreter. Here every length is checked against the bytes that are there.
+"""
+
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from skthermo._arrays import Matrix
+
+Part = tuple[int, bytes]
+
+HEADER = 128
+MATRIX, COMPRESSED = 14, 15
+STORED_AS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+SPARSE_CLASS, OBJECT_CLASS = 5, 17
+NUMERIC_CLASSES = range(6, 16)
+COMPLEX = 0x0800
+NAME_WITHIN = 1024  # bytes of a variable's beginning, its name included
+
+
+def read_matlab(file: Path, *, complex_too: bool = False) -> dict[str, Matrix | None]:
+    """Every variable of a MATLAB v5 file; None for what is not a real matrix, full or sparse.
+
+    Raises
+    ------
+    ValueError
+        Names the file and the variable, if it is not a MATLAB v5 file, or cut off or inconsistent anywhere.
+    """
+    content = file.read_bytes()
+    if content.startswith(b"MATLAB 7.3"):
+        raise ValueError(f"{file}: a MATLAB v7.3 file; expected v5: save it anew with the option '-v7'")
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+    if order is None:
+        raise ValueError(f"{file}: not a MATLAB v5 file; expected its header of {HEADER} bytes")
+    matrices: dict[str, Matrix | None] = {}
+    place = "the first variable"
+    try:
+        for kind, body in _elements(content[HEADER:], order):
+            if kind == COMPRESSED:
+                place = f"variable {_name(zlib.decompressobj().decompress(body, NAME_WITHIN)[8:], order)!r}"
+                ((kind, body),) = _elements(zlib.decompress(body), order)
+            if kind != MATRIX:
+                raise ValueError(f"an element of type {kind}; expected matrices")
+            name = _name(body, order)
+            place = f"variable {name!r}"
+            if name in matrices:
+                raise ValueError("it stands there twice")
+            matrix = _matrix(list(_elements(body, order)), order)
+            is_wanted = matrix is not None and (complex_too or not np.iscomplexobj(matrix))
+            matrices[name] = matrix if is_wanted else None
+            place = f"what follows variable {name!r}"
+    except (ValueError, struct.error, zlib.error) as error:
+        raise ValueError(f"{file}: {place} is not readable as MATLAB v5 ({error})") from error
+    return matrices
+
+
+def _elements(content: bytes, order: str) -> Iterator[Part]:
+    """Types and bytes of the elements that follow each other in a block."""
+    position = 0
+    while position < len(content):
+        (kind,) = struct.unpack_from(order + "I", content, position)
+        if kind >> 16:  # up to four bytes stand in the tag itself
+            kind, length, start, end = kind & 0xFFFF, kind >> 16, position + 4, position + 8
+        else:
+            (length,) = struct.unpack_from(order + "I", content, position + 4)
+            start = position + 8
+            end = start + length if kind == COMPRESSED else start + 8 * math.ceil(length / 8)
+        if start + length > len(content) or start + length > end:
+            raise ValueError(f"an element of {length} bytes where {len(content) - start} are left")
+        yield kind, content[start : start + length]
+        position = end
+
+
+def _name(body: bytes, order: str) -> str:
+    """What a variable is called, in the third of its parts; objects have no dimensions before it."""
+    parts = [content for _, (_, content) in zip(range(3), _elements(body, order), strict=False)]
+    if len(parts) < 3 or len(parts[0]) != 8:
+        raise ValueError("a variable without flags, dimensions and name")
+    name = parts[1 if _class(parts[0], order) == OBJECT_CLASS else 2].decode("ascii")
+    if name and not name.isidentifier():
+        raise ValueError(f"the name {name!r}")
+    return name
+
+
+def _class(flags: bytes, order: str) -> int:
+    return struct.unpack(order + "II", flags)[0] & 0xFF
+
+
+def _matrix(parts: list[Part], order: str) -> Matrix | None:
+    """Values of one variable, from its flags, dimensions, name and numbers."""
+    kind, shape = _class(parts[0][1], order), np.frombuffer(parts[1][1][: len(parts[1][1]) // 4 * 4], order + "i4")
+    if kind not in (SPARSE_CLASS, *NUMERIC_CLASSES) or len(shape) != 2:
+        return None
+    is_complex = bool(struct.unpack(order + "II", parts[0][1])[0] & COMPLEX)
+    numbers = [_numbers(part, order) for part in parts[3:]]
+    if len(numbers) != (3 if kind == SPARSE_CLASS else 1) + is_complex or (shape < 0).any():
+        raise ValueError(f"{len(numbers)} arrays of numbers for the dimensions {shape.tolist()}")
+    values = _complex(*numbers[-2:]) if is_complex else numbers[-1].astype(float)
+    if kind == SPARSE_CLASS:
+        return _sparse_matrix(numbers[0], numbers[1], values, *shape.tolist())
+    if values.size != math.prod(shape.tolist()):
+        raise ValueError(f"{values.size} values; expected {shape.tolist()}")
+    return values.reshape(shape, order="F")
+
+
+def _complex(real: NDArray, imaginary: NDArray) -> NDArray:
+    if real.size != imaginary.size:
+        raise ValueError(f"{imaginary.size} imaginary parts; expected {real.size}")
+    values = np.empty(real.size, dtype=complex)
+    values.real, values.imag = real, imaginary
+    return values
+
+
+def _sparse_matrix(rows: NDArray, starts: NDArray, values: NDArray, n_rows: int, n_columns: int) -> Matrix:
+    """Values by columns; rows and values may be longer than what the columns use."""
+    rows, starts = rows.astype(np.int64), starts.astype(np.int64)
+    if starts.size != n_columns + 1 or starts[0] != 0 or (np.diff(starts) < 0).any():
+        raise ValueError(f"{starts.size} starts of sparse columns; expected {n_columns + 1} that rise from 0")
+    count = starts[-1]
+    if count > min(rows.size, values.size):
+        raise ValueError(f"{values.size} values in {rows.size} sparse rows; expected {count}")
+    rows = rows[:count]
+    places = np.repeat(np.arange(n_columns), np.diff(starts)) * n_rows + rows
+    if ((rows < 0) | (rows >= n_rows)).any() or (np.diff(places) <= 0).any():
+        raise ValueError(f"sparse rows that do not rise within their columns from 0 to at most {n_rows - 1}")
+    return scipy.sparse.csc_array((values[:count], rows, starts), shape=(n_rows, n_columns))
+
+
+def _numbers(part: Part, order: str) -> NDArray:
+    kind, content = part
+    if kind not in STORED_AS:
+        raise ValueError(f"values of type {kind}; expected numbers")
+    return np.frombuffer(content, order + STORED_AS[kind])

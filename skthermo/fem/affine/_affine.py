@@ -1,0 +1,211 @@
+"""FE models whose matrices are affine in products of the parameters."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import RandomState
+from skthermo.fem._theta import check_theta, nominal_theta
+from skthermo.fem.affine._base import AffineBase
+from skthermo.fem.affine._core import AffineCore
+from skthermo.fem.affine._read_terms import (
+    are_sparse,
+    check_groups,
+    check_n_modes,
+    check_names,
+    check_severities,
+    exponents_of,
+    read_terms,
+)
+from skthermo.fem.affine._reduced import ReducedModel
+from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
+from skthermo.fem.modal import check_supported, count_modes
+
+MAX_CANDIDATES_PER_MODE = 8
+"""How many times as many candidates as modes are examined before a mode counts as dissolved."""
+
+Terms = Mapping[tuple[str, ...], ArrayLike] | Sequence[tuple[tuple[str, ...], ArrayLike]]
+
+
+class AffineModel(AffineBase):
+    """FE model K(theta) phi = (2 pi f)^2 M(theta) phi with affine stiffness and mass.
+
+    K(theta) = sum over the terms of (product of the named theta) * matrix, and M likewise.
+    Models are immutable; clones share their matrices.
+
+    Parameters
+    ----------
+    stiffness : mapping of tuple of str to matrix, or sequence of such pairs
+        Parameter names -> symmetric matrix (n_dof, n_dof), dense or SciPy sparse, in N/m. The
+        key ``()`` is the constant part; a name may stand in a key more than once. Pairs,
+        unlike a mapping, may repeat a key, so that groups can cut through a parameter.
+    mass : matrix, mapping or sequence of pairs
+        Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless
+        degrees of freedom).
+    n_modes : int, default=6
+        How many of the lowest modes the model gives.
+    parameter_names : sequence of str, optional
+        Columns of theta. By default the names in the order in which the terms mention them.
+    groups : mapping of str to list of (tuple of str or int), optional
+        Damage group -> the stiffness terms that it scales, by key or by position. By default
+        each parameter's name is a group of all stiffness terms that carry it.
+    track : bool, default=False
+        True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
+        swap. False: column j is the j-th lowest mode.
+    dof_names : sequence of str, optional
+        What degrees of freedom are called in errors.
+
+    Attributes
+    ----------
+    n_dof : int
+        Number of degrees of freedom.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, a matrix is not symmetric or not finite, a name is unknown, the
+        nominal stiffness leaves a motion free, or there are fewer modes than ``n_modes``.
+
+    Notes
+    -----
+    Up to 200 degrees of freedom eigenproblems are dense and solved in batches: with a constant mass that
+    is factored once, else (mass that depends on theta or is singular, or a wide spectrum) through the
+    flexibility L^-1 M L^-T with K = L L'. Larger ones are sparse and solved one by one by Lanczos
+    iterations on K^-1 M, from a seeded start. All run on as many threads as BLAS may use. Where the
+    stiffness is not positive definite, frequencies are NaN and a warning says at which theta.
+
+    Examples
+    --------
+    Two equal masses in a row on two springs, the second spring a parameter:
+
+    >>> import numpy as np
+    >>> from skthermo.fem import AffineModel
+    >>> model = AffineModel(
+    ...     {(): [[400.0, 0.0], [0.0, 0.0]], ("k",): [[400.0, -400.0], [-400.0, 400.0]]},
+    ...     mass=np.eye(2), n_modes=2)
+    >>> model
+    AffineModel(1 parameter, 2 degrees of freedom, 2 modes)
+    >>> model.frequencies([[1.0], [0.5]]).round(3)
+    array([[1.967, 5.15 ],
+           [1.723, 4.159]])
+    >>> model.damaged({"k": 0.5}).frequencies([[1.0]]).round(3)
+    array([[1.723, 4.159]])
+    """
+
+    def __init__(
+        self,
+        stiffness: Terms,
+        mass: ArrayLike | Terms,
+        *,
+        n_modes: int = 6,
+        parameter_names: Sequence[str] | None = None,
+        groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
+        track: bool = False,
+        dof_names: Sequence[str] | None = None,
+    ):
+        stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
+        mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
+        self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
+        self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
+        check_n_modes(n_modes)
+
+        terms: type[AffineTerms] = (
+            SparseTerms if are_sparse(stiffness_matrices + mass_matrices, n_modes) else DenseTerms
+        )
+        stiffness_terms = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
+        mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
+        n_dof = stiffness_terms.n_dof
+        nominal = nominal_theta(len(self._parameter_names))
+        check_supported(
+            stiffness_terms.assemble(nominal)[0], dof_names or [f"degree of freedom {i}" for i in range(n_dof)]
+        )
+        available = count_modes(mass_terms.assemble(nominal)[0], at_least=n_modes)
+        solvable = n_dof - 1 if terms is SparseTerms else n_dof
+        self._core = AffineCore.from_terms(
+            stiffness_terms,
+            mass_terms,
+            n_modes=n_modes,
+            track=bool(track),
+            max_candidates=min(available, MAX_CANDIDATES_PER_MODE * n_modes, solvable),
+        )
+
+    def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
+        """A new model with less stiffness (or more) in some groups; mass stays.
+
+        Parameters
+        ----------
+        damage : mapping of str to float
+            Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half,
+            -0.15 a strengthening by 15 %. Terms of several damaged groups take every factor.
+
+        Returns
+        -------
+        AffineModel
+            Its columns are the modes of this model's undamaged nominal state.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or a severity is 1 or more or not finite.
+        """
+        factors = np.ones(len(self._core.stiffness.factors))
+        for group, severity in check_severities(damage, self._groups).items():
+            factors[list(self._groups[group])] *= 1 - severity
+        return self._twin(self._core.with_scaled_stiffness(factors))
+
+    def rescaled(self, theta: ArrayLike) -> "AffineModel":
+        """A new model whose nominal state, theta = 1, is this model at a given theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers that become the new nominal values.
+
+        Returns
+        -------
+        AffineModel
+            Its columns are the modes of this model's nominal state.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width or more than one row, or a value is not finite and positive.
+        """
+        row = check_theta(theta, self.parameter_names, one_row=True)
+        return self._twin(self._core.rescaled(row))
+
+    def reduced(self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
+        """A small model that gives the same frequencies within a box, to a stated error.
+
+        Parameters
+        ----------
+        bounds : float or array-like of shape (n_parameters, 2), default=0.3
+            Box of multipliers: a half-width, or lowest and highest of each parameter.
+        tol : float, default=1e-5
+            Largest relative error of a frequency.
+        random_state : int, RandomState or None, default=None
+            Seed of the points at which the basis is made and checked.
+
+        Returns
+        -------
+        ReducedModel
+            With this model's interface.
+        """
+        return ReducedModel(self, bounds, tol=tol, random_state=random_state)
+
+    def __repr__(self) -> str:
+        counts = ((len(self.parameter_names), "parameter"), (self.n_dof, "degree"), (self.n_modes, "mode"))
+        parameters, degrees, modes = (f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts)
+        track = ", track=True" if self.track else ""
+        return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
+
+    @property
+    def _full_core(self) -> AffineCore:
+        return self._core
+
+    def _twin(self, core: AffineCore) -> "AffineModel":
+        twin = AffineModel.__new__(AffineModel)
+        twin._parameter_names, twin._groups, twin._core = self._parameter_names, self._groups, core
+        twin._is_quiet = self._is_quiet
+        return twin

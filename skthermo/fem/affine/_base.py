@@ -1,0 +1,228 @@
+"""The public methods of affine models: checks, chunks, threads, warnings."""
+
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csc_array
+
+from skthermo._arrays import Array
+from skthermo._threads import map_on_blas_threads
+from skthermo.fem._theta import check_theta, warn_of_failures
+from skthermo.fem.affine._core import AffineCore
+from skthermo.fem.modal import LocalModes
+
+Model = TypeVar("Model", bound="AffineBase")
+
+
+class AffineBase(ABC):
+    """Base of `AffineModel` and `ReducedModel`: everything that asks a core for modes.
+
+    A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and
+    `_bounds_warning` serve those that are solved on a basis, within a box.
+    """
+
+    _parameter_names: tuple[str, ...]
+    _groups: dict[str, tuple[int, ...]]
+    _core: AffineCore
+    _basis: Array | None = None
+    _is_quiet = False
+
+    thread_safe = True
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Columns of theta."""
+        return self._parameter_names
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes given."""
+        return self._core.n_modes
+
+    @property
+    def n_dof(self) -> int:
+        """Number of degrees of freedom."""
+        return self._full_core.stiffness.n_dof
+
+    @property
+    def track(self) -> bool:
+        """Whether a column follows its mode rather than its rank."""
+        return self._core.track
+
+    @property
+    def groups(self) -> dict[str, tuple[int, ...]]:
+        """Damage groups and the positions of the stiffness terms that each scales."""
+        return dict(self._groups)
+
+    @property
+    def rows_per_chunk(self) -> int:
+        """How many samples are solved together, so that memory stays bounded."""
+        return self._core.rows_per_chunk
+
+    @property
+    def prefer(self) -> str:
+        """Hint to joblib: "threads" or "processes". Sparse solves hold Python's lock, dense ones do not."""
+        return "threads" if self._core.is_dense else "processes"
+
+    def frequencies(self, theta: ArrayLike) -> Array:
+        """Natural frequencies.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            In Hz.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width, or a value that is not finite and positive.
+        """
+        return self._in_chunks(self._core.frequencies, theta)[0]
+
+    def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
+        """Natural frequencies and mode shapes.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz.
+        shapes : ndarray of shape (n_samples, n_dof, n_modes)
+            With unit modal mass; signs are arbitrary.
+        """
+        frequencies, shapes = self._in_chunks(self._core.modes, theta)
+        return frequencies, shapes if self._basis is None else self._basis @ shapes
+
+    def jacobian(self, theta: ArrayLike) -> Array:
+        """Exact derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of
+            single modes do not exist and the values are those of an arbitrary basis.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_parameters)
+            d f / d theta in Hz.
+        """
+        return self._in_chunks(self._core.jacobian, theta)[0]
+
+    def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
+        """The lowest modes at one theta, with their derivatives.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers of the nominal parameters.
+        follow : bool, default=False
+            Whether to look at as many modes as it takes to find every nominal mode.
+
+        Returns
+        -------
+        LocalModes
+            More modes than ``n_modes``, in ascending order.
+        """
+        row = check_theta(theta, self.parameter_names, one_row=True)
+        self._warn_of_bounds(row, stacklevel=3)
+        return self._core.local_modes(row, follow=follow, basis=self._basis)
+
+    def nominal_mac(self, shapes: Array) -> Array:
+        """Mass-weighted MAC of the healthy nominal modes with other shapes.
+
+        Parameters
+        ----------
+        shapes : ndarray of shape (n_samples, n_dof, n_candidates)
+            Mode shapes, of any scale.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_candidates)
+            Between 0 and 1.
+        """
+        return self._full_core.nominal_mac(shapes)
+
+    def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
+        """Stiffness and mass at one theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
+        """
+        row = check_theta(theta, self.parameter_names, one_row=True)
+        core = self._full_core
+        return csc_array(core.stiffness.assemble(row)[0]), csc_array(core.mass.assemble(row)[0])
+
+    def quiet(self: Model) -> Model:
+        """The same model without warnings.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            For searches that pass through theta outside a box or without modes. It shares this model's matrices.
+        """
+        twin = self._twin(self._core)
+        twin._is_quiet = True
+        return twin
+
+    def warn_of(self, theta: Array, frequencies: NDArray) -> None:
+        """Warn of rows outside the bounds of a reduced model, and of rows without a solution.
+
+        Parameters
+        ----------
+        theta : ndarray of shape (n_samples, n_parameters)
+            Multipliers; rows with NaN are passed over.
+        frequencies : ndarray of shape (n_samples, ...)
+            What was solved for them.
+        """
+        self._warn_of_bounds(theta, stacklevel=5)
+        if not self._is_quiet:
+            warn_of_failures(theta, frequencies, stacklevel=5)
+
+    def __sklearn_clone__(self: Model) -> Model:
+        return self
+
+    @property
+    @abstractmethod
+    def _full_core(self) -> AffineCore:
+        """The core at all degrees of freedom."""
+
+    @abstractmethod
+    def _twin(self: Model, core: AffineCore) -> Model:
+        """A model like this one, on another core."""
+
+    def _bounds_warning(self, theta: Array) -> str:
+        """Hook: ReducedModel warns outside its box."""
+        return ""
+
+    def _warn_of_bounds(self, theta: Array, *, stacklevel: int) -> None:
+        message = "" if self._is_quiet else self._bounds_warning(theta)
+        if message:
+            warnings.warn(message, UserWarning, stacklevel=stacklevel)
+
+    def _in_chunks(self, solve: Callable[[Array], tuple[Array, ...]], theta: ArrayLike) -> tuple[Array, ...]:
+        rows = check_theta(theta, self.parameter_names)
+        size = self.rows_per_chunk
+        parts = map_on_blas_threads(solve, [rows[i : i + size] for i in range(0, max(len(rows), 1), size)])
+        results = tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+        self.warn_of(rows, results[0])
+        return results

@@ -1,0 +1,129 @@
+"""A basis of mode shapes that represents a model within a box, grown to a stated error."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import SuperLU
+
+from skthermo._arrays import Array
+from skthermo._threads import map_on_blas_threads
+from skthermo.fem._theta import nominal_theta
+from skthermo.fem.affine._core import GUARD_MODES, AffineCore
+from skthermo.fem.modal import factorise, may_be_missed, pair_modes
+
+SNAPSHOTS_PER_ROUND = 8
+CANDIDATES_PER_ROUND = 96
+CHECKS = 20
+MAX_ROUNDS = 40
+
+LEAST_ENERGY = 1e-13
+"""Share of strain energy below which a direction is made of rounding."""
+
+WIDEST_SPECTRUM = 1e13
+"""Spectrum, times the relative error allowed, up to which the standard form has the digits."""
+
+
+class Basis(NamedTuple):
+    """Basis vectors (n_dof, n) and the core on them; largest relative error of a frequency at the check points."""
+
+    vectors: Array
+    core: AffineCore
+    error: float
+    check_points: Array
+    snapshot_points: Array
+
+
+def grow_basis(
+    full: AffineCore, bounds: Array, tol: float, random: np.random.RandomState, start: Array | None = None
+) -> Basis:
+    """Add modes where the estimated error is largest until it is small, and the true error at fresh points too.
+
+    Raises
+    ------
+    RuntimeError
+        If no basis reaches ``tol``.
+    """
+    nominal = nominal_theta(len(bounds))
+    stiffness = csc_array(full.stiffness.assemble(nominal)[0])
+    factors = factorise(stiffness)
+    if start is None:
+        snapshots = np.empty((full.stiffness.n_dof, 0))
+        points = np.vstack([nominal, draw(bounds, random, SNAPSHOTS_PER_ROUND)])
+    else:
+        snapshots, points = start, nominal[:0]
+    used = [points]
+    for _ in range(MAX_ROUNDS):
+        snapshots = np.hstack([snapshots, snapshots_at(full, points)])
+        vectors = orthonormal(snapshots, stiffness, drop=max(tol / 100, LEAST_ENERGY))
+        core = projected_core(full, vectors, tol)
+        candidates = draw(bounds, random, CANDIDATES_PER_ROUND)
+        errors = estimated_errors(full, core, vectors, candidates, factors)
+        if errors.max() < tol / 4:
+            candidates = draw(bounds, random, CHECKS)
+            errors = true_errors(full, core, candidates)
+            if errors.max() < tol / 2:
+                return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
+        points = candidates[np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]]
+        used.append(points)
+    raise RuntimeError(
+        f"after {MAX_ROUNDS} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
+        "larger tol, or narrower bounds"
+    )
+
+
+def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
+    """The core on basis vectors, in a form that keeps the digits that ``tol`` asks for."""
+    return full.projected(vectors, widest_spectrum=tol * WIDEST_SPECTRUM)
+
+
+def draw(bounds: Array, random: np.random.RandomState, n_points: int) -> Array:
+    """Uniform random points of a box."""
+    lowest, highest = bounds.T
+    return random.uniform(lowest, highest, size=(n_points, len(bounds)))
+
+
+def snapshots_at(full: AffineCore, theta: Array) -> Array:
+    """Shapes of the full model's lowest modes, and of its own where these are others, side by side."""
+    if not len(theta):
+        return np.empty((full.stiffness.n_dof, 0))
+    n_snapshots = min(full.n_modes + GUARD_MODES, full.max_candidates)
+    lowest = full.solver.modes(theta, n_snapshots)[1]
+    shapes = [*lowest]
+    if full.track:
+        mac = full.nominal_mac(lowest)
+        elsewhere = may_be_missed(mac, pair_modes(mac, full.nominal.repeated), full.nominal.repeated)
+        shapes += [*full.modes(theta[elsewhere])[1]] if elsewhere.any() else []
+    side_by_side = np.hstack(shapes)
+    return side_by_side[:, np.isfinite(side_by_side).all(axis=0)]
+
+
+def estimated_errors(full: AffineCore, core: AffineCore, vectors: Array, theta: Array, factors: SuperLU) -> Array:
+    """Largest r' K_0^-1 r / (2 lambda) over the modes of every row."""
+    errors = []
+    for rows in np.split(theta, range(full.rows_per_chunk, len(theta), full.rows_per_chunk)):
+        frequencies, shapes = core.modes(rows)
+        eigenvalues, phi = (2 * np.pi * frequencies) ** 2, vectors @ shapes
+        inertia = eigenvalues[:, np.newaxis] * full.mass.product(rows, phi)
+        residuals = full.stiffness.product(rows, phi) - inertia
+        norms = [np.einsum("im,im->m", residual, factors.solve(residual)) for residual in residuals]
+        errors.append((np.array(norms) / (2 * eigenvalues)).max(axis=1))
+    return np.nan_to_num(np.concatenate(errors))
+
+
+def true_errors(full: AffineCore, core: AffineCore, theta: Array) -> Array:
+    """Largest relative error of a frequency in every row."""
+    size = full.rows_per_chunk
+    chunks = [theta[i : i + size] for i in range(0, len(theta), size)]
+    exact = np.concatenate([part for (part,) in map_on_blas_threads(full.frequencies, chunks)])
+    errors = np.where(np.isnan(exact), 0.0, np.abs(core.frequencies(theta)[0] / exact - 1))
+    return np.nan_to_num(errors, nan=np.inf).max(axis=1)
+
+
+def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:
+    """The directions of vectors of equal strain energy, orthonormal in a stiffness, without the share ``drop``."""
+    scaled = vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
+    energies, directions = scipy.linalg.eigh(scaled.T @ (stiffness @ scaled))
+    kept = energies > drop * energies[-1]
+    return scaled @ (directions[:, kept] / np.sqrt(energies[kept]))

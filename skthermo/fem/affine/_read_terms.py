@@ -1,0 +1,147 @@
+"""Reading what an affine model is made from."""
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from skthermo._arrays import Matrix
+
+Key = tuple[str, ...]
+
+DENSE_DOFS = 200
+"""Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
+
+DENSE_SHARE = 0.3
+"""Share of entries that are not zero from which on a matrix counts as dense."""
+
+
+def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:
+    """Keys and matrices, copied and symmetric, each dense or sparse as it came."""
+    if isinstance(terms, Mapping):
+        pairs = list(terms.items())
+    elif isinstance(terms, Sequence) and all(_is_pair(term) for term in terms):
+        pairs = list(terms)
+    else:
+        pairs = [((), terms)]
+    if not pairs:
+        raise ValueError(f"{what} has no terms; expected at least one matrix")
+    keys = [_read_key(key, what) for key, _ in pairs]
+    matrices = []
+    for key, (_, matrix) in zip(keys, pairs, strict=True):
+        matrices.append(_read_matrix(matrix, f"{what} term {key}", n_dof))
+        n_dof = matrices[0].shape[0]
+    return keys, matrices
+
+
+def _is_pair(term) -> bool:
+    return isinstance(term, tuple) and len(term) == 2 and isinstance(term[0], tuple | str)
+
+
+def _read_key(key, what: str) -> Key:
+    names = (key,) if isinstance(key, str) else key
+    if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{what} has the key {key!r}; expected a tuple of parameter names")
+    return names
+
+
+def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
+    array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{what} is complex; expected a real matrix")
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.shape[0]:
+        raise ValueError(f"{what} has shape {array.shape}; expected a square matrix")
+    if n_dof is not None and array.shape[0] != n_dof:
+        raise ValueError(f"{what} has shape {array.shape}; expected ({n_dof}, {n_dof}) like the first term")
+    array = array.astype(float)
+    if not np.isfinite(array.data if scipy.sparse.issparse(array) else array).all():
+        raise ValueError(f"{what} holds values that are not finite")
+    skew = abs(array - array.T)
+    if skew.max() > 1e-8 * abs(array).max():
+        row, column = np.unravel_index(int(skew.argmax()), array.shape)
+        raise ValueError(
+            f"{what} is not symmetric: entries ({row}, {column}) and ({column}, {row}) are "
+            f"{array[row, column]} and {array[column, row]}"
+        )
+    return (array + array.T) / 2
+
+
+def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
+    """Whether shift-invert finds so many modes of the summed matrices sooner than dense batches do."""
+    n_dof = matrices[0].shape[0]
+    entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
+    return n_dof > max(DENSE_DOFS, 4 * n_modes) and entries < DENSE_SHARE * n_dof**2
+
+
+def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
+    """The parameters' names; every one in some term, and no term with another."""
+    mentioned = dict.fromkeys(name for key in keys for name in key)
+    if parameter_names is None:
+        names = tuple(mentioned)
+        if not names:
+            raise ValueError("no term names a parameter; expected at least one, such as ('E_deck',)")
+        return names
+    names = check_different(parameter_names)
+    unknown = [name for name in mentioned if name not in names]
+    if unknown:
+        raise ValueError(f"terms name {unknown}; expected only the parameters {list(names)}")
+    unused = [name for name in names if name not in mentioned]
+    if unused:
+        raise ValueError(f"no term names the parameters {unused}; the terms name {list(mentioned)}")
+    return names
+
+
+def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
+    """Names of parameters, each once."""
+    names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"parameter_names is {names}; expected one or more different names")
+    return names
+
+
+def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str, tuple[int, ...]]:
+    """Damage groups as positions of stiffness terms."""
+    if groups is None:
+        groups = {name: [i for i, key in enumerate(keys) if name in key] for name in names}
+        return {name: tuple(positions) for name, positions in groups.items() if positions}
+    found = {}
+    for group, terms in groups.items():
+        positions: set[int] = set()
+        for term in [terms] if isinstance(terms, str) else terms:
+            matches = [i for i, key in enumerate(keys) if term in (i, key) or (term,) == key]
+            if not matches:
+                raise ValueError(f"group {group!r} names the term {term!r}; expected one of {list(keys)}")
+            positions.update(matches)
+        if not positions:
+            raise ValueError(f"group {group!r} names no stiffness term")
+        found[group] = tuple(sorted(positions))
+    return found
+
+
+def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
+    """Known groups, and severities that leave some stiffness."""
+    if not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    for group, severity in damage.items():
+        if group not in groups:
+            raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
+        if not (isinstance(severity, Real) and -np.inf < severity < 1):
+            raise ValueError(
+                f"damage of group {group!r} has severity {severity!r}; expected a number below 1 "
+                "(0.5 halves the stiffness, -0.15 adds 15 %)"
+            )
+    return damage
+
+
+def check_n_modes(n_modes: int) -> int:
+    """A positive number of modes."""
+    if not isinstance(n_modes, Integral) or isinstance(n_modes, bool) or n_modes < 1:
+        raise ValueError(f"n_modes is {n_modes!r}; expected a positive integer")
+    return n_modes
+
+
+def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
+    """How often each parameter stands in each key, (n_terms, n_parameters)."""
+    return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)

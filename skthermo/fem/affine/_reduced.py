@@ -1,0 +1,187 @@
+"""FE models on a small basis of their own mode shapes."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, RandomState, as_random_state
+from skthermo.fem._theta import check_bounds, check_theta
+from skthermo.fem.affine._base import AffineBase
+from skthermo.fem.affine._basis import Basis, grow_basis, projected_core
+from skthermo.fem.affine._core import AffineCore
+
+if TYPE_CHECKING:
+    from skthermo.fem.affine._affine import AffineModel
+
+
+class ReducedModel(AffineBase):
+    """An affine FE model on a small basis of its own mode shapes, to a stated error.
+
+    Modes at random points of the box, and then where an error estimate is largest, span a basis V;
+    every term is projected once, V' K_t V, so that a solve is a small dense eigenproblem. Made by
+    `AffineModel.reduced`.
+
+    Parameters
+    ----------
+    full : AffineModel
+        The model to reduce.
+    bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        Box of multipliers in which the error is controlled. Outside it a warning is given.
+    tol : float, default=1e-5
+        Largest relative error of a frequency. The basis grows until the errors at fresh
+        random points of the box are below tol / 2.
+    random_state : int, RandomState or None, default=None
+        Seed of those points.
+
+    Attributes
+    ----------
+    basis_size_ : int
+        Number of basis vectors.
+    error_ : float
+        Largest relative error of a frequency at the check points.
+    check_points_ : ndarray of shape (20, n_parameters)
+        Uniform random theta at which the full model was solved for ``error_``.
+    snapshot_points_ : ndarray of shape (n_snapshots, n_parameters)
+        Theta whose modes span the basis.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are infeasible or ``tol`` is not between 0 and 1.
+    RuntimeError
+        If no basis reaches ``tol``.
+
+    Notes
+    -----
+    A frequency of rank j is never below the full model's of that rank (Rayleigh-Ritz). The
+    estimate of a relative error is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi
+    of a mode of unit modal mass and the nominal stiffness K_0. Shapes are given at all degrees of
+    freedom. A damaged model is checked anew, and its basis grows if it must.
+
+    References
+    ----------
+    Machiels, Maday, Oliveira, Patera & Rovas, Output bounds for reduced-basis approximations of symmetric
+    positive definite eigenvalue problems, C. R. Acad. Sci. Paris I 331 (2000) 153-158.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> truss = make_truss()
+    >>> reduced = truss.reduced(bounds=0.2, random_state=0)
+    >>> reduced.error_ < 5e-6
+    True
+    >>> theta = [[0.9, 1.1, 1.0, 0.85]]
+    >>> bool(np.abs(reduced.frequencies(theta) / truss.frequencies(theta) - 1).max() < 1e-5)
+    True
+    """
+
+    def __init__(
+        self,
+        full: "AffineModel",
+        bounds: ArrayLike = 0.3,
+        *,
+        tol: float = 1e-5,
+        random_state: RandomState = None,
+    ):
+        if not 0 < tol < 1:
+            raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
+        self._parameter_names, self._groups = full.parameter_names, full._groups
+        self._full = full
+        self._bounds = check_bounds(bounds, full.parameter_names)
+        self._tol = tol
+        self._use(grow_basis(full._core, self._bounds, tol, as_random_state(random_state)))
+
+    @property
+    def basis_size_(self) -> int:
+        """Number of basis vectors."""
+        return self._core.stiffness.n_dof
+
+    def damaged(self, damage: Mapping[str, float]) -> "ReducedModel":
+        """A new model with less stiffness (or more) in some groups, on a basis that represents it.
+
+        Parameters
+        ----------
+        damage : mapping of str to float
+            Group -> severity s, which multiplies the group's stiffness by 1 - s.
+
+        Returns
+        -------
+        ReducedModel
+            Checked against the damaged full model, to the same tolerance.
+        """
+        twin = self._twin(self._core)
+        twin._full = self._full.damaged(damage)
+        twin._use(grow_basis(twin._full._core, self._bounds, self._tol, as_random_state(0), start=self._basis))
+        return twin
+
+    def rescaled(self, theta: ArrayLike) -> "ReducedModel":
+        """A new model on the same basis whose nominal state, theta = 1, is this model at a given theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers that become the new nominal values.
+
+        Returns
+        -------
+        ReducedModel
+            For the same box, which its multipliers now measure from theta.
+        """
+        row = check_theta(theta, self.parameter_names, one_row=True)
+        twin = self._twin(self._core)
+        twin._full, twin._bounds = self._full.rescaled(row), self._bounds / row.T
+        twin._core = projected_core(twin._full._core, self._basis, self._tol)
+        twin.check_points_, twin.snapshot_points_ = self.check_points_ / row, self.snapshot_points_ / row
+        return twin
+
+    def reduced(
+        self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None
+    ) -> "ReducedModel":
+        """The full model, reduced for another box.
+
+        Parameters
+        ----------
+        bounds : float or array-like of shape (n_parameters, 2), default=0.3
+            Box of multipliers: a half-width, or lowest and highest of each parameter.
+        tol : float, default=1e-5
+            Largest relative error of a frequency.
+        random_state : int, RandomState or None, default=None
+            Seed of the points at which the basis is made and checked.
+
+        Returns
+        -------
+        ReducedModel
+        """
+        return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
+
+    def __repr__(self) -> str:
+        return f"ReducedModel({self._full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
+
+    @property
+    def _full_core(self) -> AffineCore:
+        return self._full._core
+
+    def _twin(self, core: AffineCore) -> "ReducedModel":
+        twin = ReducedModel.__new__(ReducedModel)
+        twin._parameter_names, twin._groups, twin._core = self._parameter_names, self._groups, core
+        twin._full, twin._bounds, twin._tol, twin._basis = self._full, self._bounds, self._tol, self._basis
+        twin.error_, twin.check_points_, twin.snapshot_points_ = self.error_, self.check_points_, self.snapshot_points_
+        twin._is_quiet = self._is_quiet
+        return twin
+
+    def _use(self, basis: Basis) -> None:
+        self._core, self._basis = basis.core, basis.vectors
+        self.error_, self.check_points_, self.snapshot_points_ = basis.error, basis.check_points, basis.snapshot_points
+
+    def _bounds_warning(self, theta: Array) -> str:
+        lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
+        outside = ((theta < lowest) | (theta > highest)).any(axis=1)
+        if not outside.any():
+            return ""
+        return (
+            f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
+            f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}"
+        )

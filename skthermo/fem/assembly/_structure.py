@@ -1,0 +1,261 @@
+"""Structures of nodes and members."""
+
+from collections.abc import Collection, Hashable, Mapping, Sequence
+
+import numpy as np
+
+from skthermo._arrays import Array
+from skthermo.fem.affine import AffineModel
+from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
+from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element
+
+Binding = tuple[str, str] | tuple[str, str, str]
+Target = tuple[str, str, tuple[str, ...]]
+
+
+class Structure:
+    """Nodes, members, supports and named groups, from which FE models are assembled.
+
+    Parameters
+    ----------
+    nodes : mapping of node to coordinates
+        (x, y) or (x, y, z) in m.
+    members : mapping of member to element
+        `Bar`, `Beam`, `Membrane`, `Spring` and `PointMass` objects.
+    supports : mapping of node to directions
+        Fixed directions of a node, such as "xy", ("x", "y") or "xyz rx ry rz".
+    groups : mapping of group to members, optional
+        Named groups; a member may be in several, or in none.
+
+    Attributes
+    ----------
+    dofs : list of (node, direction)
+        Free degrees of freedom in the order of the matrices' rows.
+
+    Raises
+    ------
+    ValueError
+        Names the node, member, group or direction that is unknown, duplicated, disconnected,
+        of zero length or of a property that is not positive.
+
+    Examples
+    --------
+    A king-post truss, whose post and rafters are parameters:
+
+    >>> from skthermo.fem import Bar, Structure
+    >>> steel = dict(E=210e9, A=0.01, density=7850.0)
+    >>> structure = Structure(
+    ...     nodes={"left": (0, 0), "foot": (3, 0), "right": (6, 0), "apex": (3, 2)},
+    ...     members={
+    ...         "tie 1": Bar("left", "foot", **steel), "tie 2": Bar("foot", "right", **steel),
+    ...         "rafter 1": Bar("left", "apex", **steel), "rafter 2": Bar("apex", "right", **steel),
+    ...         "post": Bar("foot", "apex", **steel)},
+    ...     supports={"left": "xy", "right": "y"},
+    ...     groups={"rafters": ["rafter 1", "rafter 2"], "post": ["post"]})
+    >>> model = structure.assemble(["rafters", "post"], n_modes=2)
+    >>> model.frequencies([[1.0, 1.0]]).round(2)
+    array([[ 93.94, 186.36]])
+    """
+
+    def __init__(
+        self,
+        nodes: Mapping[Hashable, Sequence[float]],
+        members: Mapping[Hashable, Element],
+        supports: Mapping[Hashable, Collection[str]],
+        groups: Mapping[str, Collection[Hashable]] | None = None,
+    ):
+        self._coordinates = _read_nodes(nodes)
+        self._members = dict(members)
+        for name, element in self._members.items():
+            check_element(name, element, self._coordinates)
+        self._groups = {
+            group: frozenset([names] if isinstance(names, str) else names) for group, names in (groups or {}).items()
+        }
+        self._check_groups()
+        self.dofs = self._free_dofs(supports)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return len(next(iter(self._coordinates.values())))
+
+    @property
+    def nodes(self) -> dict[Hashable, Array]:
+        """Coordinates of every node in m."""
+        return dict(self._coordinates)
+
+    @property
+    def members(self) -> dict[Hashable, Element]:
+        """Elements by name."""
+        return dict(self._members)
+
+    @property
+    def groups(self) -> dict[str, frozenset]:
+        """Members of every named group."""
+        return dict(self._groups)
+
+    def assemble(
+        self,
+        parameters: Sequence[str] | Mapping[str, str | Binding],
+        *,
+        groups: Sequence[str] | Mapping[str, str | Binding] | None = None,
+        n_modes: int = 6,
+        track: bool = False,
+    ) -> AffineModel:
+        """The structure as an FE model.
+
+        Parameters
+        ----------
+        parameters : sequence of str, or mapping of str to group or (property, group[, matrix])
+            What theta multiplies. A group's name stands for the whole stiffness of the group;
+            ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "I_yy", "k", "m", ...) of
+            its members, in stiffness and mass; ``("A", "arches", "stiffness")`` in stiffness alone
+            (or ``"mass"``); ``("mass", group)`` for the whole mass.
+        groups : sequence of str, or mapping of str to group or (property, group), optional
+            What can be damaged: the whole stiffness of a group, or, as in ``{"torsion": ("G",
+            "girder")}``, what one property has in it. By default all of the structure's groups.
+        n_modes : int, default=6
+            Number of modes.
+        track : bool, default=False
+            Whether a column follows its mode rather than its rank.
+
+        Returns
+        -------
+        AffineModel
+
+        Raises
+        ------
+        ValueError
+            If a group or property is unknown, a property of ``groups`` has no stiffness, or the
+            structure is a mechanism.
+        """
+        bindings = self._read_bindings(parameters, "parameter")
+        damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
+        stiffness, mass = TermAssembler(self.dofs), TermAssembler(self.dofs)
+        for name, element in self._members.items():
+            coordinates = np.array([self._coordinates[node] for node in element.nodes])
+            dofs = element.dofs(self.dimension)
+            damage = self._bound(name, damageable, STIFFNESS)
+            stiffness.add(element.stiffness(coordinates), dofs, self._bound(name, bindings, STIFFNESS), damage)
+            mass.add(element.mass(coordinates), dofs, self._bound(name, bindings, MASS))
+        return AffineModel(
+            stiffness.terms(),
+            mass.terms(),
+            n_modes=n_modes,
+            parameter_names=tuple(bindings),
+            groups={name: terms for name in damageable if (terms := stiffness.positions(name)) or groups is not None},
+            track=track,
+            dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
+        )
+
+    def _bound(self, member: Hashable, bindings: Mapping[str, Target], matrix: str) -> dict[str, str]:
+        """What multiplies the stiffness or mass of one member, and which of its properties that is."""
+        return {
+            name: prop
+            for name, (prop, group, matrices) in bindings.items()
+            if member in self._groups[group] and matrix in matrices
+        }
+
+    def _read_bindings(self, targets, what: str) -> dict[str, Target]:
+        """Property, group and matrices of every parameter or damage group."""
+        if isinstance(targets, str):
+            targets = [targets]
+        if not isinstance(targets, Mapping):
+            if len(set(targets)) < len(targets):
+                raise ValueError(f"{what}s are {list(targets)}; expected each group once")
+            targets = {group: group for group in targets}
+        bindings = {}
+        for name, target in targets.items():
+            if not isinstance(target, str) and len(target) not in (2, 3):
+                expected = "a group, (property, group) or (property, group, matrix)"
+                raise ValueError(f"{what} {name!r} is {target!r}; expected {expected}")
+            prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
+            matrices = (prop,) if prop in (STIFFNESS, MASS) else (STIFFNESS, MASS)
+            if not set(where) <= set(matrices):
+                raise ValueError(f"{what} {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
+            members = self._groups[self._known(group, f"{what} {name!r}")]
+            known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
+            if prop not in known | {STIFFNESS, MASS}:
+                raise ValueError(
+                    f"{what} {name!r} is the property {prop!r} of group {group!r}; "
+                    f"expected {STIFFNESS!r}, {MASS!r} or one of {sorted(known)}"
+                )
+            bindings[name] = (prop, group, tuple(where) or matrices)
+        return bindings
+
+    def _known(self, group: str, what: str) -> str:
+        if group not in self._groups:
+            raise ValueError(f"{what}: unknown group {group!r}; expected one of {sorted(self._groups)}")
+        return group
+
+    def _check_groups(self) -> None:
+        for group, members in self._groups.items():
+            unknown = [member for member in members if member not in self._members]
+            if unknown or not members:
+                raise ValueError(f"group {group!r} holds {unknown or 'no member'}; expected names of members")
+
+    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
+        directions = TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
+        used: set[Dof] = set()
+        for name, element in self._members.items():
+            for node, direction in element.dofs(self.dimension):
+                if direction not in directions:
+                    raise ValueError(
+                        f"member {name!r} acts along {direction!r} of node {node!r}; expected one of {directions}"
+                    )
+                used.add((node, direction))
+        connected = {node for element in self._members.values() for node in element.nodes}
+        for node in self._coordinates:
+            if node not in connected:
+                raise ValueError(f"node {node!r} is disconnected: no member ends there")
+        fixed = set()
+        for node, along in supports.items():
+            if node not in self._coordinates:
+                raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
+            for direction in _read_directions(along):
+                if direction not in directions:
+                    raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
+                fixed.add((node, direction))
+        used -= fixed
+        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
+        if not free:
+            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
+        return free
+
+    def __repr__(self) -> str:
+        return (
+            f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
+            f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
+        )
+
+
+def _read_directions(along: Collection[str]) -> list[str]:
+    """Directions one by one: ("x", "ry") is such a list; "xyz rx ry" names five."""
+    if not isinstance(along, str):
+        return list(along or ())
+    words = along.split()
+    return [d for word in words for d in (word if set(word) <= set(TRANSLATIONS) else [word])]
+
+
+def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    if not nodes:
+        raise ValueError("nodes is empty; expected a mapping of node to coordinates")
+    coordinates: dict[Hashable, Array] = {}
+    places: dict[tuple[float, ...], Hashable] = {}
+    first = np.shape(next(iter(nodes.values())))
+    for node, place in nodes.items():
+        try:
+            xyz = np.array(place, dtype=float)
+        except (TypeError, ValueError):
+            xyz = np.empty(0)
+        if xyz.shape not in ((2,), (3,)) or xyz.shape != first or not np.isfinite(xyz).all():
+            raise ValueError(
+                f"node {node!r} has the coordinates {place!r}; expected two or three finite numbers, "
+                "as many as the first node has"
+            )
+        twin = places.setdefault(tuple(xyz + 0.0), node)
+        if twin != node:
+            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+        xyz.flags.writeable = False
+        coordinates[node] = xyz
+    return coordinates

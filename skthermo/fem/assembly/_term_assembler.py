@@ -1,0 +1,67 @@
+"""From members' matrices to affine terms."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import scipy.sparse
+
+from skthermo.fem.elements import ByProperties, Dof
+
+STIFFNESS = "stiffness"
+"""The whole stiffness of a group, whatever properties its members have."""
+
+MASS = "mass"
+"""The whole mass of a group."""
+
+Key = tuple[str, ...]
+
+
+class TermAssembler:
+    """Sums members' matrices by the parameters that multiply them and the groups that damage them.
+
+    Parameters
+    ----------
+    dofs : sequence of (node, direction)
+        Free degrees of freedom; what members have at others is left out.
+    """
+
+    def __init__(self, dofs: Sequence[Dof]):
+        self._index = {dof: i for i, dof in enumerate(dofs)}
+        self._entries: dict[tuple[Key, frozenset[str]], list] = {}
+
+    def add(
+        self,
+        matrices: ByProperties,
+        dofs: Sequence[Dof],
+        bound: Mapping[str, str],
+        damage: Mapping[str, str] | None = None,
+    ) -> None:
+        """Add one member's matrices, given the parameters and damage groups bound to its properties."""
+        rows = np.array([self._index.get(dof, -1) for dof in dofs])
+        free = np.flatnonzero(rows >= 0)
+        grid = np.meshgrid(rows[free], rows[free], indexing="ij")
+        for properties, matrix in matrices.items():
+            key = tuple(
+                parameter
+                for parameter, prop in bound.items()
+                for _ in range(1 if prop in (STIFFNESS, MASS) else properties.count(prop))
+            )
+            groups = frozenset(g for g, prop in (damage or {}).items() if prop in (STIFFNESS, *properties))
+            block = matrix[np.ix_(free, free)]
+            self._entries.setdefault((key, groups), []).append((block, *grid))
+
+    def terms(self) -> list[tuple[Key, scipy.sparse.csr_array]]:
+        """Parameters and matrix of every term."""
+        terms = [(key, self._matrix(blocks)) for (key, _), blocks in self._entries.items()]
+        return terms or [((), self._matrix([]))]
+
+    def positions(self, group: str) -> list[int]:
+        """Positions among the terms of those that a damage group scales."""
+        return [i for i, (_, damage) in enumerate(self._entries) if group in damage]
+
+    def _matrix(self, blocks: Sequence[tuple[np.ndarray, ...]]) -> scipy.sparse.csr_array:
+        shape = (len(self._index), len(self._index))
+        if not blocks:
+            return scipy.sparse.csr_array(shape)
+        values, rows, columns = (np.concatenate([b[i].ravel() for b in blocks]) for i in range(3))
+        return scipy.sparse.csr_array((values, (rows, columns)), shape=shape)

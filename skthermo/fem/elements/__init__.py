@@ -1,0 +1,22 @@
+"""Finite elements, one a file."""
+
+from skthermo.fem.elements._bar import Bar
+from skthermo.fem.elements._beam import Beam
+from skthermo.fem.elements._element import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element
+from skthermo.fem.elements._membrane import Membrane
+from skthermo.fem.elements._point_mass import PointMass
+from skthermo.fem.elements._spring import Spring
+
+__all__ = [
+    "ROTATIONS",
+    "TRANSLATIONS",
+    "Bar",
+    "Beam",
+    "ByProperties",
+    "Dof",
+    "Element",
+    "Membrane",
+    "PointMass",
+    "Spring",
+    "check_element",
+]

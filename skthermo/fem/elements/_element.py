@@ -1,0 +1,88 @@
+"""The interface of finite elements: nodes, properties, stiffness and mass.
+
+Every element gives its matrices by the product of properties that multiplies them, so that
+any of these properties can become a parameter.
+"""
+
+from collections.abc import Hashable, Iterator, Mapping
+from math import isfinite
+from numbers import Real
+from typing import Protocol
+
+import numpy as np
+
+from skthermo._arrays import Array
+
+Dof = tuple[Hashable, str]
+ByProperties = dict[tuple[str, ...], Array]
+
+TRANSLATIONS = ("x", "y", "z")
+ROTATIONS = ("rx", "ry", "rz")
+
+
+class Element(Protocol):
+    """The duck type of what `Structure` assembles: an element of your own needs these members.
+
+    Attributes
+    ----------
+    nodes : tuple of hashable
+        Names of its nodes.
+
+    Notes
+    -----
+    Stiffness is a dictionary from properties to matrices: ``{("E", "A"): matrix}`` says that the matrix is
+    proportional to the properties E and A, each of which can then be made a parameter. Mass likewise. Rows are in
+    the order of ``dofs``, whose directions are "x", "y", "z", "rx", "ry" and "rz" (in 2-D: "x" and "y").
+    """
+
+    @property
+    def nodes(self) -> tuple[Hashable, ...]:
+        """Names of its nodes."""
+
+    def dofs(self, dimension: int) -> list[Dof]:
+        """(node, direction) of every row of the matrices."""
+
+    def properties(self) -> Iterator[tuple[str, float, bool]]:
+        """Name, value and whether zero is allowed, of every physical property."""
+
+    def ends(self, coordinates: Array) -> Array:
+        """Where the element itself has its ends or corners, given its nodes."""
+
+    def stiffness(self, coordinates: Array) -> ByProperties:
+        """Stiffness matrices in N/m by the product of properties that multiplies each."""
+
+    def mass(self, coordinates: Array) -> ByProperties:
+        """Mass matrices in kg by the product of properties that multiplies each."""
+
+
+class PhysicalElement:
+    """Base of elements: names and values of their physical properties."""
+
+    _properties: tuple[str, ...]
+    _may_be_zero: tuple[str, ...] = ()
+
+    def properties(self) -> Iterator[tuple[str, float, bool]]:
+        """Name, value and whether zero is allowed, of every physical property."""
+        for name in self._properties:
+            yield name, getattr(self, name), name in self._may_be_zero
+
+    def ends(self, coordinates: Array) -> Array:
+        """Where the element itself has its ends or corners, given its nodes."""
+        return coordinates
+
+
+def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array]) -> None:
+    """Refuse an element with unknown nodes, no length, or a property that is not positive."""
+    if not hasattr(element, "nodes"):
+        raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
+    for node in element.nodes:
+        if node not in coordinates:
+            raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")
+    ends = element.ends(np.array([coordinates[node] for node in element.nodes]))
+    if len(ends) == 2 and np.array_equal(*ends):
+        first, last = element.nodes
+        raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
+    for symbol, value, may_be_zero in element.properties():
+        expected = "zero or more" if may_be_zero else "a positive number"
+        if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):
+            raise ValueError(f"member {name!r} has {symbol} = {value!r}; expected {expected}")

@@ -1,0 +1,50 @@
+"""Point masses."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+from skthermo._arrays import Array
+from skthermo.fem.elements._element import TRANSLATIONS, ByProperties, Dof, PhysicalElement
+
+
+@dataclass(frozen=True)
+class PointMass(PhysicalElement):
+    """Mass lumped at a node, the same in every direction.
+
+    Parameters
+    ----------
+    node : hashable
+        Name of its node.
+    m : float
+        Mass in kg.
+
+    Examples
+    --------
+    >>> from skthermo.fem import PointMass
+    >>> PointMass("deck", m=250.0).dofs(dimension=2)
+    [('deck', 'x'), ('deck', 'y')]
+    """
+
+    node: Hashable
+    m: float
+
+    _properties = ("m",)
+
+    @property
+    def nodes(self) -> tuple[Hashable]:
+        """Its node."""
+        return (self.node,)
+
+    def dofs(self, dimension: int) -> list[Dof]:
+        """Translations of the node."""
+        return [(self.node, direction) for direction in TRANSLATIONS[:dimension]]
+
+    def stiffness(self, coordinates: Array) -> ByProperties:
+        """None."""
+        return {}
+
+    def mass(self, coordinates: Array) -> ByProperties:
+        """m in every direction."""
+        return {("m",): self.m * np.eye(coordinates.shape[1])}

@@ -1,0 +1,123 @@
+"""Whether a program's matrices are affine in its parameters, and which parameter is to blame if not."""
+
+from collections.abc import Callable
+from functools import reduce
+from operator import add
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse
+from scipy.optimize import brentq
+
+from skthermo._arrays import Array
+from skthermo.fem._theta import by_name, failures_named
+from skthermo.fem.affine import read_terms
+
+Terms = list[tuple[tuple[str, ...], scipy.sparse.csc_array]]
+
+MATRICES = ("stiffness", "mass")
+SAME = 1e-6
+POWERS = (-9.0, 9.0)
+
+
+class Program:
+    """A function that returns stiffness and mass: symmetric, of one size, or an error says at which theta not."""
+
+    def __init__(self, function: Callable[[Array], tuple[Any, Any]], parameter_names: tuple[str, ...]):
+        self.function = function
+        self.parameter_names = parameter_names
+        self.n_dof: int | None = None
+
+    def __call__(self, row: Array) -> list[scipy.sparse.csc_array]:
+        with failures_named(row, self.parameter_names):
+            result = self.function(row.copy())
+        where = f"at theta = {by_name(row, self.parameter_names)}"
+        if not isinstance(result, tuple | list) or len(result) != 2:
+            raise ValueError(f"the program returned a {type(result).__name__} {where}; expected (stiffness, mass)")
+        matrices = []
+        for matrix, what in zip(result, MATRICES, strict=True):
+            try:
+                _, (read,) = read_terms(matrix, what, self.n_dof)
+            except ValueError as error:
+                raise ValueError(f"{error}, {where}") from error
+            self.n_dof = read.shape[0]
+            matrices.append(scipy.sparse.csc_array(read))
+        return matrices
+
+
+class Difference(NamedTuple):
+    """The largest one between a program's matrix and the affine one."""
+
+    matrix: str
+    share: float
+    row: int
+    column: int
+    value: float
+
+
+def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
+    """|entry_ij| / sqrt(d_i d_j)."""
+    size, scale = np.abs(entries.data), np.sqrt(np.abs(diagonal[entries.row] * diagonal[entries.col]))
+    return np.divide(size, scale, out=np.where(size > 0, np.inf, 0.0), where=scale > 0)
+
+
+def check_affine(program: Program, terms: tuple[Terms, Terms], row: Array) -> None:
+    """Refuse a program whose matrices at a row of multipliers are not the sum of its terms.
+
+    Raises
+    ------
+    ValueError
+        Names the parameter, or the two, that act otherwise.
+    """
+    if _difference(program, terms, row) is None:
+        return
+    names = program.parameter_names
+    ones, columns = np.ones(len(row)), np.arange(len(row))
+    for j, name in enumerate(names):
+        if _difference(program, terms, np.where(columns <= j, row, ones)) is None:
+            continue
+        if found := _difference(program, terms, np.where(columns == j, row, ones)):
+            power = _power(row[j], found, terms[MATRICES.index(found.matrix)], name)
+            it_may_be = "" if power is None else f", where it goes with about the power {power:.2f}"
+            _refuse(repr(name), found, f"{name} = {row[j]:.3g}{it_may_be}")
+        for i in range(j):
+            if found := _difference(program, terms, np.where(np.isin(columns, (i, j)), row, ones)):
+                both = f"{names[i]!r} and {name!r} together"
+                _refuse(both, found, f"{names[i]} = {row[i]:.3g}, {name} = {row[j]:.3g}: it may hold their product")
+        raise ValueError(f"the program is not affine: {name!r} acts together with two or more of {list(names[:j])}")
+
+
+def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> Difference | None:
+    theta = by_name(row, program.parameter_names)
+    for what, matrix, pairs in zip(MATRICES, program(row), terms, strict=True):
+        affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
+        entries = (matrix - affine).tocoo()
+        share = relative(entries, matrix.diagonal())
+        if share.size and share.max() > SAME:
+            worst = int(share.argmax())
+            place = int(entries.row[worst]), int(entries.col[worst])
+            return Difference(what, float(share[worst]), *place, float(matrix[place]))
+    return None
+
+
+def _power(multiplier: float, found: Difference, terms: Terms, name: str) -> float | None:
+    """The p for which (t^p - 1) / (2^p - 1) is what the entry does at t and at 2, if there is one."""
+    entries: dict[tuple[str, ...], float] = {key: matrix[found.row, found.column] for key, matrix in terms}
+    doubling = entries.get((name,), 0.0)
+    if not doubling:
+        return None
+    ratio = (found.value - sum(entries.values())) / doubling
+
+    def excess(power: float) -> float:
+        power = power or np.finfo(float).tiny
+        return np.expm1(power * np.log(multiplier)) / np.expm1(power * np.log(2)) - ratio
+
+    return brentq(excess, *POWERS) if excess(POWERS[0]) * excess(POWERS[1]) < 0 else None
+
+
+def _refuse(names: str, found: Difference, where: str) -> None:
+    raise ValueError(
+        f"the program is not affine in {names}: its {found.matrix} differs by {found.share:.2%} of the diagonal from "
+        f"K_0 + sum of theta_j K_j at {where}; expected each parameter to act alone and to the first power (let one "
+        "stand for the power or product), or CallableModel for what is not affine"
+    )

@@ -1,0 +1,217 @@
+"""FE models computed by a user's own program."""
+
+import copy
+import warnings
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array
+from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, check_theta, failures_named, warn_of_failures
+from skthermo.fem.affine import check_different, check_n_modes
+from skthermo.fem.external._cache import SampleCache
+
+ROWS_PER_TASK = 32
+"""Of a program that solves row by row: few, so that all workers get some and progress shows."""
+
+
+class CallableModel:
+    """Any program that turns parameters into frequencies, as an FE model.
+
+    Parameters
+    ----------
+    function : callable
+        Takes one row of multipliers, an array of shape (n_parameters,), and returns the
+        frequencies in Hz, (n_modes,), NaN where one is not known. With ``vectorized=True`` it takes (n_samples,
+        n_parameters) and returns (n_samples, n_modes).
+    parameter_names : sequence of str
+        Columns of theta.
+    n_modes : int
+        Number of frequencies returned.
+    vectorized : bool, default=False
+        Whether the function takes many rows at once.
+    cache : str or path-like, optional
+        A file that keeps every solved row of theta, so that none is solved twice: neither
+        when the process was killed and starts again, nor in another process later on.
+
+    Attributes
+    ----------
+    cache : Path or None
+        The file, as an absolute path.
+
+    Raises
+    ------
+    ValueError
+        If a name repeats, ``n_modes`` is not a positive integer, or the cache is a folder or belongs to
+        other parameters or another number of modes.
+
+    Warns
+    -----
+    UserWarning
+        If records of the cache are damaged: these rows are solved again, and the next row that is
+        written replaces the records.
+
+    See Also
+    --------
+    probe : For programs that return matrices.
+
+    Notes
+    -----
+    A row is recognised by the exact bits of its theta, and written as soon as it is solved; of
+    many rows at once (``vectorized=True``), all when the last is. Several processes may share a
+    cache; what one of them is still solving, another solves too. A cache cannot know whether the
+    function is still the same: delete the file when the program changes. On Windows, where
+    nothing locks the file, let one process at a time write it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.fem import CallableModel
+    >>> model = CallableModel(lambda row: np.sqrt(row[0]) * np.array([1.0, 2.0]), ["E"], 2)
+    >>> model.frequencies([[1.0], [4.0]])
+    array([[1., 2.],
+           [2., 4.]])
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Array], ArrayLike],
+        parameter_names: Sequence[str],
+        n_modes: int,
+        *,
+        vectorized: bool = False,
+        cache: str | PathLike | None = None,
+    ):
+        self.function = function
+        self.parameter_names = check_different(parameter_names)
+        self.n_modes = check_n_modes(n_modes)
+        self.vectorized = vectorized
+        self._is_quiet = False
+        self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
+        if self._samples is not None:
+            self._samples.read()
+
+    @property
+    def cache(self) -> Path | None:
+        """The file that keeps solved rows."""
+        return None if self._samples is None else self._samples.path
+
+    @property
+    def rows_per_chunk(self) -> int:
+        """How many samples are one task, where many are solved."""
+        return ROWS_PER_CHUNK if self.vectorized else ROWS_PER_TASK
+
+    def frequencies(self, theta: ArrayLike) -> Array:
+        """Natural frequencies.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters. Rows that repeat are solved once.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            In Hz.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width or values, the function returns another shape, or the
+            cache belongs to other parameters.
+        RuntimeError
+            If the function fails at all of several rows, by an error or by a frequency that is neither
+            NaN nor finite and positive; the error says at which theta first.
+
+        Warns
+        -----
+        UserWarning
+            If the function fails at some rows, which become NaN and are not cached.
+        """
+        rows = check_theta(theta, self.parameter_names)
+        keys = [row.tobytes() for row in rows.astype("<f8")]
+        known = {} if self._samples is None else self._samples.read()
+        missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
+        batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
+        solved: dict[bytes, Array] = {}
+        failures: dict[bytes, RuntimeError] = {}
+        for batch in batches:
+            asked = np.array([missing[key] for key in batch])
+            try:
+                frequencies = self._solve(asked)
+            except RuntimeError as failure:
+                failures |= dict.fromkeys(batch, failure)
+                continue
+            impossible = self._impossible(asked, frequencies)
+            failures |= {batch[row]: failure for row, failure in impossible.items()}
+            good = [row for row in range(len(batch)) if row not in impossible]
+            if self._samples is not None and good:
+                self._samples.append(asked[good], frequencies[good])
+            solved |= {batch[row]: frequencies[row] for row in good}
+        if failures:
+            first = next(iter(failures.values()))
+            if len(failures) == len(missing) > 1:
+                raise first
+            if not self._is_quiet:
+                warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {first}", UserWarning, stacklevel=2)
+            solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
+        found = [solved[key] if key in solved else known[key] for key in keys]
+        return np.array(found).reshape(len(rows), self.n_modes)
+
+    def _solve(self, rows: Array) -> Array:
+        argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))
+        with failures_named(argument, self.parameter_names):
+            result = np.asarray(self.function(argument.copy()), dtype=float)
+        if result.size != np.prod(shape) or result.shape[-1:] != shape[-1:]:
+            raise ValueError(
+                f"the model's function returned shape {result.shape}; expected {shape}"
+                + ("" if self.vectorized else " for one row of theta (for many rows: vectorized=True)")
+                + f", at theta = {by_name(rows[0], self.parameter_names)}"
+            )
+        return result.reshape(len(rows), self.n_modes)
+
+    def _impossible(self, rows: Array, frequencies: Array) -> dict[int, RuntimeError]:
+        """Rows with what is no frequency."""
+        wrong = ~np.isnan(frequencies) & ~(np.isfinite(frequencies) & (frequencies > 0))
+        return {
+            int(row): RuntimeError(
+                f"the model's function returned {frequencies[row][wrong[row]][0]} Hz at theta = "
+                f"{by_name(rows[row], self.parameter_names)}; expected frequencies that are finite and positive, or NaN"
+            )
+            for row in np.flatnonzero(wrong.any(axis=1))
+        }
+
+    def quiet(self) -> "CallableModel":
+        """The same model without warnings of rows at which the function fails.
+
+        Returns
+        -------
+        CallableModel
+            For searches that pass through such rows.
+        """
+        twin = copy.copy(self)
+        twin._is_quiet = True
+        return twin
+
+    def warn_of(self, theta: Array, frequencies: Array) -> None:
+        """Warn of rows without frequencies.
+
+        Parameters
+        ----------
+        theta : ndarray of shape (n_samples, n_parameters)
+            Multipliers.
+        frequencies : ndarray of shape (n_samples, n_modes)
+            What was solved for them.
+        """
+        if not self._is_quiet:
+            warn_of_failures(theta, frequencies, stacklevel=5)
+
+    def __sklearn_clone__(self) -> "CallableModel":
+        return self
+
+    def __repr__(self) -> str:
+        name = getattr(self.function, "__name__", type(self.function).__name__)
+        return f"CallableModel({name}, {list(self.parameter_names)}, {self.n_modes} modes)"

@@ -1,0 +1,272 @@
+"""FE models that other programs have exported as matrices."""
+
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from functools import reduce
+from operator import add
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+
+from skthermo._arrays import Matrix
+from skthermo._io import read_named_matrices
+from skthermo.fem.affine import AffineModel
+
+Key = tuple[str, ...]
+
+MASS_NAMES = ("m", "m0", "mass")
+TOTAL_NAMES = ("k", "k0", "stiffness")
+SAME = 1e-6
+EXACTLY_SAME = 1e-8
+
+
+def load_affine(
+    path: str | PathLike,
+    *,
+    stiffness: Collection[str] | Mapping[str, str | Key] | None = None,
+    mass: str | None = None,
+    total: str | None = None,
+    n_modes: int = 6,
+    parameter_names: Sequence[str] | None = None,
+    groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
+    track: bool = False,
+) -> AffineModel:
+    """An FE model from the stiffness terms and the mass matrix that another program has written.
+
+    K(theta) is the sum of theta_j times the j-th stiffness matrix, each a parameter of the matrix's name.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A MATLAB v5 file (``.mat``; ``save -v7`` writes it), a NumPy file (``.npz``) of named arrays, or a
+        folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``) or what
+        `scipy.sparse.save_npz` writes (``.npz``). Matrices are dense or sparse.
+    stiffness : collection of str, or mapping of str to str or tuple of str, optional
+        Matrices that are terms; a mapping says which parameters multiply each, as in `AffineModel`: ``()``
+        none, ``("E", "A")`` a product, the same parameter several matrices. By default every square matrix
+        but the mass and the total is a term.
+    mass : str, optional
+        The mass matrix. By default the one called M, M0 or mass, in lower or upper case.
+    total : str, optional
+        The whole nominal stiffness, with which the terms are compared. By default, where ``stiffness`` is
+        not given, the matrix called K, K0 or stiffness, in lower or upper case, if there are others.
+    n_modes : int, default=6
+        How many of the lowest modes the model gives.
+    parameter_names : sequence of str, optional
+        Columns of theta. By default in the order of the file; a folder is read in the order of its names,
+        E_2 before E_10.
+    groups : mapping of str to list of (tuple of str or int), optional
+        Damage groups, as in `AffineModel`: by default each parameter is one.
+    track : bool, default=False
+        Whether a column follows its mode rather than its rank.
+
+    Returns
+    -------
+    AffineModel
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is nothing at the path.
+    ValueError
+        Names the file and the variable that is damaged, missing, of another size than the mass, or not
+        finite; or names the total if it holds less stiffness than the terms summed.
+
+    Warns
+    -----
+    UserWarning
+        If, without ``stiffness``, a total that was found by its name is more than the sum of the terms; if a matrix
+        of another name is the sum of all others, and so taken as the total; or if a term is proportional to the
+        mass or to the sum of the other terms.
+
+    See Also
+    --------
+    AffineModel : From matrices at hand.
+    probe : From a program that returns matrices.
+
+    Notes
+    -----
+    Which matrix is which is decided by these rules alone:
+
+    - Text, structs, numbers, vectors and matrices that are not square are left alone. A square matrix of another
+      size than the mass, not finite, or of the mass's size and complex, is an error unless ``stiffness`` names
+      the terms; an imaginary part of zeros is left out. Of a folder, only the files of these names are then read.
+    - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
+    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If it is
+      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal,
+      that is an error. A matrix K0 that comes on top of the terms is said to be so by
+      ``stiffness={"K0": (), "K1": "E_deck", ...}``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from skthermo.fem import load_affine
+    >>> k1, k2 = np.array([[400.0, 0], [0, 0]]), np.array([[400.0, -400], [-400, 400]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.savez(f"{folder}/tower.npz", K0=k1 + k2, k_base=k1, k_top=k2, M0=np.eye(2))
+    ...     model = load_affine(f"{folder}/tower.npz", n_modes=2)
+    >>> model.parameter_names
+    ('k_base', 'k_top')
+    >>> model.frequencies([[1.0, 1.0]]).round(3)
+    array([[1.967, 5.15 ]])
+    """
+    file = Path(path)
+    named = None if stiffness is None else {*_keys(stiffness), mass, total}
+    matrices = read_named_matrices(
+        file, lambda name: named is None or name in named or (mass is None and name.lower() in MASS_NAMES)
+    )
+    square = _square(matrices)
+    mass = mass or _usual(square, MASS_NAMES, "mass", file)
+    if mass is None:
+        raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
+    mass_matrix = _find(matrices, mass, file)
+    says_total = total is not None
+    if stiffness is None:
+        others = {
+            name: _find(matrices, name, file, mass_matrix.shape)
+            for name, matrix in matrices.items()
+            if name != mass and (name in square or _is_complex(matrix, mass_matrix.shape))
+        }
+        if total is None and len(others) > 1:
+            total = _usual(others, TOTAL_NAMES, "total", file)
+        stiffness = _terms(others, total, mass, mass_matrix, file)
+    keys = _keys(stiffness)
+    if not keys:
+        raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
+    terms = {name: _find(matrices, name, file, mass_matrix.shape) for name in keys}
+    pairs = [(keys[name], term) for name, term in terms.items()]
+    if total is not None:
+        rest = _rest(_find(matrices, total, file, mass_matrix.shape), terms, f"{file}: {total!r}", says_total)
+        pairs += [] if rest is None else [((), rest)]
+    try:
+        return AffineModel(
+            pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track
+        )
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
+    """Names of real square matrices; of single numbers only if there is nothing larger."""
+    real = {name: matrix for name, matrix in matrices.items() if matrix is not None and not np.iscomplexobj(matrix)}
+    sizes = {name: m.shape[0] for name, m in real.items() if m.shape[0] == m.shape[1] > 0}
+    return [name for name, size in sizes.items() if size > 1] or list(sizes)
+
+
+def _is_complex(matrix: Matrix | None, shape: tuple[int, ...]) -> bool:
+    return matrix is not None and np.iscomplexobj(matrix) and matrix.shape == shape
+
+
+def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
+    """Why nothing is the mass."""
+    for name, matrix in matrices.items():
+        if name.lower() in MASS_NAMES:
+            shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
+            is_complex = matrix is not None and np.iscomplexobj(matrix)
+            return f"{name!r} is {shape}, {'complex' if is_complex else 'not square'}, and so not the mass"
+    return f"no matrix is called {', '.join(MASS_NAMES)}"
+
+
+def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
+    """What remains of all matrices but the mass as terms; what looks like something else is said."""
+    found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
+    has_pattern = mass_matrix.shape[0] > 1
+    like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
+    alike = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
+    springs = {name: term for name, term in found.items() if name not in alike}
+    if total is None and len(springs) > 2:
+        whole = reduce(add, springs.values())
+        sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
+        if len(sums) == 1:
+            del springs[sums[0]], found[sums[0]]
+            warnings.warn(
+                f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
+                f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
+                stacklevel=3,
+            )
+    if len(springs) > 1 and has_pattern:
+        whole = reduce(add, springs.values())
+        for name, term in springs.items():
+            if ratio := _ratio(term, whole - term):
+                alike[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
+    for name, what in alike.items():
+        warnings.warn(
+            f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
+            stacklevel=3,
+        )
+    return list(found)
+
+
+def _ratio(term: Matrix, reference: Matrix) -> float:
+    """How many times the reference a term is; 0 if it is not a multiple."""
+    reference = scipy.sparse.csc_array(reference)
+    ratio = float((term * reference).sum() / max((reference * reference).sum(), np.finfo(float).tiny))
+    return ratio if ratio and _same(term, ratio * reference, SAME) else 0.0
+
+
+def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
+    """Whether no difference is more than a part of the diagonal."""
+    rest = scipy.sparse.coo_array(matrix - expected)
+    diagonal = np.abs(expected.diagonal())
+    return not (np.abs(rest.data) > tolerance * np.sqrt(diagonal[rest.row] * diagonal[rest.col])).any()
+
+
+def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:
+    """The only name that is a usual one."""
+    found = [name for name in names if name.lower() in usual]
+    if len(found) > 1:
+        raise ValueError(f"{file}: {found} could each be the {what}; say {what}=...")
+    return found[0] if found else None
+
+
+def _keys(stiffness: Collection[str] | Mapping[str, str | Key]) -> dict[str, Key]:
+    """The parameters that multiply each term."""
+    names = [stiffness] if isinstance(stiffness, str) else stiffness
+    keys = names if isinstance(names, Mapping) else {name: name for name in names}
+    return {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
+
+
+def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: tuple[int, ...] = ()) -> Matrix:
+    if name not in matrices:
+        raise ValueError(f"{file}: no variable {name!r}; found {list(matrices)}")
+    matrix = matrices[name]
+    if matrix is None:
+        raise ValueError(f"{file}: variable {name!r} is not a matrix of real numbers")
+    if np.iscomplexobj(matrix):
+        raise ValueError(
+            f"{file}: variable {name!r} is not a matrix of real numbers: its imaginary part is not zero; expected real "
+            "ones, or stiffness=[...] that names the terms"
+        )
+    if not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
+        raise ValueError(f"{file}: variable {name!r} holds values that are not finite")
+    if shape and matrix.shape != shape:
+        raise ValueError(
+            f"{file}: variable {name!r} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] "
+            "that names the terms"
+        )
+    return matrix
+
+
+def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool) -> Matrix | None:
+    """What the terms leave of the total, if anything."""
+    summed = reduce(add, terms.values())
+    if _same(summed, total, SAME):
+        return None
+    rest = scipy.sparse.csc_array(total - summed)
+    less = rest.diagonal() < -SAME * np.abs(total.diagonal())
+    if less.any():
+        row = int(np.argmax(less))
+        raise ValueError(
+            f"{what} is {total.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; expected a "
+            "total of the stiffness, or stiffness=... that says which matrices are terms"
+        )
+    if not is_meant:
+        warnings.warn(
+            f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
+            "total=... says that it is, stiffness=... what else the matrices are",
+            stacklevel=3,
+        )
+    return rest

@@ -1,0 +1,116 @@
+"""Affine models recovered from programs that assemble matrices."""
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from numbers import Integral
+from operator import add
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from skthermo._arrays import Array, RandomState, as_random_state
+from skthermo.fem.affine import AffineModel, check_different
+from skthermo.fem.external._affine_check import Program, Terms, check_affine, relative
+
+ROUNDING = 16 * np.finfo(float).eps
+
+
+def probe(
+    assemble: Callable[[Array], tuple[Any, Any]],
+    parameter_names: Sequence[str],
+    *,
+    n_modes: int = 6,
+    track: bool = False,
+    n_checks: int = 3,
+    random_state: RandomState = None,
+) -> AffineModel:
+    """The affine terms behind a program that returns stiffness and mass for given parameters.
+
+    K(theta) = K_0 + sum of theta_j K_j, and M likewise, are recovered from one call at theta = 1 and one for
+    each parameter, with that parameter doubled; from then on the program is not needed.
+
+    Parameters
+    ----------
+    assemble : callable
+        Takes one row of multipliers, an array of shape (n_parameters,), and returns stiffness and mass,
+        each dense or SciPy sparse of shape (n_dof, n_dof).
+    parameter_names : sequence of str
+        Columns of theta.
+    n_modes : int, default=6
+        How many of the lowest modes the model gives.
+    track : bool, default=False
+        Whether a column follows its mode rather than its rank.
+    n_checks : int, default=3
+        Number of random points, each multiplier between 0.5 and 1.5, at which the program is called once
+        more to verify that it is affine.
+    random_state : int, RandomState or None, default=None
+        Seed of these points.
+
+    Returns
+    -------
+    AffineModel
+        A term for each parameter that changes the stiffness, and one for each that changes the mass.
+
+    Raises
+    ------
+    ValueError
+        If the program is not affine; the error names the parameter, by how much a matrix differs, and the
+        power or product that it might be (found with at most 2 n_parameters more calls). If a parameter
+        changes neither matrix, or a matrix has another shape than at theta = 1.
+    RuntimeError
+        If the program fails; the error says at which theta.
+
+    See Also
+    --------
+    CallableModel : For programs that are not affine, or return frequencies only.
+    load_affine : For matrices in files.
+
+    Notes
+    -----
+    Differences are relative to the diagonal, abs(A_ij - B_ij) / sqrt(A_ii A_jj): below some 1e-14 they are
+    rounding and left out, so that sparse matrices stay sparse; above 1e-6 a program is not affine.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.fem import probe
+    >>> def tower(theta):
+    ...     k1, k2, m = 400.0 * theta[0], 400.0 * theta[1], 1.0
+    ...     return np.array([[k1 + k2, -k2], [-k2, k2]]), m * np.eye(2)
+    >>> model = probe(tower, ["k_base", "k_top"], n_modes=2, random_state=0)
+    >>> model.frequencies([[1.0, 1.0], [1.0, 0.5]]).round(3)
+    array([[1.967, 5.15 ],
+           [1.723, 4.159]])
+    """
+    if not isinstance(n_checks, Integral) or n_checks < 0:
+        raise ValueError(f"n_checks is {n_checks!r}; expected zero or a positive integer")
+    names = check_different(parameter_names)
+    program = Program(assemble, names)
+    base = program(np.ones(len(names)))
+    doubled = [program(row) for row in 1 + np.eye(len(names))]
+    stiffness, mass = (_terms(names, base[i], [matrices[i] for matrices in doubled]) for i in range(2))
+    for name in names:
+        if (name,) not in [key for key, _ in stiffness + mass]:
+            raise ValueError(
+                f"parameter {name!r} changes neither stiffness nor mass when doubled; expected one of them"
+            )
+    for row in as_random_state(random_state).uniform(0.5, 1.5, (n_checks, len(names))):
+        check_affine(program, (stiffness, mass), row)
+    return AffineModel(stiffness, mass, n_modes=n_modes, parameter_names=names, track=track)
+
+
+def _terms(names: Sequence[str], base: scipy.sparse.csc_array, doubled: Sequence[scipy.sparse.csc_array]) -> Terms:
+    """What each parameter adds when doubled, and what then is left as the constant part."""
+    diagonal, rounding = base.diagonal(), ROUNDING * (len(names) + 1)
+    parts = [_without(rounding, matrix - base, diagonal) for matrix in doubled]
+    rest = _without(rounding, base - reduce(add, parts), diagonal)
+    pairs: Terms = [*(((name,), part) for name, part in zip(names, parts, strict=True)), ((), rest)]
+    return [(key, matrix) for key, matrix in pairs if matrix.nnz] or [((), rest)]
+
+
+def _without(rounding: float, matrix: scipy.sparse.csc_array, diagonal: Array) -> scipy.sparse.csc_array:
+    entries = matrix.tocoo()
+    matters = relative(entries, diagonal) > rounding
+    places = entries.row[matters], entries.col[matters]
+    return scipy.sparse.csc_array((entries.data[matters], places), shape=matrix.shape)

@@ -1,0 +1,26 @@
+"""Eigenproblems, which mode is which, and modes at one theta."""
+
+from skthermo.fem.modal._dense import EigenSolver, dense_solver, hertz
+from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
+from skthermo.fem.modal._mac import mac
+from skthermo.fem.modal._reordering import share_reordered
+from skthermo.fem.modal._shift_invert import ShiftInvertSolver, factorise
+from skthermo.fem.modal._stability import check_supported, count_modes
+from skthermo.fem.modal._tracking import may_be_missed, pair_modes, repeated_modes
+
+__all__ = [
+    "EigenSolver",
+    "LocalModes",
+    "ShiftInvertSolver",
+    "check_supported",
+    "count_modes",
+    "dense_solver",
+    "factorise",
+    "hertz",
+    "mac",
+    "may_be_missed",
+    "pair_modes",
+    "repeated_modes",
+    "shape_jacobian",
+    "share_reordered",
+]

@@ -1,0 +1,113 @@
+"""Sparse generalised eigenproblems K phi = lambda M phi, one theta after the other."""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo.fem.modal._matrices import ParametrisedMatrix
+
+GUARD_VECTORS = 2
+"""Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
+
+FEW_MASSES = 20
+"""Degrees of freedom with mass, beyond three for each eigenpair, from which on a Lanczos iteration has room."""
+
+
+class ShiftInvertSolver:
+    """Lanczos iteration on K^-1 M in the inner product of M, which may be singular.
+
+    The start vector is random with a fixed seed: the same theta gives the same bits, and no
+    symmetry of a structure is orthogonal to it.
+    """
+
+    def __init__(self, stiffness: ParametrisedMatrix, mass: ParametrisedMatrix):
+        self._stiffness = stiffness
+        self._mass = mass
+        self._start = seeded_start(stiffness.n_dof)
+
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        return self._each(theta, n_modes, with_shapes=False)[0]
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        return self._each(theta, n_modes, with_shapes=True)
+
+    def scaled(self, factors: Array) -> "ShiftInvertSolver":
+        return ShiftInvertSolver(self._stiffness.scaled(factors), self._mass)
+
+    def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
+        eigenvalues = np.full((len(theta), n_modes), np.nan)
+        shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
+        pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
+        for row, (stiffness, mass) in enumerate(pairs):
+            eigenvalues[row], vectors = lowest_modes(stiffness, factorise(stiffness), mass, n_modes, self._start)
+            if with_shapes:
+                shapes[row] = vectors
+        return eigenvalues, shapes
+
+    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        stiffness, mass = self._stiffness.assemble(theta)[0], self._mass.assemble(theta)[0]
+        factors = factorise(stiffness)
+        eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
+        return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
+
+
+def lowest_modes(
+    stiffness: scipy.sparse.csc_array,
+    factors: scipy.sparse.linalg.SuperLU | None,
+    mass: scipy.sparse.csc_array,
+    n_modes: int,
+    start: Array,
+) -> tuple[Array, Array]:
+    """Eigenvalues in ascending order and shapes of unit modal mass; NaN without factors or convergence."""
+    n_dof = len(start)
+    nothing = np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
+    if factors is None:
+        return nothing
+    massive = np.flatnonzero(mass.diagonal())
+    wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
+    if len(massive) < FEW_MASSES + 3 * wanted:
+        vectors = modes_of_few_masses(factors, mass, massive, n_modes)
+    else:
+        inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
+        try:
+            values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
+        except scipy.sparse.linalg.ArpackError:
+            return nothing
+        vectors = vectors[:, np.argsort(values)[:n_modes]]
+    # One more application of K^-1 M takes out what massless degrees of freedom gather of rounding.
+    shapes = factors.solve(mass @ vectors)
+    shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
+    return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
+
+
+def modes_of_few_masses(
+    factors: scipy.sparse.linalg.SuperLU, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int
+) -> Array:
+    """Lowest shapes, up to their scale, from the dense flexibility R' K^-1 R of the mass M = R R'.
+
+    The Krylov space of K^-1 M is no larger than there are masses, too small for an iteration.
+    """
+    root = np.zeros((mass.shape[0], len(massive)))
+    weights, directions = np.linalg.eigh(mass[massive][:, massive].toarray())
+    root[massive] = directions * np.sqrt(np.maximum(weights, 0.0))
+    flexible = factors.solve(root)
+    return flexible @ np.linalg.eigh(root.T @ flexible)[1][:, ::-1][:, :n_modes]
+
+
+def factorise(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU | None:
+    """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
+    try:
+        factors = scipy.sparse.linalg.splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:  # exactly singular
+        return None
+    return factors if (factors.U.diagonal() > 0).all() else None
+
+
+def seeded_start(n_dof: int) -> Array:
+    """A vector that is neither symmetric nor different from call to call."""
+    return np.random.default_rng(0).standard_normal(n_dof)

@@ -1,0 +1,106 @@
+"""Checks for mechanisms and missing mass."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse.linalg
+
+from skthermo._arrays import Array, Matrix, as_dense
+from skthermo.fem.modal._shift_invert import factorise, seeded_start
+
+FEW_DOFS = 500
+"""Degrees of freedom up to which a mass matrix is examined as a dense one."""
+
+SMALL_SHIFT = 1e-10
+"""Makes a semidefinite matrix of unit diagonal definite."""
+
+
+def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
+    """Refuse a stiffness matrix that leaves a motion free.
+
+    Parameters
+    ----------
+    stiffness : matrix of shape (n_dof, n_dof)
+        Nominal stiffness, dense or sparse.
+    names : sequence of str
+        What each degree of freedom is called in the error.
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not positive definite; the error names the free motion's largest parts.
+    """
+    diagonal = stiffness.diagonal()
+    if (diagonal <= 0).any():
+        _refuse([name for name, stiff in zip(names, diagonal, strict=True) if stiff <= 0])
+    scale = 1 / np.sqrt(diagonal)
+    if isinstance(stiffness, np.ndarray):
+        eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
+        lowest, vector, highest = eigenvalues[0], vectors[:, 0], eigenvalues[-1]
+    else:
+        scaled = _scaled(stiffness, scale)
+        lowest, vector = _lowest(scaled)
+        highest = abs(scaled).sum(axis=0).max()
+    if lowest <= 50 * np.finfo(float).eps * highest:
+        motion = np.abs(scale * vector)
+        largest = np.argsort(-motion, kind="stable")
+        _refuse([names[i] for i in largest if motion[i] > 0.5 * motion[largest[0]]])
+
+
+def count_modes(mass: Matrix, *, at_least: int) -> int:
+    """How many modes of finite frequency a mass matrix allows.
+
+    Of a sparse matrix with many masses, as many as it has degrees of freedom with mass.
+
+    Raises
+    ------
+    ValueError
+        If these are fewer than ``at_least``, or the mass has a negative eigenvalue.
+    """
+    diagonal = mass.diagonal()
+    if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= FEW_DOFS:
+        kept = np.flatnonzero(diagonal) if isinstance(mass, scipy.sparse.csc_array) else slice(None)
+        part = mass[kept][:, kept]
+        eigenvalues = np.linalg.eigvalsh(as_dense(part))
+        tolerance = 10 * len(eigenvalues) * np.finfo(float).eps * abs(eigenvalues[-1])
+        outside = abs(mass).sum() > (1 + 1e-12) * abs(part).sum()  # beside a diagonal of zero
+        negative, count = outside or eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
+    else:
+        massive = diagonal > 0
+        scale = 1 / np.sqrt(np.where(massive, diagonal, 1.0))
+        shifted = _scaled(mass, scale) + SMALL_SHIFT * scipy.sparse.eye_array(len(diagonal), format="csc")
+        negative, count = factorise(shifted) is None, int(massive.sum())
+    if negative:
+        raise ValueError("the nominal mass has a negative eigenvalue; expected none below zero")
+    if count < at_least:
+        raise ValueError(
+            f"n_modes is {at_least}, but {len(diagonal)} degrees of freedom, {len(diagonal) - count} of them "
+            f"massless, have only {count} modes"
+        )
+    return count
+
+
+def _scaled(matrix: scipy.sparse.csc_array, scale: Array) -> scipy.sparse.csc_array:
+    """Rows and columns multiplied."""
+    diagonal = scipy.sparse.diags_array(scale, format="csc")
+    return diagonal @ matrix @ diagonal
+
+
+def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
+    """Lowest eigenvalue and its vector, by a shift that lies below it."""
+    identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
+    shift = SMALL_SHIFT
+    while (factors := factorise(matrix + shift * identity)) is None:
+        shift *= 10
+    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factors.solve, dtype=float)
+    start = seeded_start(matrix.shape[0])
+    eigenvalue, vector = scipy.sparse.linalg.eigsh(matrix, 1, sigma=-shift, OPinv=inverse, v0=start)
+    return float(eigenvalue[0]), vector[:, 0]
+
+
+def _refuse(free: list[str]) -> None:
+    listed = ", ".join(free[:6]) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
+    raise ValueError(
+        f"the structure is a mechanism: {listed} can move without resistance; "
+        "expected supports, springs or members that hold every motion (a positive definite stiffness)"
+    )

@@ -1,0 +1,7 @@
+"""Solving many samples, drawing them, and measurement noise."""
+
+from skthermo.fem.sampling._evaluate import evaluate
+from skthermo.fem.sampling._noise import add_noise, check_noise
+from skthermo.fem.sampling._sample import sample
+
+__all__ = ["add_noise", "check_noise", "evaluate", "sample"]

@@ -1,0 +1,96 @@
+"""Frequencies and derivatives of many rows of theta."""
+
+from collections.abc import Callable, Generator
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed, effective_n_jobs
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import Array
+from skthermo._threads import map_on_blas_threads, single_blas_thread
+from skthermo.fem._protocol import FEModel
+from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta, warn_of_failures
+from skthermo.fem.sampling._progress import watched
+
+
+def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
+    """Frequencies of many rows of parameters.
+
+    Parameters
+    ----------
+    model : FE model
+        Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    n_jobs : int, optional
+        Jobs over which chunks of rows are spread, through joblib.
+    progress : bool, optional
+        Whether a bar on stderr tells how far it is. By default on a terminal, once a second has passed.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If theta has the wrong width, or a value that is neither NaN nor finite and positive.
+
+    Warns
+    -----
+    UserWarning
+        Once, if rows have no solution.
+
+    Notes
+    -----
+    Rows are cut into the same chunks whatever ``n_jobs`` is, and so give the same bits: of ``rows_per_chunk`` rows
+    if the model states that. One job of a model that is ``thread_safe`` runs on as many threads as
+    BLAS may use.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import evaluate
+    >>> evaluate(make_truss(), [[1.0, 1.0, 1.0, 1.0], [0.9, float("nan"), 1.0, 1.0]])[:, :2].round(2)
+    array([[ 7.48, 27.5 ],
+           [  nan,   nan]])
+    """
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    frequencies = np.full((len(rows), model.n_modes), np.nan)
+    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    if not known.size:
+        return frequencies
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    places = [known[i : i + size] for i in range(0, len(known), size)]
+    with closing(_solved(model, rows, places, n_jobs)) as parts:
+        for place, part in zip(places, watched(parts, len(known), progress), strict=True):
+            frequencies[place] = part
+    getattr(model, "warn_of", warn_of_failures)(rows, frequencies)
+    return frequencies
+
+
+def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
+    """Frequencies at each of the places in their order; the work ends where the generator is closed."""
+    thread_safe = getattr(model, "thread_safe", False)
+    frequencies = model.quiet().frequencies if thread_safe else model.frequencies
+    if thread_safe and effective_n_jobs(n_jobs) == 1:
+        yield from map_on_blas_threads(lambda place: frequencies(rows[place]), places)
+    else:
+        parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        yield from parallel(delayed(_solve_chunk)(frequencies, rows[place]) for place in places)
+
+
+def _parallel(**options: Any) -> Parallel:
+    """Gives results as they come where the active backend can."""
+    try:
+        return Parallel(return_as="generator", **options)
+    except ValueError:  # pools of workers, Ray's among them, give all at the end
+        return Parallel(**options)
+
+
+def _solve_chunk(frequencies: Callable[[Array], Array], theta: Array) -> Array:
+    with single_blas_thread():
+        return frequencies(theta)

@@ -1,0 +1,82 @@
+"""Measurement noise on frequencies."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import RandomState, as_floats, as_random_state
+
+
+def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
+    """Relative standard deviation of every mode.
+
+    Parameters
+    ----------
+    noise : float or array-like of shape (n_modes,)
+        Relative standard deviation; 0.01 means 1 %.
+    n_modes : int
+        Number of modes.
+
+    Returns
+    -------
+    ndarray of shape (n_modes,)
+
+    Raises
+    ------
+    ValueError
+        If the shape is neither () nor (n_modes,), or a value is negative or not finite.
+
+    Examples
+    --------
+    >>> from skthermo.fem import check_noise
+    >>> check_noise(0.01, 3)
+    array([0.01, 0.01, 0.01])
+    """
+    array = np.asarray(noise, dtype=float)
+    if array.shape not in ((), (n_modes,)) or not (np.isfinite(array) & (array >= 0)).all():
+        raise ValueError(
+            f"noise is {array}; expected a relative standard deviation (0.01 means 1 %), "
+            f"a number or one for each of the {n_modes} modes, none negative"
+        )
+    return np.broadcast_to(array, (n_modes,))
+
+
+def add_noise(
+    frequencies: ArrayLike,
+    noise: ArrayLike,
+    *,
+    random_state: RandomState = None,
+) -> NDArray[np.float64]:
+    """Frequencies times (1 + noise * standard Gaussian).
+
+    Parameters
+    ----------
+    frequencies : array-like of shape (n_samples, n_modes)
+        In Hz.
+    noise : float or array-like of shape (n_modes,)
+        Relative standard deviation; 0 leaves the frequencies as they are.
+    random_state : int, RandomState or None, default=None
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_modes)
+        In Hz.
+
+    Raises
+    ------
+    ValueError
+        If the noise is negative, not finite or of another length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.fem import add_noise
+    >>> noisy = add_noise(np.full((10_000, 2), 4.0), [0.0, 0.01], random_state=0)
+    >>> noisy.std(axis=0).round(2)
+    array([0.  , 0.04])
+    """
+    clean = as_floats(frequencies)
+    if clean.ndim != 2:
+        raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
+    deviation = check_noise(noise, clean.shape[1])
+    return clean * (1 + deviation * as_random_state(random_state).standard_normal(clean.shape))

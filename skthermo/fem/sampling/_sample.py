@@ -1,0 +1,85 @@
+"""Monte Carlo sampling of FE models."""
+
+from numbers import Integral
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
+
+from skthermo._arrays import Array, RandomState, as_random_state
+from skthermo.fem._protocol import FEModel
+from skthermo.fem._theta import check_bounds
+from skthermo.fem.sampling._evaluate import evaluate
+
+if TYPE_CHECKING:
+    from sklearn.utils import Bunch
+
+
+def sample(
+    model: FEModel,
+    bounds: ArrayLike = 0.3,
+    n_samples: int = 1000,
+    *,
+    method: Literal["uniform", "lhs", "sobol"] = "uniform",
+    n_jobs: int | None = None,
+    progress: bool | None = None,
+    random_state: RandomState = None,
+) -> "Bunch":
+    """Frequencies of an FE model at random parameters.
+
+    Parameters
+    ----------
+    model : FE model
+        Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
+    bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        A half-width (0.2 means 1 +- 20 %), or lowest and highest multipliers.
+    n_samples : int, default=1000
+        Number of rows.
+    method : {"uniform", "lhs", "sobol"}, default="uniform"
+        Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (even
+        where ``n_samples`` is a power of 2).
+    n_jobs : int, optional
+        Jobs over which chunks of rows are spread, through joblib.
+    progress : bool, optional
+        Whether a bar on stderr tells how far it is. By default on a terminal, once a second has passed.
+    random_state : int, RandomState or None, default=None
+        Seed. The same seed gives the same bits whatever ``n_jobs`` is.
+
+    Returns
+    -------
+    Bunch
+        ``theta`` (n_samples, n_parameters) and ``frequencies`` (n_samples, n_modes) in Hz.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are infeasible, ``n_samples`` is not positive or the method is unknown.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import sample
+    >>> drawn = sample(make_truss(), bounds=0.2, n_samples=100, random_state=0)
+    >>> drawn.theta.shape, drawn.frequencies.shape
+    ((100, 4), (100, 6))
+    """
+    from sklearn.utils import Bunch  # imported here because scikit-learn imports pandas
+
+    lowest, highest = check_bounds(bounds, model.parameter_names).T
+    if not isinstance(n_samples, Integral) or n_samples < 1:
+        raise ValueError(f"n_samples is {n_samples!r}; expected a positive integer")
+    theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
+    theta *= highest - lowest
+    theta += lowest
+    return Bunch(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
+
+
+def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.random.RandomState) -> Array:
+    if method == "uniform":
+        return random_state.uniform(size=(n_samples, n_parameters))
+    engines = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}
+    if method not in engines:
+        raise ValueError(f"method is {method!r}; expected one of {['uniform', *engines]}")
+    generator = np.random.default_rng(random_state.randint(np.iinfo(np.int32).max))
+    return engines[method](n_parameters, rng=generator).random(n_samples)
