@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import check_columns, check_same_rows, column_names, frame_like
@@ -27,7 +28,6 @@ from skthermo.fem import FEModel, add_noise, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
-from skthermo.surrogate._regression import identity
 
 POSSIBLE = (1e-6, 1e6)
 """Multipliers outside which a model's matrices lose all digits."""
@@ -68,6 +68,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         Fitted clone.
     parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
         Multipliers that M1 found in the training data, eq. (5).
+    parameter_names_, mode_names_ : list of str
+        Columns of the parameters and of the frequencies.
     n_features_in_ : int
         Number of temperature columns.
     feature_names_in_ : ndarray of str
@@ -124,7 +126,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         self.imputer = imputer
         self.random_state = random_state
 
-    @_fit_context(prefer_skip_nested_validation=True)
+    @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: ArrayLike) -> "DataInformedFEM":
         """Learn how temperature moves the parameters.
 
@@ -148,16 +150,32 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         """
         T, F = self._read_records(X, y)
         self._prepare_parts()
-        if self.imputer_ is not None:
-            F = self._imputed(T, F)
-        aligned = self.aligner_.fit(F).transform(F)
-        self.inverse_.fit(aligned)
-        theta = as_floats(self.inverse_.transform(aligned))
-        if theta.shape[1] != len(self._parameter_names):
-            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self._parameter_names}")
-        self.parameters_ = frame_like(T, theta, self._parameter_names)
+        theta = self._fit_inverse(self._completed(T, F))
+        self.parameters_ = frame_like(T, theta, self.parameter_names_)
         self.mapper_.fit(T, self.parameters_)
         return self
+
+    def estimate_parameters(self, F: ArrayLike) -> Table:
+        """Parameters behind measured frequencies, eq. (5).
+
+        Parameters
+        ----------
+        F : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz; NaN is allowed.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters; NaN where a mode is missing.
+
+        Raises
+        ------
+        ValueError
+            If the number or the names of the modes differ from `fit`, or a frequency is not positive.
+        """
+        check_is_fitted(self)
+        theta = as_floats(self.inverse_.transform(self.aligner_.transform(F)))
+        return frame_like(F, theta, self.parameter_names_)
 
     def predict_parameters(self, X: ArrayLike) -> Table:
         """Parameters at given temperatures, eq. (7).
@@ -173,20 +191,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             Multipliers of the nominal parameters; NaN where M2 has no complete input, and, with a warning,
             where it gives what no structure has (less than 1e-6 or more than 1e6).
         """
-        check_is_fitted(self)
-        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        theta = as_columns(self.mapper_.predict(X)).copy()
-        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
-        if impossible.any():
-            row = np.flatnonzero(impossible)[0]
-            warnings.warn(
-                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
-                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
-                UserWarning,
-                stacklevel=2,
-            )
-            theta[impossible] = np.nan
-        return frame_like(X, theta, self._parameter_names)
+        return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
     def predict(self, X: ArrayLike) -> Table:
         """Frequencies of the healthy structure at given temperatures.
@@ -201,7 +206,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         ndarray or DataFrame of shape (n_samples, n_modes)
             In Hz, in the measured domain.
         """
-        return self._frequencies(self.model, X)
+        return frame_like(X, self._frequencies(self.model, X), self.mode_names_)
 
     def simulate(
         self,
@@ -234,12 +239,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         ValueError
             If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
         """
-        if damage and not hasattr(self.model, "damaged"):
-            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
-        model = self.model.damaged(damage) if damage else self.model
-        frequencies = self._frequencies(model, X)
-        noisy = add_noise(frequencies, noise, random_state=random_state)
-        return frame_like(X, noisy, self._mode_names)
+        frequencies = self._frequencies(self._damaged_model(damage), X)
+        return frame_like(X, add_noise(frequencies, noise, random_state=random_state), self.mode_names_)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -260,9 +261,33 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         check_same_rows(X, y, ("temperatures", "frequencies"))
         return complete_r2(y, self.predict(X))
 
-    def _frequencies(self, model: FEModel, X: ArrayLike) -> Table:
-        simulated = evaluate(model, as_floats(self.predict_parameters(X)))
-        return frame_like(X, as_floats(self.aligner_.inverse_transform(simulated)), self._mode_names)
+    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
+        check_is_fitted(self)
+        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
+        theta = as_columns(self.mapper_.predict(X)).copy()
+        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+        if impossible.any():
+            row = np.flatnonzero(impossible)[0]
+            warnings.warn(
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                UserWarning,
+                stacklevel=4,
+            )
+            theta[impossible] = np.nan
+        return theta
+
+    def _frequencies(self, model: FEModel, X: ArrayLike) -> NDArray[np.float64]:
+        """Frequencies of a model at given temperatures, in the measured domain."""
+        frequencies = evaluate(model, self._predict_theta(X))
+        return as_floats(self.aligner_.inverse_transform(frequencies))
+
+    def _damaged_model(self, damage: Mapping[str, float] | None) -> FEModel:
+        if not damage:
+            return self.model
+        if not hasattr(self.model, "damaged"):
+            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
+        return self.model.damaged(damage)
 
     def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies, checked; frames stay frames."""
@@ -280,33 +305,48 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             )
         check_columns(T, "temperature", varying=True)
         check_columns(F, "frequency")
-        self._mode_names = column_names(F, "f")
-        self._parameter_names = list(self.model.parameter_names)
+        self.mode_names_ = column_names(F, "f")
+        self.parameter_names_ = list(self.model.parameter_names)
         return T, F
 
     def _prepare_parts(self) -> None:
         inverse = InverseSurrogate() if self.inverse is None else self.inverse
         mapper = TemperatureMapper() if self.mapper is None else self.mapper
         self.inverse_, self.mapper_ = clone(inverse), clone(mapper)
-        self.aligner_ = identity() if self.aligner == "passthrough" else clone(self.aligner)
+        self.aligner_ = (
+            FunctionTransformer().set_output(transform="default")
+            if self.aligner == "passthrough"
+            else clone(self.aligner)
+        )
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
         for part in (self.inverse_, *self.inverse_.get_params().values()):
             if isinstance(part, InverseSurrogate) and part.model is None:
                 part.set_params(model=self.model)
-            if isinstance(part, InverseSurrogate) and list(part.model.parameter_names) != self._parameter_names:
+            if isinstance(part, InverseSurrogate) and list(part.model.parameter_names) != self.parameter_names_:
                 raise ValueError(
                     f"the inverse's model has the parameters {list(part.model.parameter_names)}; "
-                    f"expected {self._parameter_names}, as {self.model!r} has"
+                    f"expected {self.parameter_names_}, as {self.model!r} has"
                 )
         random_state = seeded(self.random_state)
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
 
-    def _imputed(self, T: Any, F: Any) -> Any:
+    def _completed(self, T: Any, F: Any) -> Any:
+        """Frequencies without gaps, where there is an imputer."""
+        if self.imputer_ is None:
+            return F
         n_sensors, n_modes = T.shape[1], F.shape[1]
-        completed = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-        return frame_like(F, completed[:, n_sensors : n_sensors + n_modes], self._mode_names)
+        values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
+        return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
+
+    def _fit_inverse(self, F: Any) -> NDArray[np.float64]:
+        """Fit aligner and M1, which gives the parameters of the training data."""
+        aligned = self.aligner_.fit(F).transform(F)
+        theta = as_floats(self.inverse_.fit(aligned).transform(aligned))
+        if theta.shape[1] != len(self.parameter_names_):
+            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
+        return theta
 
     def __sklearn_clone__(self) -> "DataInformedFEM":
         return clone_sharing_models(self)

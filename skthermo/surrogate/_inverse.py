@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._frames import frame_like
+from skthermo._arrays import as_floats
+from skthermo._frames import column_names, frame_like
 from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
 from skthermo.fem import FEModel, add_noise, check_theta, evaluate
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
@@ -30,9 +31,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     model : FE model, optional
         Needed unless `fit` gets frequencies and parameters.
     regressor : regressor, optional
-        Any multi-output regressor, between the logarithms of frequencies and of parameters, which
-        are nearly linear in each other; both are standardised. By default a small ``MLPRegressor``; see
-        `paper_network` for the paper's.
+        Any regressor, between the logarithms of frequencies and of parameters, which are nearly linear in each
+        other; both are standardised. One that takes a single output only is fitted once for each parameter. By
+        default a small ``MLPRegressor``; see `paper_network` for the paper's.
     bounds : float or array-like of shape (n_parameters, 2), default=0.3
         Box of multipliers: a half-width, or lowest and highest of each parameter.
     n_samples : int, default=1000
@@ -58,8 +59,14 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     ----------
     regressor_ : regressor
         Fitted; between standardised log frequencies and standardised log parameters.
+    inputs_, targets_ : Standardiser
+        Means and scales of the log frequencies and of the log parameters.
     samples_ : Bunch
         ``theta`` and ``frequencies`` learned from, before noise.
+    n_parameters_ : int
+        Number of parameters.
+    parameter_names_ : list of str or None
+        Their names: the model's, or those of the frame that `fit` saw.
     n_features_in_ : int
         Number of modes.
     feature_names_in_ : ndarray of str
@@ -121,7 +128,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self.n_jobs = n_jobs
         self.random_state = random_state
 
-    @_fit_context(prefer_skip_nested_validation=True)
+    @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike | None = None, y: ArrayLike | None = None) -> "InverseSurrogate":
         """Learn the inverse.
 
@@ -154,13 +161,11 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if self.model is not None and y is None:
             frequencies, theta = self._simulate(X, random)
         else:
-            self._simulated_alone = False
             frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
             if self.model is not None:
                 check_theta(theta, self.model.parameter_names, allow_nan=True)
-                self._parameter_names = list(self.model.parameter_names)
+                self.parameter_names_ = list(self.model.parameter_names)
             self.samples_ = Bunch(theta=theta, frequencies=frequencies)
-        self._n_parameters = theta.shape[1]
         self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
         return self
 
@@ -177,7 +182,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         ndarray or DataFrame of shape (n_samples, n_parameters)
             NaN in rows where a mode is missing. A frame gives a frame on its own index.
         """
-        return frame_like(X, self._predict_array(X), self.get_feature_names_out())
+        return frame_like(X, self._predict_arrays(X)[0], self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Frequencies of parameters, by the FE model.
@@ -218,14 +223,13 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             The model's parameter names, else y's columns, else theta1, theta2, ...
         """
         check_is_fitted(self)
-        numbered = [f"theta{i + 1}" for i in range(self._n_parameters)]
-        return np.array(self._parameter_names or numbered, dtype=object)
+        numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
+        return np.array(self.parameter_names_ or numbered, dtype=object)
 
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         if not is_model(self.model):
             raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
         model = self.model
-        self._simulated_alone = X is None
         names_only = np.ones((1, model.n_modes)) if X is None else X
         n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
         if n_modes != model.n_modes:
@@ -250,9 +254,20 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 stacklevel=4,
             )
         self.samples_ = drawn
-        self._parameter_names = list(model.parameter_names)
-        self._y_is_vector = False
+        self.parameter_names_ = list(model.parameter_names)
+        self.y_is_vector_ = False
         return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
+
+    def _read_inputs(self, X: ArrayLike) -> NDArray[np.float64]:
+        has_names = hasattr(self, "feature_names_in_")
+        frequencies = super()._read_inputs(X if has_names else as_floats(X))
+        if self.inputs_.log and (frequencies <= 0).any():
+            row, column = np.argwhere(frequencies <= 0)[0]
+            raise ValueError(
+                f"row {row} of {column_names(X, 'f')[column]!r} is {frequencies[row, column]:g}; expected positive "
+                "frequencies in Hz, NaN where one is missing"
+            )
+        return frequencies
 
     def _tolerance(self) -> float | None:
         """Relative error of frequencies that a reduced model may have; None for the model itself."""

@@ -15,9 +15,9 @@ class TemperatureMapper(MultiplierRegressor):
     Parameters
     ----------
     regressor : regressor, optional
-        Any multi-output regressor; temperatures are standardised and the logarithms of the
-        parameters learned, standardised too, so that predictions are positive (parameters
-        that are not all positive, and so no multipliers, are learned as they are). By default a
+        Any regressor; one that takes a single output only is fitted once for each parameter. Temperatures are
+        standardised and the logarithms of the parameters learned, standardised too, so that predictions are positive
+        (parameters that are not all positive, and so no multipliers, are learned as they are). By default a
         small ``MLPRegressor``; see `paper_network` for the paper's.
     random_state : int, RandomState or None, default=None
         Seeds the regressor unless that has its own seed.
@@ -26,6 +26,14 @@ class TemperatureMapper(MultiplierRegressor):
     ----------
     regressor_ : regressor
         Fitted; between standardised temperatures and standardised log parameters.
+    inputs_, targets_ : Standardiser
+        Means and scales of the temperatures and of the (log) parameters.
+    n_parameters_ : int
+        Number of parameters.
+    parameter_names_ : list of str or None
+        Their names, where `fit` saw them in a frame.
+    y_is_vector_ : bool
+        Whether `fit` saw one parameter as a vector.
     n_features_in_ : int
         Number of temperature columns.
     feature_names_in_ : ndarray of str
@@ -64,7 +72,7 @@ class TemperatureMapper(MultiplierRegressor):
         self.regressor = regressor
         self.random_state = random_state
 
-    @_fit_context(prefer_skip_nested_validation=True)
+    @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: ArrayLike) -> "TemperatureMapper":
         """Learn the mapping from complete rows.
 
@@ -88,6 +96,5 @@ class TemperatureMapper(MultiplierRegressor):
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         check_columns(frame_like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
-        self._n_parameters = theta.shape[1]
-        self._learn(T, theta, seeded(self.random_state))
+        self._learn(T, theta, seeded(self.random_state), log_inputs=False)
         return self

@@ -1,49 +1,53 @@
-"""What both surrogates share: a regression from standardised inputs to log multipliers."""
+"""What both surrogates share: a regression between standardised inputs and standardised log multipliers."""
 
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer, StandardScaler
+from sklearn.multioutput import MultiOutputRegressor
 
-from skthermo._arrays import as_columns, as_floats
+from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._threads import single_blas_thread
 from skthermo._validation import check_array, check_is_fitted, clone_sharing_models, seed_parts, validate_data
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._networks import default_network
+from skthermo.surrogate._standardiser import Standardiser, is_positive
 
 
 class MultiplierRegressor(RegressorMixin, BaseEstimator):
     """Base of regressors onto multipliers: complete rows in, NaN where an input is missing.
 
-    A subclass stores ``regressor`` and ``random_state`` and calls `_learn`.
+    A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`.
     """
 
-    _simulated_alone = False
-
-    def predict(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """Multipliers of the nominal parameters.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_features)
             Inputs; NaN is allowed.
+        return_std : bool, default=False
+            Whether to return standard deviations too, of a regressor whose own ``predict`` gives them.
 
         Returns
         -------
-        ndarray or DataFrame of shape (n_samples, n_parameters)
+        theta : ndarray or DataFrame of shape (n_samples, n_parameters)
             Positive if those learned from were; NaN in rows where an input is missing. A frame on X's
             index where X and the multipliers learned from were frames.
+        std : ndarray or DataFrame of shape (n_samples, n_parameters)
+            Only with ``return_std``: standard deviations of theta, to first order in those of its logarithm.
+
+        Raises
+        ------
+        ValueError
+            If standard deviations are asked of a regressor that has none.
         """
-        theta = self._predict_array(X)
-        if self._y_is_vector:
-            return theta[:, 0]
-        return theta if self._parameter_names is None else frame_like(X, theta, self._parameter_names)
+        theta, std = self._predict_arrays(X, return_std)
+        return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.
@@ -62,25 +66,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         """
         return complete_r2(as_columns(y), as_columns(self.predict(X)))
 
-    def _learn(
-        self, X: NDArray, y: NDArray, random_state: np.random.RandomState | None, *, log_inputs: bool = False
-    ) -> None:
-        """Fit on the complete rows of X and y (n_samples, n_parameters)."""
-        complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
-        if complete.sum() < 2:
-            raise ValueError(
-                f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
-            )
-        target = y[complete]
-        regressor = default_network() if self.regressor is None else clone(self.regressor)
-        self._log_inputs = log_inputs and is_positive(X[complete])
-        regression = standardised_regression(regressor, log_inputs=self._log_inputs, log_targets=is_positive(target))
-        seed_parts(regression, random_state)
-        with single_blas_thread():
-            self._regression = regression.fit(X[complete], target[:, 0] if target.shape[1] == 1 else target)
-        self.regressor_ = self._regression.regressor_[-1]
-
-    def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[NDArray, NDArray]:
+    def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""
         if y is None:
             raise ValueError(
@@ -91,27 +77,52 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         targets = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, targets if plain_rows else y, names)
-        self._y_is_vector = targets.ndim == 1
-        self._parameter_names = column_names(y, "") if isinstance(y, pd.DataFrame) else None
+        self.y_is_vector_ = targets.ndim == 1
+        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
         return inputs, as_columns(targets)
 
-    def _predict_array(self, X: ArrayLike) -> NDArray[np.float64]:
-        check_is_fitted(self)
-        table = as_floats(X) if self._simulated_alone else X  # no names to compare with
-        inputs = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-        if self._log_inputs and (inputs <= 0).any():
-            row, column = np.argwhere(inputs <= 0)[0]
+    def _learn(self, X: Array, y: Array, random_state: np.random.RandomState | None, *, log_inputs: bool) -> None:
+        """Fit on the complete rows of X and y (n_samples, n_parameters)."""
+        complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
+        if complete.sum() < 2:
             raise ValueError(
-                f"row {row} of {column_names(X, 'f')[column]!r} is {inputs[row, column]:g}; expected positive "
-                "frequencies in Hz, NaN where one is missing"
+                f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
             )
+        X, y = X[complete], y[complete]
+        self.n_parameters_ = y.shape[1]
+        self.inputs_ = Standardiser.fitted(X, log=log_inputs and is_positive(X))
+        self.targets_ = Standardiser.fitted(y, log=is_positive(y))
+        regressor = default_network() if self.regressor is None else clone(self.regressor)
+        seed_parts(regressor, random_state)
+        with single_blas_thread():
+            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), self.targets_.transform(y))
+
+    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
+        """Multipliers and their standard deviations, (n_samples, n_parameters) each; NaN where not known or asked."""
+        check_is_fitted(self)
+        inputs = self._read_inputs(X)
         complete = ~np.isnan(inputs).any(axis=1)
-        theta = np.full((len(inputs), self._n_parameters), np.nan)
+        theta = np.full((len(inputs), self.n_parameters_), np.nan)
+        std = np.full_like(theta, np.nan)
         if complete.any():
-            # Far outside what was learned exp overflows to inf, which is what it should say.
-            with np.errstate(over="ignore"):
-                theta[complete] = as_columns(self._regression.predict(inputs[complete]))
-        return theta
+            standardised = self.inputs_.transform(inputs[complete])
+            if return_std:
+                means, deviations = predict_with_std(self.regressor_, standardised)
+                theta[complete] = self.targets_.inverse_transform(means)
+                std[complete] = self.targets_.inverse_deviations(deviations, theta[complete])
+            else:
+                means = as_columns(self.regressor_.predict(standardised))
+                theta[complete] = self.targets_.inverse_transform(means)
+        return theta, std
+
+    def _read_inputs(self, X: ArrayLike) -> Array:
+        return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+
+    def _as_targets(self, X: Any, values: Array) -> Any:
+        """A vector or a frame where the targets learned from were."""
+        if self.y_is_vector_:
+            return values[:, 0]
+        return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
 
     def __sklearn_clone__(self) -> "MultiplierRegressor":
         return clone_sharing_models(self)
@@ -123,32 +134,36 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         return tags
 
 
-def standardised_regression(
-    regressor: BaseEstimator, *, log_inputs: bool, log_targets: bool
-) -> TransformedTargetRegressor:
-    """Standardised inputs to standardised targets, or the logarithms of either; logarithms keep targets positive."""
-    return TransformedTargetRegressor(
-        make_pipeline(*([logarithm()] if log_inputs else []), standardiser(), regressor),
-        transformer=make_pipeline(logarithm() if log_targets else identity(), standardiser()),
-        check_inverse=False,
-    )
+def fit_outputs(regressor: BaseEstimator, X: Array, y: Array) -> BaseEstimator:
+    """The regressor fitted to all outputs, or a clone of it to each where it takes one only.
+
+    scikit-learn's tag of multiple outputs does not tell them apart: it is False for ``MLPRegressor``.
+    """
+    if y.shape[1] == 1:
+        return regressor.fit(X, y[:, 0])
+    try:
+        return clone(regressor).fit(X, y)
+    except Exception:  # what else may be wrong is raised again here
+        return MultiOutputRegressor(regressor).fit(X, y)
 
 
-def is_positive(values: NDArray) -> bool:
-    """Whether all values have a logarithm."""
-    return bool((values > 0).all())
+def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
+    """Means and standard deviations of all outputs.
 
-
-def standardiser() -> StandardScaler:
-    """To mean zero and unit variance, as an array whatever the user's configuration says."""
-    return StandardScaler().set_output(transform="default")
-
-
-def logarithm() -> FunctionTransformer:
-    """To natural logarithms and back."""
-    return FunctionTransformer(np.log, np.exp, check_inverse=False).set_output(transform="default")
-
-
-def identity() -> FunctionTransformer:
-    """Leaves arrays arrays and frames frames."""
-    return FunctionTransformer().set_output(transform="default")
+    Raises
+    ------
+    ValueError
+        If the regressor has no standard deviations.
+    """
+    if isinstance(regressor, MultiOutputRegressor):
+        parts = [predict_with_std(part, X) for part in regressor.estimators_]
+        means, deviations = (np.hstack(columns) for columns in zip(*parts, strict=True))
+        return means, deviations
+    try:
+        means, deviations = regressor.predict(X, return_std=True)
+    except TypeError as error:
+        raise ValueError(
+            f"{regressor!r} gives no standard deviations; expected a regressor whose predict takes return_std, such as "
+            "GaussianProcessRegressor or BayesianRidge"
+        ) from error
+    return as_columns(means), as_columns(deviations)
