@@ -8,13 +8,14 @@ from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
 from sklearn.utils import check_array, check_random_state
-from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
+from sklearn.utils._param_validation import HasMethods, Interval, InvalidParameterError, StrOptions
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, validate_data
 
 __all__ = [
     "BaseSearchCV",
     "HasMethods",
     "Interval",
+    "InvalidParameterError",
     "StrOptions",
     "_BaseImputer",
     "_check_feature_names_in",

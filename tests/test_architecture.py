@@ -13,6 +13,12 @@ from skthermo._optional import import_optional
 PACKAGE = Path(skthermo.__file__).parent
 MAY_IMPORT = {
     "fem": set(),
+    "fem.elements": set(),
+    "fem.modal": set(),
+    "fem.sampling": set(),
+    "fem.affine": {"fem.modal"},
+    "fem.assembly": {"fem.elements", "fem.affine"},
+    "fem.external": {"fem.affine"},
     "preprocessing": set(),
     "metrics": set(),
     "detection": {"metrics"},
@@ -21,6 +27,9 @@ MAY_IMPORT = {
     "datasets": {"fem"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
+FILES = sorted(PACKAGE.rglob("*.py"))
+LONGEST_FILE = 350
+each_file = pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 
 
 def imported_modules(path):
@@ -32,19 +41,75 @@ def imported_modules(path):
             yield node.module
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.relative_to(PACKAGE)))
+def own_imports(path):
+    """Modules of skthermo that a file imports, without the package's name."""
+    names = [module.split(".") for module in imported_modules(path)]
+    return [parts[1:] for parts in names if parts[0] == "skthermo" and len(parts) > 1]
+
+
+def package_of(path):
+    return list(path.relative_to(PACKAGE).parent.parts)
+
+
+@each_file
 def test_arrows_point_one_way(path):
-    parts = path.relative_to(PACKAGE).parts
-    room = parts[0] if len(parts) > 1 else None
+    room = ".".join(package_of(path))
+    for module in own_imports(path):
+        package = ".".join(part for part in module if not part.startswith("_"))
+        if module[0].startswith("_") or package == room or not room:
+            continue
+        is_front = path.name == "__init__.py" and package.startswith(room + ".")  # a room presents its sub-rooms
+        shares_parent = room.startswith(package + ".") and module[-1].startswith("_")
+        assert is_front or shares_parent or package in MAY_IMPORT[room], f"{room} may not import {'.'.join(module)}"
+
+
+@each_file
+def test_what_every_room_uses_uses_no_room(path):
+    if not package_of(path) or package_of(path)[0].startswith("_"):
+        assert all(module[0].startswith("_") for module in own_imports(path))
+
+
+@each_file
+def test_private_modules_are_for_their_own_package(path):
+    for module in own_imports(path):
+        private = next((i for i, part in enumerate(module) if part.startswith("_")), None)
+        if private is not None:
+            assert package_of(path)[:private] == module[:private], f"{path} reaches into {'.'.join(module)}"
+            assert private == len(module) - 1 or package_of(path)[: private + 1] == module[: private + 1]
+
+
+def test_no_circle_of_modules():
+    imports = {}
+    for path in FILES:
+        name = ".".join([*package_of(path), path.stem]).removesuffix(".__init__")
+        imports[name] = {".".join(module) for module in own_imports(path)}
+    done, open_now = set(), []
+
+    def visit(name):
+        assert name not in open_now, f"circle: {[*open_now[open_now.index(name) :], name]}"
+        if name in imports and name not in done:
+            open_now.append(name)
+            for module in imports[name]:
+                visit(module)
+            open_now.pop()
+            done.add(name)
+
+    for name in imports:
+        visit(name)
+
+
+@each_file
+def test_only_core_dependencies_are_imported(path):
     for module in imported_modules(path):
-        top = module.split(".")
-        assert top[0] in CORE | set(sys.stdlib_module_names), f"{module} is not a core dependency"
-        if top[0] == "skthermo" and len(top) > 1 and not top[1].startswith("_"):
-            assert room is not None, f"{module}: what every room uses may not use a room"
-            assert top[1] in MAY_IMPORT[room] | {room}, f"{room} may not import {module}"
+        assert module.split(".")[0] in CORE | set(sys.stdlib_module_names), f"{module} is not a core dependency"
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.relative_to(PACKAGE)))
+@each_file
+def test_files_are_short(path):
+    assert len(path.read_text().splitlines()) <= LONGEST_FILE
+
+
+@each_file
 def test_private_scikit_learn_is_imported_in_one_place(path):
     if path.name == "_validation.py":
         return
@@ -60,6 +125,12 @@ def test_import_loads_no_optional_package():
         "skthermo.metrics, skthermo.datasets, skthermo.updating; "
         "print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') if m in sys.modules])"
     )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert loaded.stdout.strip() == "[]"
+
+
+def test_fem_needs_neither_pandas_nor_scikit_learn_to_be_imported():
+    code = "import sys, skthermo.fem; print([m for m in ('pandas', 'sklearn') if m in sys.modules])"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert loaded.stdout.strip() == "[]"
 

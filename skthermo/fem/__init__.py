@@ -14,7 +14,7 @@ from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, load_affine, probe
 from skthermo.fem.modal import LocalModes, mac, shape_jacobian, share_reordered
-from skthermo.fem.sampling import add_noise, check_noise, evaluate, sample
+from skthermo.fem.sampling import add_noise, check_noise, evaluate, linearise, sample
 
 __all__ = [
     "AffineModel",
@@ -39,6 +39,7 @@ __all__ = [
     "check_noise",
     "check_theta",
     "evaluate",
+    "linearise",
     "load_affine",
     "mac",
     "probe",

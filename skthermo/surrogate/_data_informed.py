@@ -7,27 +7,21 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.preprocessing import FunctionTransformer
+from sklearn.base import BaseEstimator, RegressorMixin
 
 from skthermo._arrays import as_columns, as_floats
-from skthermo._frames import check_columns, check_same_rows, column_names, frame_like
+from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._validation import (
     HasMethods,
     StrOptions,
     _fit_context,
-    check_array,
     check_is_fitted,
     clone_sharing_models,
-    is_model,
-    seed_parts,
-    seeded,
     validate_data,
 )
 from skthermo.fem import FEModel, add_noise, evaluate
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._inverse import InverseSurrogate
-from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._chain_parts import clone_parts, read_records
 
 POSSIBLE = (1e-6, 1e6)
 """Multipliers outside which a model's matrices lose all digits."""
@@ -148,8 +142,10 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
             If lengths or indices differ, the number of modes is not the model's, a temperature
             is constant or missing throughout, or a mode was never measured.
         """
-        T, F = self._read_records(X, y)
-        self._prepare_parts()
+        T, F = read_records(self, X, y)
+        self.mode_names_ = column_names(F, "f")
+        self.parameter_names_ = list(self.model.parameter_names)
+        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
         theta = self._fit_inverse(self._completed(T, F))
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
         self.mapper_.fit(T, self.parameters_)
@@ -288,49 +284,6 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         if not hasattr(self.model, "damaged"):
             raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
         return self.model.damaged(damage)
-
-    def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
-        """Temperatures and frequencies, checked; frames stay frames."""
-        if not is_model(self.model):
-            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
-        if y is None:
-            raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
-        T = frame_like(X, values, getattr(X, "columns", ()))
-        F = frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
-        check_same_rows(X, y, ("temperatures", "frequencies"))
-        if F.shape[1] != self.model.n_modes:
-            raise ValueError(
-                f"frequencies have {F.shape[1]} columns; expected the {self.model.n_modes} modes of {self.model!r}"
-            )
-        check_columns(T, "temperature", varying=True)
-        check_columns(F, "frequency")
-        self.mode_names_ = column_names(F, "f")
-        self.parameter_names_ = list(self.model.parameter_names)
-        return T, F
-
-    def _prepare_parts(self) -> None:
-        inverse = InverseSurrogate() if self.inverse is None else self.inverse
-        mapper = TemperatureMapper() if self.mapper is None else self.mapper
-        self.inverse_, self.mapper_ = clone(inverse), clone(mapper)
-        self.aligner_ = (
-            FunctionTransformer().set_output(transform="default")
-            if self.aligner == "passthrough"
-            else clone(self.aligner)
-        )
-        self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
-        for part in (self.inverse_, *self.inverse_.get_params().values()):
-            if isinstance(part, InverseSurrogate) and part.model is None:
-                part.set_params(model=self.model)
-            if isinstance(part, InverseSurrogate) and list(part.model.parameter_names) != self.parameter_names_:
-                raise ValueError(
-                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; "
-                    f"expected {self.parameter_names_}, as {self.model!r} has"
-                )
-        random_state = seeded(self.random_state)
-        for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
-            if part is not None:
-                seed_parts(part, random_state)
 
     def _completed(self, T: Any, F: Any) -> Any:
         """Frequencies without gaps, where there is an imputer."""

@@ -4,12 +4,12 @@ from typing import Any, Literal
 
 from sklearn.neural_network import MLPRegressor
 
-HIDDEN_LAYERS = {
-    1: (128, 128, 64, 64, 32, 16),
-    4: (256, 128, 64, 32, 16),
-    6: (256, 128, 64, 32),
+NETWORKS: dict[str, dict[str, Any]] = {
+    "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
+    "kw51-inverse": {"hidden_layer_sizes": (256, 128, 64, 32, 16), "alpha": 1e-4, "batch_size": 128},
+    "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
 }
-BATCH_SIZES = {1: "auto", 4: 128, 6: 256}
+TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 
 
 def default_network() -> MLPRegressor:
@@ -23,14 +23,14 @@ def default_network() -> MLPRegressor:
     )
 
 
-def paper_network(table: Literal[1, 4, 6], **parameters: Any) -> MLPRegressor:
+def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:
     """The deep networks of Kamali et al. (2026), as near as ``MLPRegressor`` comes to them.
 
     Parameters
     ----------
-    table : {1, 4, 6}
-        Table of the paper: 1, both networks of the truss (6 hidden layers); 4, the inverse
-        surrogate of the KW51 bridge (5); 6, its temperature mapper (4).
+    network : {"truss", "kw51-inverse", "kw51-mapper"} or {1, 4, 6}
+        What the network is for, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers),
+        the inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
     **parameters
         Parameters of ``MLPRegressor`` to set otherwise.
 
@@ -42,15 +42,14 @@ def paper_network(table: Literal[1, 4, 6], **parameters: Any) -> MLPRegressor:
     Raises
     ------
     ValueError
-        If the paper has no such table.
+        If the paper has no such network.
 
     Notes
     -----
-    ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. What stands in for
-    the dropout of Table 1 (0.05 after the input) and Table 6 (0.2 after the first two layers) is
-    the L2 penalty ``alpha``, 0.1 and 1 here, and, for the inverse surrogate, ``noise``
-    on the simulated frequencies. Training ends before 1000 epochs when the loss has stopped
-    falling; no rows are held back to decide this, which fails on small samples.
+    ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. The dropout of Table 1 (0.05 after the
+    input) and Table 6 (0.2 after the first two layers) is replaced by the L2 penalty ``alpha``, 0.1 and 1 here, and,
+    for the inverse surrogate, by ``noise`` on the simulated frequencies. Training ends before 1000 epochs when the
+    loss has stopped falling; no rows are held back to decide this, which fails on small samples.
     Standardisation of inputs and outputs is the estimators' own.
 
     References
@@ -60,16 +59,11 @@ def paper_network(table: Literal[1, 4, 6], **parameters: Any) -> MLPRegressor:
     Examples
     --------
     >>> from skthermo.surrogate import paper_network
-    >>> paper_network(4, alpha=0.01).hidden_layer_sizes
+    >>> paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes
     (256, 128, 64, 32, 16)
     """
-    if table not in HIDDEN_LAYERS:
-        raise ValueError(f"table is {table!r}; expected one of {sorted(HIDDEN_LAYERS)}")
-    settings = {
-        "hidden_layer_sizes": HIDDEN_LAYERS[table],
-        "alpha": {1: 0.1, 4: 1e-4, 6: 1.0}[table],
-        "batch_size": BATCH_SIZES[table],
-        "learning_rate_init": 0.001,
-        "max_iter": 1000,
-    }
+    purpose = TABLES.get(network, network)
+    if purpose not in NETWORKS:
+        raise ValueError(f"network is {network!r}; expected one of {[*NETWORKS]} or of the tables {[*TABLES]}")
+    settings = NETWORKS[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000}
     return MLPRegressor(**(settings | parameters))

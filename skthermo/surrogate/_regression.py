@@ -11,7 +11,14 @@ from sklearn.multioutput import MultiOutputRegressor
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._threads import single_blas_thread
-from skthermo._validation import check_array, check_is_fitted, clone_sharing_models, seed_parts, validate_data
+from skthermo._validation import (
+    InvalidParameterError,
+    check_array,
+    check_is_fitted,
+    clone_sharing_models,
+    seed_parts,
+    validate_data,
+)
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._standardiser import Standardiser, is_positive
@@ -143,7 +150,9 @@ def fit_outputs(regressor: BaseEstimator, X: Array, y: Array) -> BaseEstimator:
         return regressor.fit(X, y[:, 0])
     try:
         return clone(regressor).fit(X, y)
-    except Exception:  # what else may be wrong is raised again here
+    except InvalidParameterError:
+        raise
+    except Exception:  # another cause than the number of outputs is raised again here
         return MultiOutputRegressor(regressor).fit(X, y)
 
 

@@ -241,14 +241,15 @@ def test_seeds_reach_parts_without_one_and_leave_the_others():
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
-@pytest.mark.parametrize("table", [1, 4, 6])
-def test_paper_networks(table):
-    network = paper_network(table, max_iter=3)
+@pytest.mark.parametrize(("table", "purpose"), [(1, "truss"), (4, "kw51-inverse"), (6, "kw51-mapper")])
+def test_paper_networks(table, purpose):
+    network = paper_network(purpose, max_iter=3)
+    assert network.get_params() == paper_network(table, max_iter=3).get_params()
     assert network.max_iter == 3
     assert not network.early_stopping
     inverse = InverseSurrogate(TRUSS, network, bounds=0.2, n_samples=300, random_state=0).fit()
     assert inverse.predict(HELD_OUT.frequencies).shape == (200, 4)
-    with pytest.raises(ValueError, match="table is 2; expected one of"):
+    with pytest.raises(ValueError, match=r"network is 2; expected one of \['truss', .* tables \[1, 4, 6\]"):
         paper_network(2)
 
 

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -120,7 +120,25 @@ class AffineBase(ABC):
         ndarray of shape (n_samples, n_modes, n_parameters)
             d f / d theta in Hz.
         """
-        return self._in_chunks(self._core.jacobian, theta)[0]
+        return self.linearised(theta)[1]
+
+    def linearised(self, theta: ArrayLike) -> tuple[Array, Array]:
+        """Natural frequencies and their exact derivatives, from one solution of each eigenproblem.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz.
+        jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+            d f / d theta in Hz.
+        """
+        frequencies, jacobian = self._in_chunks(self._core.linearised, theta)
+        return frequencies, jacobian
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
         """The lowest modes at one theta, with their derivatives.
@@ -200,6 +218,14 @@ class AffineBase(ABC):
 
     def __sklearn_clone__(self: Model) -> Model:
         return self
+
+    @abstractmethod
+    def damaged(self: Model, damage: Mapping[str, float]) -> Model:
+        """A new model with less stiffness (or more) in some groups."""
+
+    @abstractmethod
+    def rescaled(self: Model, theta: ArrayLike) -> Model:
+        """A new model whose nominal state, theta = 1, is this model at a given theta."""
 
     @property
     @abstractmethod

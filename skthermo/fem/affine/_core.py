@@ -124,14 +124,14 @@ class AffineCore:
         eigenvalues, shapes = self.solver.modes(theta, self.n_modes)
         return hertz(eigenvalues), shapes
 
-    def jacobian(self, theta: Array) -> tuple[Array]:
-        """d f / d theta, (n_samples, n_modes, n_parameters)."""
+    def linearised(self, theta: Array) -> tuple[Array, Array]:
+        """Frequencies in Hz and d f / d theta, (n_samples, n_modes, n_parameters)."""
         frequencies, shapes = self.modes(theta)
         gradient = self.stiffness.gradients(theta, shapes)
         if not self.mass.is_constant:
             eigenvalues = (2 * np.pi * frequencies) ** 2
             gradient -= eigenvalues[:, :, np.newaxis] * self.mass.gradients(theta, shapes)
-        return (gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis]),)
+        return frequencies, gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis])
 
     def nominal_mac(self, shapes: Array) -> Array:
         """Mass-weighted MAC of the nominal modes with shapes, (n_samples, n_modes, n_candidates)."""

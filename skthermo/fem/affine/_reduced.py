@@ -1,7 +1,6 @@
 """FE models on a small basis of their own mode shapes."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,9 +10,6 @@ from skthermo.fem._theta import check_bounds, check_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._basis import Basis, grow_basis, projected_core
 from skthermo.fem.affine._core import AffineCore
-
-if TYPE_CHECKING:
-    from skthermo.fem.affine._affine import AffineModel
 
 
 class ReducedModel(AffineBase):
@@ -80,7 +76,7 @@ class ReducedModel(AffineBase):
 
     def __init__(
         self,
-        full: "AffineModel",
+        full: AffineBase,
         bounds: ArrayLike = 0.3,
         *,
         tol: float = 1e-5,

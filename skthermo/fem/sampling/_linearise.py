@@ -1,0 +1,81 @@
+"""Frequencies and their derivatives at many rows of theta."""
+
+from numbers import Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array
+from skthermo.fem._protocol import FEModel
+from skthermo.fem._theta import check_theta
+from skthermo.fem.sampling._evaluate import evaluate
+
+
+def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple[Array, Array]:
+    """Frequencies of many rows of parameters, and how they change with the parameters.
+
+    Parameters
+    ----------
+    model : FE model
+        Exact derivatives are taken from a method ``linearised`` or ``jacobian``, where it has one; else central
+        differences.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    step : float, default=0.001
+        Relative step of central differences.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+    jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+        d f / d theta in Hz; NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If theta has the wrong width, or a value that is neither NaN nor finite and positive; if the step is not
+        between 0 and 1.
+
+    Examples
+    --------
+    The frequency of a mass on a spring grows with the square root of its stiffness:
+
+    >>> from skthermo.fem import AffineModel, linearise
+    >>> model = AffineModel({("k",): [[400.0]]}, [[1.0]], n_modes=1)
+    >>> frequencies, jacobian = linearise(model, [[1.0], [4.0]])
+    >>> (jacobian[:, 0, 0] / frequencies[:, 0]).round(6)
+    array([0.5  , 0.125])
+    """
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    frequencies = np.full((len(rows), model.n_modes), np.nan)
+    jacobian = np.full((len(rows), model.n_modes, rows.shape[1]), np.nan)
+    known = ~np.isnan(rows).any(axis=1)
+    if not known.any():
+        return frequencies, jacobian
+    if hasattr(model, "linearised"):
+        frequencies[known], jacobian[known] = model.linearised(rows[known])
+    else:
+        frequencies[known] = evaluate(model, rows[known])
+        exact = getattr(model, "jacobian", None)
+        jacobian[known] = exact(rows[known]) if exact else central_differences(model, rows[known], step)
+    return frequencies, jacobian
+
+
+def central_differences(model: FEModel, theta: Array, step: float) -> Array:
+    """d f / d theta by central differences of a relative step, (n_samples, n_modes, n_parameters).
+
+    One-sided where one side has no frequencies.
+    """
+    if not isinstance(step, Real) or not 0 < step < 1:
+        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
+    n_samples, n_parameters = theta.shape
+    steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # sample, parameter that is moved, parameter
+    moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])
+    solved = evaluate(model, moved.reshape(-1, n_parameters))
+    sides = solved.reshape(2, n_samples, n_parameters, -1)
+    known = ~np.isnan(sides)
+    if not known.all():
+        sides = np.where(known, sides, evaluate(model, theta)[:, np.newaxis])
+    widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * (step * theta)[:, :, np.newaxis]
+    return ((sides[0] - sides[1]) / widths).swapaxes(1, 2)

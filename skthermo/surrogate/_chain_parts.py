@@ -1,0 +1,69 @@
+"""What `DataInformedFEM` is fitted from: records, and clones of its parts."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from sklearn.base import BaseEstimator, clone
+from sklearn.preprocessing import FunctionTransformer
+
+from skthermo._frames import check_columns, check_same_rows, frame_like
+from skthermo._validation import check_array, is_model, seed_parts, seeded, validate_data
+from skthermo.surrogate._inverse import InverseSurrogate
+from skthermo.surrogate._mapper import TemperatureMapper
+
+
+class Parts(NamedTuple):
+    """Clones, ready to be fitted."""
+
+    inverse: BaseEstimator
+    mapper: BaseEstimator
+    aligner: BaseEstimator
+    imputer: BaseEstimator | None
+
+
+def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
+    """Temperatures and frequencies, checked; frames stay frames."""
+    model = chain.model
+    if not is_model(model):
+        raise ValueError(f"model is {model!r}; expected parameter_names, n_modes and frequencies")
+    if y is None:
+        raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+    values = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
+    T = frame_like(X, values, getattr(X, "columns", ()))
+    F = frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
+    check_same_rows(X, y, ("temperatures", "frequencies"))
+    if F.shape[1] != model.n_modes:
+        raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
+    check_columns(T, "temperature", varying=True)
+    check_columns(F, "frequency")
+    return T, F
+
+
+def clone_parts(chain: Any) -> Parts:
+    """Clones of the chain's parts, with its model and seeds where they have none of their own."""
+    parts = Parts(
+        inverse=InverseSurrogate() if chain.inverse is None else clone(chain.inverse),
+        mapper=TemperatureMapper() if chain.mapper is None else clone(chain.mapper),
+        aligner=passthrough() if chain.aligner == "passthrough" else clone(chain.aligner),
+        imputer=None if chain.imputer == "passthrough" else clone(chain.imputer),
+    )
+    names = list(chain.model.parameter_names)
+    for part in (parts.inverse, *parts.inverse.get_params().values()):
+        if isinstance(part, InverseSurrogate):
+            if part.model is None:
+                part.set_params(model=chain.model)
+            if list(part.model.parameter_names) != names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                    f"{chain.model!r} has"
+                )
+    random_state = seeded(chain.random_state)
+    for part in parts:
+        if part is not None:
+            seed_parts(part, random_state)
+    return parts
+
+
+def passthrough() -> FunctionTransformer:
+    """Leaves arrays arrays and frames frames."""
+    return FunctionTransformer().set_output(transform="default")
