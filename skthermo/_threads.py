@@ -1,4 +1,4 @@
-"""Small matrices and small networks run on one BLAS thread each."""
+"""One BLAS thread for small matrices and small networks, which more threads make slower."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +24,7 @@ def _controller() -> threadpoolctl.ThreadpoolController:
 
 @contextmanager
 def _in_control() -> Iterator[None]:
-    """Let this thread set limits: since threadpoolctl 3.8 only the one that did so first can, until it lets go."""
+    """Let this thread set limits: since threadpoolctl 3.8 only the first thread that did so can."""
     openblas = getattr(threadpoolctl, "OpenBLASController", None)
     let_go = getattr(openblas, "clear_controlling_thread", lambda force: None)
     let_go(force=True)
@@ -36,8 +36,8 @@ def _in_control() -> Iterator[None]:
 def single_blas_thread() -> Iterator[None]:
     """Hold every BLAS of this process to one thread.
 
-    The limit is global to the process, so that contexts which overlap in several Python
-    threads are counted: the first one in sets the limit, the last one out lifts it.
+    The limit is global to the process. Contexts that overlap in several Python threads are therefore
+    counted: the first to enter sets the limit, the last to leave lifts it.
     """
     global _depth, _limits
     with _lock:
@@ -59,8 +59,8 @@ def single_blas_thread() -> Iterator[None]:
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
     """Map with as many Python threads as BLAS has, one BLAS thread in each.
 
-    Whoever limits BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limits this too. Closing the
-    iterator waits for what runs and leaves the rest.
+    Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limit these threads too. Closing the
+    iterator waits for the items that are running and skips the rest.
     """
     n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
     with single_blas_thread():

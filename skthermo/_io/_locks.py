@@ -1,4 +1,4 @@
-"""Files that one process at a time may use."""
+"""File locks between processes."""
 
 from typing import IO
 
@@ -9,6 +9,6 @@ except ImportError:  # not on Windows
 
 
 def lock(file: IO) -> None:
-    """Wait for a file and hold it until it is closed; the system closes it when its process ends."""
+    """Wait until no other process holds a file's lock, then hold it until the file is closed."""
     if fcntl is not None:
         fcntl.flock(file, fcntl.LOCK_EX)

@@ -64,7 +64,7 @@ def read_matlab(file: Path, *, complex_too: bool = False) -> dict[str, Matrix | 
 
 
 def _elements(content: bytes, order: str) -> Iterator[Part]:
-    """Types and bytes of the elements that follow each other in a block."""
+    """Type and bytes of each element of a block, in order."""
     position = 0
     while position < len(content):
         (kind,) = struct.unpack_from(order + "I", content, position)
@@ -81,7 +81,7 @@ def _elements(content: bytes, order: str) -> Iterator[Part]:
 
 
 def _name(body: bytes, order: str) -> str:
-    """What a variable is called, in the third of its parts; objects have no dimensions before it."""
+    """The name of a variable: its third part, or the second of an object, which has no dimensions."""
     parts = [content for _, (_, content) in zip(range(3), _elements(body, order), strict=False)]
     if len(parts) < 3 or len(parts[0]) != 8:
         raise ValueError("a variable without flags, dimensions and name")
@@ -121,7 +121,7 @@ def _complex(real: NDArray, imaginary: NDArray) -> NDArray:
 
 
 def _sparse_matrix(rows: NDArray, starts: NDArray, values: NDArray, n_rows: int, n_columns: int) -> Matrix:
-    """Values by columns; rows and values may be longer than what the columns use."""
+    """A sparse matrix from its columns; rows and values may be longer than the columns need."""
     rows, starts = rows.astype(np.int64), starts.astype(np.int64)
     if starts.size != n_columns + 1 or starts[0] != 0 or (np.diff(starts) < 0).any():
         raise ValueError(f"{starts.size} starts of sparse columns; expected {n_columns + 1} that rise from 0")

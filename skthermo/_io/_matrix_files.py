@@ -43,7 +43,7 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str,
 
 
 def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
-    """A matrix for every file, E_2 before E_10."""
+    """One matrix for each file, in the order of their names, E_2 before E_10."""
     files = [file for file in folder.iterdir() if file.suffix.lower() in (".mtx", ".npz")]
     matrices: dict[str, Matrix | None] = {}
     for file in sorted(files, key=lambda file: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", file.name)]):
@@ -71,7 +71,7 @@ def _read_sparse_npz(file: Path) -> Matrix | None:
 
 
 def _read_npz(file: Path) -> dict[str, NDArray]:
-    """Arrays, once the checksum of each is known to be right."""
+    """Arrays whose checksums are right."""
     variable = ""
     try:
         arrays = {}
@@ -95,7 +95,7 @@ def _matrix(matrix) -> Matrix | None:
 
 
 def _real_if_exact(matrix: Matrix | None) -> Matrix | None:
-    """The real part of what has no imaginary one."""
+    """The real part, where the imaginary part is zero."""
     if matrix is None or not np.iscomplexobj(matrix):
         return matrix
     values = np.asarray(matrix.data if scipy.sparse.issparse(matrix) else matrix)

@@ -61,7 +61,7 @@ def _read(text: str) -> Matrix | None:
 
 
 def _dense(numbers: NDArray[np.float64], size: list[int], is_symmetric: bool) -> Matrix:
-    """Columns one after another, of a symmetric matrix from the diagonal on."""
+    """A dense matrix from its columns; those of a symmetric matrix begin at the diagonal."""
     n_rows, n_columns = size
     count = n_rows * (n_rows + 1) // 2 if is_symmetric else n_rows * n_columns
     if numbers.size != count:
@@ -75,7 +75,7 @@ def _dense(numbers: NDArray[np.float64], size: list[int], is_symmetric: bool) ->
 
 
 def _sparse(numbers: NDArray[np.float64], size: list[int], is_symmetric: bool) -> Matrix:
-    """Entries as row, column and value, counted from 1, of a symmetric matrix on one side only."""
+    """A sparse matrix from rows, columns (from 1) and values; a symmetric matrix has one side only."""
     *shape, count = size
     if numbers.size != 3 * count:
         raise ValueError(f"{numbers.size} numbers; expected {count} times row, column and value")

@@ -1,4 +1,4 @@
-"""Simulations that are remembered."""
+"""Memory of simulations, shared by processes."""
 
 from pathlib import Path
 from pickle import PicklingError
@@ -19,7 +19,7 @@ ORDER_CHECKS = 256
 def remembered_simulations(
     memory: str | Memory | None, model: FEModel, bounds: ArrayLike, n_samples: int, tol: float | None, *, n_jobs, seed
 ) -> tuple[Bunch, float]:
-    """`simulations`, looked up in a memory; processes that want the same ones wait for the first.
+    """`simulations`, read from a memory if they are there; processes that want the same ones wait for the first.
 
     Raises
     ------

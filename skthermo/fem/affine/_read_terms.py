@@ -1,4 +1,4 @@
-"""Reading what an affine model is made from."""
+"""Reads and checks the arguments of an affine model."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
@@ -15,7 +15,7 @@ DENSE_DOFS = 200
 """Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
 
 DENSE_SHARE = 0.3
-"""Share of entries that are not zero from which on a matrix counts as dense."""
+"""Share of nonzero entries above which a matrix counts as dense."""
 
 
 def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:
@@ -69,14 +69,14 @@ def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
 
 
 def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
-    """Whether shift-invert finds so many modes of the summed matrices sooner than dense batches do."""
+    """Whether shift-invert is faster than dense batches for this many modes."""
     n_dof = matrices[0].shape[0]
     entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
     return n_dof > max(DENSE_DOFS, 4 * n_modes) and entries < DENSE_SHARE * n_dof**2
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
-    """The parameters' names; every one in some term, and no term with another."""
+    """Names of the parameters: each stands in some term, and the terms name no others."""
     mentioned = dict.fromkeys(name for key in keys for name in key)
     if parameter_names is None:
         names = tuple(mentioned)
@@ -94,7 +94,7 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
 
 
 def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
-    """Names of parameters, each once."""
+    """Names of parameters, all different."""
     names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
     if not names or len(set(names)) < len(names):
         raise ValueError(f"parameter_names is {names}; expected one or more different names")
@@ -121,7 +121,7 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
 
 
 def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
-    """Known groups, and severities that leave some stiffness."""
+    """Checks that groups are known and severities leave some stiffness."""
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     for group, severity in damage.items():
@@ -136,7 +136,7 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
 
 
 def check_n_modes(n_modes: int) -> int:
-    """A positive number of modes."""
+    """Checks that a number of modes is a positive integer."""
     if not isinstance(n_modes, Integral) or isinstance(n_modes, bool) or n_modes < 1:
         raise ValueError(f"n_modes is {n_modes!r}; expected a positive integer")
     return n_modes

@@ -42,7 +42,7 @@ class AffineTerms(ABC):
         return np.prod(theta[:, np.newaxis] ** self.exponents, axis=2)
 
     def coefficients(self, theta: Array) -> Array:
-        """What multiplies each matrix, (n_samples, n_terms)."""
+        """The factor of each matrix, (n_samples, n_terms)."""
         return self.factors * self.products(theta)
 
     def coefficient_gradients(self, theta: Array) -> Array:
@@ -69,7 +69,7 @@ class AffineTerms(ABC):
 
     @abstractmethod
     def weighted_sum(self, weights: Array) -> Matrix:
-        """The matrices, each multiplied by a weight, in one."""
+        """The weighted sum of the matrices."""
 
     def each(self, theta: Array) -> Iterator[Matrix]:
         """The summed matrices one after the other; a constant one is summed once."""
@@ -85,7 +85,7 @@ class AffineTerms(ABC):
     @property
     @abstractmethod
     def n_entries(self) -> int:
-        """Numbers in one summed matrix."""
+        """Number of stored entries of one summed matrix."""
 
     @abstractmethod
     def quadratic_forms(self, shapes: Array) -> Array:
@@ -93,7 +93,7 @@ class AffineTerms(ABC):
 
     @abstractmethod
     def scaled(self, factors: Array) -> "AffineTerms":
-        """The same matrices, each multiplied once more."""
+        """The same matrices with their factors multiplied."""
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":
@@ -136,7 +136,7 @@ class DenseTerms(AffineTerms):
 
 
 class SparseTerms(AffineTerms):
-    """Terms on the union of their patterns: ``entries`` is (n_union, n_terms), one column a matrix.
+    """Terms on the union of their sparsity patterns: ``entries`` is (n_union, n_terms), one column for each matrix.
 
     The union is stored as compressed sparse columns, so that a sum of terms is one product
     with ``entries`` and has the same pattern whatever theta is.

@@ -149,7 +149,7 @@ class Structure:
         )
 
     def _bound(self, member: Hashable, bindings: Mapping[str, Target], matrix: str) -> dict[str, str]:
-        """What multiplies the stiffness or mass of one member, and which of its properties that is."""
+        """The parameters or damage groups of one member, and the property that each acts on."""
         return {
             name: prop
             for name, (prop, group, matrices) in bindings.items()

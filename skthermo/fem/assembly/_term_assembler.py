@@ -1,4 +1,4 @@
-"""From members' matrices to affine terms."""
+"""Sums members' matrices into affine terms."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,7 +22,7 @@ class TermAssembler:
     Parameters
     ----------
     dofs : sequence of (node, direction)
-        Free degrees of freedom; what members have at others is left out.
+        Free degrees of freedom; rows and columns of the others are left out.
     """
 
     def __init__(self, dofs: Sequence[Dof]):

@@ -42,7 +42,7 @@ class PointMass(PhysicalElement):
         return [(self.node, direction) for direction in TRANSLATIONS[:dimension]]
 
     def stiffness(self, coordinates: Array) -> ByProperties:
-        """None."""
+        """A point mass has no stiffness."""
         return {}
 
     def mass(self, coordinates: Array) -> ByProperties:

@@ -49,5 +49,5 @@ class Spring(PhysicalElement):
         return {("k",): np.array([[self.k]])}
 
     def mass(self, coordinates: Array) -> ByProperties:
-        """None."""
+        """A spring has no mass."""
         return {}

@@ -1,4 +1,4 @@
-"""Whether a program's matrices are affine in its parameters, and which parameter is to blame if not."""
+"""Checks that a program's matrices are affine in its parameters, and names the parameter if not."""
 
 from collections.abc import Callable
 from functools import reduce
@@ -21,7 +21,7 @@ POWERS = (-9.0, 9.0)
 
 
 class Program:
-    """A function that returns stiffness and mass: symmetric, of one size, or an error says at which theta not."""
+    """A user's function that returns stiffness and mass; its results are checked, and errors name theta."""
 
     def __init__(self, function: Callable[[Array], tuple[Any, Any]], parameter_names: tuple[str, ...]):
         self.function = function
@@ -46,7 +46,7 @@ class Program:
 
 
 class Difference(NamedTuple):
-    """The largest one between a program's matrix and the affine one."""
+    """The largest difference between a program's matrix and the affine one."""
 
     matrix: str
     share: float
@@ -101,7 +101,7 @@ def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> Dif
 
 
 def _power(multiplier: float, found: Difference, terms: Terms, name: str) -> float | None:
-    """The p for which (t^p - 1) / (2^p - 1) is what the entry does at t and at 2, if there is one."""
+    """The power p of a parameter t that explains an entry: (t^p - 1) / (2^p - 1) is its change at t over that at 2."""
     entries: dict[tuple[str, ...], float] = {key: matrix[found.row, found.column] for key, matrix in terms}
     doubling = entries.get((name,), 0.0)
     if not doubling:

@@ -1,4 +1,4 @@
-"""Solved samples on disk, which outlive the process that solved them."""
+"""A file of solved samples, which later processes can use."""
 
 import json
 import os
@@ -16,10 +16,10 @@ from skthermo._io import lock
 
 
 class SampleCache:
-    """A file of one header line and records of one size, to which several processes may append.
+    """A file of one header line and records of equal size, to which several processes may append.
 
-    A record holds theta, the frequencies and a checksum of both. What was cut off at the end of the file
-    is no record, and the next one is written over it.
+    A record holds theta, the frequencies and a checksum of both. A record that was cut off at the end of the file is
+    ignored, and the next one is written over it.
 
     Parameters
     ----------
@@ -80,11 +80,11 @@ class SampleCache:
         self._known, self._damaged, self._inode, self._end = {}, [], inode, 0
 
     def __getstate__(self) -> dict:
-        """Workers read the file themselves."""
+        """Pickled without its records: workers read the file themselves."""
         return vars(self) | {"_known": {}, "_damaged": [], "_inode": 0, "_end": 0}
 
     def append(self, theta: Array, frequencies: Array) -> None:
-        """Write rows behind the last whole record, as the only process that does so."""
+        """Write rows after the last whole record; other processes wait."""
         records = np.zeros(len(theta), self._record)
         records["theta"], records["frequencies"] = theta, frequencies
         records["checksum"] = self._checksums(records)
@@ -103,7 +103,7 @@ class SampleCache:
             self._mend(records[:1].tobytes())
 
     def _mend(self, record: bytes) -> None:
-        """Repeat a record where damaged ones stand; others keep their place, for those who read meanwhile."""
+        """Write a copy of a good record over each damaged one, so that the others keep their place."""
         with open(self.path, "r+b") as file:
             lock(file)
             for position in self._damaged:
@@ -116,7 +116,7 @@ class SampleCache:
         self._damaged = []
 
     def _is_begun(self, content: bytes) -> bool:
-        """Whether the header is there; what is another's is refused."""
+        """Whether the header is there; the header of another file is an error."""
         if content.startswith(self._header):
             return True
         if self._header.startswith(content):

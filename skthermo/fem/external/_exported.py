@@ -150,7 +150,7 @@ def load_affine(
 
 
 def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
-    """Names of real square matrices; of single numbers only if there is nothing larger."""
+    """Names of the real square matrices; single numbers count only if there is nothing larger."""
     real = {name: matrix for name, matrix in matrices.items() if matrix is not None and not np.iscomplexobj(matrix)}
     sizes = {name: m.shape[0] for name, m in real.items() if m.shape[0] == m.shape[1] > 0}
     return [name for name, size in sizes.items() if size > 1] or list(sizes)
@@ -161,7 +161,7 @@ def _is_complex(matrix: Matrix | None, shape: tuple[int, ...]) -> bool:
 
 
 def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
-    """Why nothing is the mass."""
+    """The reason why no matrix can be the mass, for an error."""
     for name, matrix in matrices.items():
         if name.lower() in MASS_NAMES:
             shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
@@ -171,7 +171,7 @@ def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
 
 
 def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
-    """What remains of all matrices but the mass as terms; what looks like something else is said."""
+    """Names of the stiffness terms; warns of matrices that look like something else."""
     found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
     has_pattern = mass_matrix.shape[0] > 1
     like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
@@ -201,21 +201,21 @@ def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matr
 
 
 def _ratio(term: Matrix, reference: Matrix) -> float:
-    """How many times the reference a term is; 0 if it is not a multiple."""
+    """The factor by which a term is a multiple of the reference; 0 if it is not."""
     reference = scipy.sparse.csc_array(reference)
     ratio = float((term * reference).sum() / max((reference * reference).sum(), np.finfo(float).tiny))
     return ratio if ratio and _same(term, ratio * reference, SAME) else 0.0
 
 
 def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
-    """Whether no difference is more than a part of the diagonal."""
+    """Whether all differences are small beside the diagonal."""
     rest = scipy.sparse.coo_array(matrix - expected)
     diagonal = np.abs(expected.diagonal())
     return not (np.abs(rest.data) > tolerance * np.sqrt(diagonal[rest.row] * diagonal[rest.col])).any()
 
 
 def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:
-    """The only name that is a usual one."""
+    """The one name among the usual ones, if there is one."""
     found = [name for name in names if name.lower() in usual]
     if len(found) > 1:
         raise ValueError(f"{file}: {found} could each be the {what}; say {what}=...")
@@ -251,7 +251,7 @@ def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: t
 
 
 def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool) -> Matrix | None:
-    """What the terms leave of the total, if anything."""
+    """The total minus all terms; None if nothing is left."""
     summed = reduce(add, terms.values())
     if _same(summed, total, SAME):
         return None

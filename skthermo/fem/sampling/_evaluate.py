@@ -12,7 +12,7 @@ from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta, warn_of_failures
-from skthermo.fem.sampling._progress import watched
+from skthermo.fem.sampling._progress import with_progress
 
 
 def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
@@ -66,14 +66,14 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
     places = [known[i : i + size] for i in range(0, len(known), size)]
     with closing(_solved(model, rows, places, n_jobs)) as parts:
-        for place, part in zip(places, watched(parts, len(known), progress), strict=True):
+        for place, part in zip(places, with_progress(parts, len(known), progress), strict=True):
             frequencies[place] = part
     getattr(model, "warn_of", warn_of_failures)(rows, frequencies)
     return frequencies
 
 
 def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
-    """Frequencies at each of the places in their order; the work ends where the generator is closed."""
+    """Frequencies of the rows at each of the places, in order; closing the generator ends the work."""
     thread_safe = getattr(model, "thread_safe", False)
     frequencies = model.quiet().frequencies if thread_safe else model.frequencies
     if thread_safe and effective_n_jobs(n_jobs) == 1:
@@ -84,7 +84,7 @@ def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | No
 
 
 def _parallel(**options: Any) -> Parallel:
-    """Gives results as they come where the active backend can."""
+    """A joblib `Parallel` that yields results as they come, where the active backend can."""
     try:
         return Parallel(return_as="generator", **options)
     except ValueError:  # pools of workers, Ray's among them, give all at the end

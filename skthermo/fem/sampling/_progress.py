@@ -1,4 +1,4 @@
-"""How far a long computation is, as a line of text."""
+"""A progress bar as a line of text."""
 
 import multiprocessing
 import sys
@@ -13,13 +13,13 @@ SECONDS_BETWEEN = 0.1
 WIDTH = 30
 
 
-def watched(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
-    """The same arrays, while a bar on stderr tells how many of all their rows have come.
+def with_progress(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
+    """Pass arrays through, and show on stderr how many of their rows have come.
 
-    With ``shown=None`` only on a terminal, once a second has passed, and only from the main thread of the main
+    With ``shown=None`` the bar appears only on a terminal, after a second, and only in the main thread of the main
     process: bars of several workers would overwrite each other.
     """
-    if shown is False or (shown is None and not _somebody_watches()):
+    if shown is False or (shown is None and not _on_terminal()):
         yield from parts
         return
     start = time.monotonic()
@@ -52,6 +52,6 @@ def bar(done: int, total: int, seconds: float) -> str:
     return f"{100 * done // total:3d} % |{drawing}| {done} of {total} samples in {seconds:.0f} s{left}   "
 
 
-def _somebody_watches() -> bool:
+def _on_terminal() -> bool:
     is_main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
     return is_main and sys.stderr is not None and sys.stderr.isatty()
