@@ -22,9 +22,6 @@ from skthermo.fem.affine._reduced import ReducedModel
 from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal import check_supported, count_modes
 
-MAX_CANDIDATES_PER_MODE = 8
-"""How many times as many candidates as modes are examined before a mode counts as dissolved."""
-
 Terms = Mapping[tuple[str, ...], ArrayLike] | Sequence[tuple[tuple[str, ...], ArrayLike]]
 
 
@@ -125,9 +122,9 @@ class AffineModel(AffineBase):
         self._core = AffineCore.from_terms(
             stiffness_terms,
             mass_terms,
-            n_modes=n_modes,
+            ranks=range(n_modes),
             track=bool(track),
-            max_candidates=min(available, MAX_CANDIDATES_PER_MODE * n_modes, solvable),
+            available=min(available, solvable),
         )
 
     def damaged(self, damage: Mapping[str, float]) -> "AffineModel":

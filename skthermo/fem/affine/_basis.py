@@ -10,7 +10,7 @@ from scipy.sparse.linalg import SuperLU
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads
 from skthermo.fem._theta import nominal_theta
-from skthermo.fem.affine._core import GUARD_MODES, AffineCore
+from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.modal import factorise, may_be_missed, pair_modes
 
 SNAPSHOTS_PER_ROUND = 8
@@ -88,7 +88,7 @@ def snapshots_at(full: AffineCore, theta: Array) -> Array:
     """Shapes of the full model's lowest modes, and of its own where these are others, side by side."""
     if not len(theta):
         return np.empty((full.stiffness.n_dof, 0))
-    n_snapshots = min(full.n_modes + GUARD_MODES, full.max_candidates)
+    n_snapshots = full.first_candidates
     lowest = full.solver.modes(theta, n_snapshots)[1]
     shapes = [*lowest]
     if full.track:

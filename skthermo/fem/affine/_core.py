@@ -1,5 +1,6 @@
 """What AffineModel and ReducedModel share: terms, eigensolver, tracking, derivatives."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,9 @@ from skthermo.fem.modal import (
 
 GUARD_MODES = 4
 """Number of modes above the tracked ones that are examined first: a mode that swaps moves up by a few ranks."""
+
+MAX_CANDIDATES_PER_MODE = 8
+"""How many times as many candidates as modes are examined before a mode counts as dissolved."""
 
 CHUNK_BYTES = 2**25
 
@@ -61,29 +65,46 @@ class AffineCore:
     mass: AffineTerms
     solver: EigenSolver
     nominal: NominalModes
-    n_modes: int
+    ranks: NDArray[np.intp]
     track: bool
-    max_candidates: int
+    available: int
+    """How many modes the mass allows and the solver finds."""
+    healthy: "AffineCore | None" = None
+    """The core whose nominal modes are the columns, where that is another one."""
 
     @classmethod
     def from_terms(
-        cls, stiffness: AffineTerms, mass: AffineTerms, *, n_modes: int, track: bool, max_candidates: int
+        cls, stiffness: AffineTerms, mass: AffineTerms, *, ranks: Sequence[int], track: bool, available: int
     ) -> "AffineCore":
-        """The core whose nominal modes are those at theta = 1."""
-        nominal = nominal_theta(stiffness.exponents.shape[1])
-        solver = eigen_solver(stiffness, mass)
-        eigenvalues, shapes = solver.modes(nominal, n_modes)
-        modes = NominalModes(
-            weighted_shapes=mass.product(nominal, shapes)[0],
-            mass_coefficients=mass.coefficients(nominal)[0],
-            repeated=repeated_modes(eigenvalues[0]),
-        )
-        return cls(stiffness, mass, solver, modes, n_modes, track, max_candidates)
+        """The core whose columns are the modes of these ranks (the lowest is 0) at theta = 1."""
+        solver, order = eigen_solver(stiffness, mass), np.asarray(ranks, dtype=np.intp)
+        nominal = nominal_modes(solver, mass, order)
+        return cls(stiffness, mass, solver, nominal, order, track, available)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of columns."""
+        return len(self.ranks)
+
+    @property
+    def n_lowest(self) -> int:
+        """How many of the lowest modes hold all columns at theta = 1."""
+        return int(self.ranks.max()) + 1
+
+    @property
+    def first_candidates(self) -> int:
+        """How many of the lowest modes are examined at first, where columns are followed."""
+        return min(self.n_lowest + GUARD_MODES, self.max_candidates)
+
+    @property
+    def max_candidates(self) -> int:
+        """How many of the lowest modes are examined at the most before a mode counts as dissolved."""
+        return min(self.available, MAX_CANDIDATES_PER_MODE * self.n_lowest)
 
     @property
     def rows_per_chunk(self) -> int:
         """How many rows are solved together, so that memory stays bounded."""
-        numbers = max(self.stiffness.n_entries, 2 * self.stiffness.n_dof * self.n_modes)
+        numbers = max(self.stiffness.n_entries, 2 * self.stiffness.n_dof * self.n_lowest)
         return max(1, min(self.stiffness.max_rows, CHUNK_BYTES // (8 * numbers)))
 
     @property
@@ -93,36 +114,48 @@ class AffineCore:
 
     def with_scaled_stiffness(self, factors: Array) -> "AffineCore":
         """The core with its stiffness terms multiplied; its columns stay the same nominal modes."""
-        return replace(self, stiffness=self.stiffness.scaled(factors), solver=self.solver.scaled(factors))
+        stiffness, solver = self.stiffness.scaled(factors), self.solver.scaled(factors)
+        return replace(self, stiffness=stiffness, solver=solver, healthy=self.healthy or self)
 
     def rescaled(self, row: Array) -> "AffineCore":
         """The core whose theta = 1 is this one's theta = row; its columns stay the same nominal modes."""
         stiffness = self.stiffness.scaled(self.stiffness.products(row)[0])
         mass = self.mass.scaled(self.mass.products(row)[0])
-        return replace(self, stiffness=stiffness, mass=mass, solver=eigen_solver(stiffness, mass))
+        solver = eigen_solver(stiffness, mass)
+        return replace(self, stiffness=stiffness, mass=mass, solver=solver, healthy=self.healthy or self)
+
+    def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
+        """The core whose columns are other modes of the healthy nominal state."""
+        healthy = self.healthy or self
+        nominal = nominal_modes(healthy.solver, healthy.mass, ranks)
+        return replace(self, nominal=nominal, ranks=ranks)
+
+    def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
+        """The core of fewer parameters, the others being 1."""
+        stiffness, mass = self.stiffness.with_parameters(columns), self.mass.with_parameters(columns)
+        healthy = self.healthy.with_parameters(columns) if self.healthy else None
+        return replace(self, stiffness=stiffness, mass=mass, solver=eigen_solver(stiffness, mass), healthy=healthy)
 
     def projected(self, basis: Array, widest_spectrum: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes."""
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
         nominal = replace(self.nominal, weighted_shapes=basis.T @ self.nominal.weighted_shapes)
         solver = dense_solver(stiffness, mass, nominal_theta(stiffness.exponents.shape[1]), widest_spectrum)
-        max_candidates = min(self.max_candidates, basis.shape[1])
-        return replace(
-            self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, max_candidates=max_candidates
-        )
+        available = min(self.max_candidates, basis.shape[1])
+        return replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
 
     def frequencies(self, theta: Array) -> tuple[Array]:
         """Frequencies in Hz, (n_samples, n_modes)."""
         if self.track:
             return (self.modes(theta)[0],)
-        return (hertz(self.solver.eigenvalues(theta, self.n_modes)),)
+        return (hertz(self.solver.eigenvalues(theta, self.n_lowest)[:, self.ranks]),)
 
     def modes(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and shapes (n_samples, n, n_modes)."""
         if self.track:
-            return self._tracked(theta, min(self.n_modes + GUARD_MODES, self.max_candidates))
-        eigenvalues, shapes = self.solver.modes(theta, self.n_modes)
-        return hertz(eigenvalues), shapes
+            return self._tracked(theta, self.first_candidates)
+        eigenvalues, shapes = self.solver.modes(theta, self.n_lowest)
+        return hertz(eigenvalues[:, self.ranks]), shapes[:, :, self.ranks]
 
     def linearised(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and d f / d theta, (n_samples, n_modes, n_parameters)."""
@@ -139,7 +172,7 @@ class AffineCore:
 
     def local_modes(self, row: Array, *, follow: bool, basis: Array | None = None) -> LocalModes:
         """The lowest modes at one row of theta; with ``follow``, enough of them to hold every nominal mode."""
-        n_candidates = min(self.n_modes + GUARD_MODES, self.max_candidates)
+        n_candidates = self.first_candidates
         while True:
             eigenvalues, shapes, solve = self.solver.local_modes(row, n_candidates)
             mac = self.nominal_mac(shapes[np.newaxis])
@@ -172,6 +205,17 @@ class AffineCore:
             more = min(2 * n_candidates, self.max_candidates)
             frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], more)
         return frequencies, shapes
+
+
+def nominal_modes(solver: EigenSolver, mass: AffineTerms, ranks: NDArray[np.intp]) -> NominalModes:
+    """The modes of some ranks at theta = 1."""
+    nominal = nominal_theta(mass.exponents.shape[1])
+    eigenvalues, shapes = solver.modes(nominal, int(ranks.max()) + 1)
+    return NominalModes(
+        weighted_shapes=mass.product(nominal, shapes[:, :, ranks])[0],
+        mass_coefficients=mass.coefficients(nominal)[0],
+        repeated=repeated_modes(eigenvalues[0])[np.ix_(ranks, ranks)],
+    )
 
 
 def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> EigenSolver:

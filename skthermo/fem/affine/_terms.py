@@ -96,6 +96,10 @@ class AffineTerms(ABC):
         """The same matrices with their factors multiplied."""
 
     @abstractmethod
+    def with_parameters(self, columns: NDArray[np.intp]) -> "AffineTerms":
+        """Terms of fewer parameters, the others being 1."""
+
+    @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":
         """Terms basis' A_t basis with the same coefficients."""
 
@@ -130,6 +134,9 @@ class DenseTerms(AffineTerms):
 
     def scaled(self, factors: Array) -> "DenseTerms":
         return DenseTerms(self.matrices, self.exponents, self.factors * factors)
+
+    def with_parameters(self, columns: NDArray[np.intp]) -> "DenseTerms":
+        return DenseTerms(self.matrices, self.exponents[:, columns], self.factors)
 
     def projected(self, basis: Array) -> "DenseTerms":
         return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
@@ -190,6 +197,9 @@ class SparseTerms(AffineTerms):
 
     def scaled(self, factors: Array) -> "SparseTerms":
         return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
+
+    def with_parameters(self, columns: NDArray[np.intp]) -> "SparseTerms":
+        return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents[:, columns], self.factors)
 
     def projected(self, basis: Array) -> DenseTerms:
         terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
