@@ -2,5 +2,6 @@
 
 from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.detection._outlier import OutlierDetector
 
-__all__ = ["MahalanobisDetector", "TemperatureCompensator"]
+__all__ = ["MahalanobisDetector", "OutlierDetector", "TemperatureCompensator"]

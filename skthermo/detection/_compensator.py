@@ -1,4 +1,4 @@
-"""Frequencies without what temperature explains of them."""
+"""Removes the effect of temperature from frequencies by regression."""
 
 from collections.abc import Iterable, Sequence
 from numbers import Integral
@@ -18,24 +18,25 @@ AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
 class TemperatureCompensator(TransformerMixin, BaseEstimator):
-    """Residuals of frequencies: measured minus predicted from the temperatures beside them.
+    """Residuals of frequencies: measured minus predicted from temperatures.
 
     Parameters
     ----------
     estimator : regressor
-        Predicts the targets from all other columns: any of scikit-learn's (in a ``MultiOutputRegressor``
-        where it takes one target only), a pipeline with `LagFeatures`, or `DataInformedFEM`.
+        Predicts the targets from all other columns: any of scikit-learn's regressors (inside a
+        ``MultiOutputRegressor`` if it takes one target only), a pipeline with `LagFeatures`, or
+        `DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.
     cv : int, cross-validation splitter or iterable, default=None
-        Folds of `fit_transform`: None for 5 and an int for any number of folds of contiguous rows, or a
-        splitter whose test parts hold every row once.
+        Folds of `fit_transform`. An int gives that many folds of consecutive rows, None gives 5. A
+        splitter must put every row into exactly one test fold.
 
     Attributes
     ----------
     estimator_ : regressor
-        Fitted clone.
+        Clone of ``estimator``, fitted on all rows that it can take.
     targets_ : ndarray of int
         Positions of the targets.
     n_features_in_ : int
@@ -45,31 +46,36 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     See Also
     --------
-    MahalanobisDetector : What residuals go to.
+    MahalanobisDetector : Raises alarms on the residuals.
+    OutlierDetector : The same with any of scikit-learn's outlier detectors.
 
     Notes
     -----
-    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. An estimator has seen the noise of the
-    rows it was fitted on, so that their residuals are smaller than those of new records, and a threshold set
-    on them alarms too often. `fit_transform` predicts every row by a clone that was fitted on the other folds,
-    then fits on all rows for the records to come. A pipeline calls it in `fit`, and so
-    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` takes its threshold from out-of-fold
-    residuals. Folds are of contiguous rows, which should come in order of time, because neighbouring records are
-    alike: random folds would train on a row's neighbours. Where the baseline holds each season only once, a fold is
-    predicted from other seasons, which makes its residuals and the threshold too large; more years, or more and
-    shorter folds, mend that.
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the
+    noise of the rows it was fitted on, so their residuals are smaller than those of new records, and a
+    threshold set on them gives too many false alarms. `fit_transform` predicts each row by a clone fitted
+    on the other folds, and also fits on all rows for the records to come. A pipeline calls `fit_transform`
+    in its own ``fit``, so ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its
+    threshold on out-of-fold residuals.
 
-    A frame gives frames to the estimator, so that lags go by time, and gives a frame; an array gives arrays.
+    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be
+    predicted by its neighbours in time, which are nearly the same record. If the baseline holds each season
+    only once, a fold is predicted from other seasons, and its residuals and the threshold become too large.
+    A baseline of several years, or more and shorter folds, avoids this.
 
-    Missing values flow through:
+    A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
+    too; an array is passed as an array.
 
-    - A missing target is NaN in its own residual only. Its row does not train the estimator, unless that has
-      an FE model (`DataInformedFEM`, also at the end of a pipeline or in a search): such a chain gets all rows, for
-      its lags, and leaves incomplete ones out itself.
-    - A row where another column is missing is used if the estimator takes NaN: scikit-learn's tag ``allow_nan``
-      says so, or an imputer in a pipeline fills it first. Else it does not train and its residuals are NaN.
-    - Lags within the estimator reach across rows left out by time on a ``DatetimeIndex``; in other tables the rows
-      around close up.
+    Missing values:
+
+    - A missing target makes only its own residual NaN. Its row is not used to fit the estimator. Only an
+      estimator with an FE model (`DataInformedFEM`, also at the end of a pipeline or in a search) gets all
+      rows, because its lags need them; it leaves out incomplete rows itself.
+    - A row with another missing value is used if the estimator accepts NaN: it has scikit-learn's tag
+      ``allow_nan``, or it is a pipeline with an imputer before any step that does not accept NaN. Otherwise
+      the row is not used to fit the estimator, and its residuals are NaN.
+    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose row was removed takes
+      the last record before it. Without a DatetimeIndex, removed rows shift the lags.
 
     Examples
     --------
@@ -85,7 +91,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     >>> print(f"{(detector.predict(unseen) == -1).mean():.0%} false alarms")
     2% false alarms
 
-    A threshold from the training rows' own residuals is too low:
+    A threshold set on residuals of rows that the regressor was fitted on is too low:
 
     >>> in_sample = MahalanobisDetector().fit(compensator.fit(baseline).transform(baseline))
     >>> print(f"{(in_sample.predict(compensator.transform(unseen)) == -1).mean():.0%} false alarms")
@@ -109,9 +115,9 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.targets = targets
         self.cv = cv
 
-    @_fit_context(prefer_skip_nested_validation=True)
+    @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> "TemperatureCompensator":
-        """Learn how the targets follow the other columns.
+        """Fit the regression of the targets on the other columns.
 
         Parameters
         ----------
@@ -128,17 +134,14 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If targets are not among the columns, repeat, or are all of them or none; if a target was never
-            measured, or no row is complete.
+            If a target is not among the columns or is named twice; if the targets are all of the columns
+            or none; if a target is NaN in every row, or no row is complete.
         """
-        temperatures, frequencies = self._read_baseline(X)
-        self._regression = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
-        self.estimator_ = self._regression.estimator_
-        return self
+        return self._learn(*self._read_baseline(X))
 
-    @_fit_context(prefer_skip_nested_validation=True)
+    @_fit_context(prefer_skip_nested_validation=False)
     def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
-        """Out-of-fold residuals of a baseline; then learn from all its rows.
+        """Fit on all rows of a baseline, and give its out-of-fold residuals.
 
         Parameters
         ----------
@@ -150,17 +153,17 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            In Hz, each row predicted by a clone that has not seen its fold.
+            In Hz, each row predicted by a clone that was not fitted on its fold.
 
         Raises
         ------
         ValueError
-            As in `fit`; if there are fewer rows than folds, or ``cv`` does not test every row once.
+            As in `fit`; if there are fewer rows than folds, or ``cv`` does not test every row exactly once.
         """
         temperatures, frequencies = self._read_baseline(X)
         folds = self._folds(temperatures)
+        self._learn(temperatures, frequencies)
         predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=folds)
-        self.fit(X)
         return frame_like(X, np.asarray(frequencies) - predicted, self.get_feature_names_out())
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
@@ -174,7 +177,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            In Hz, measured minus predicted; too small on the rows of `fit`.
+            In Hz, measured minus predicted. For the rows of `fit` they are too small: use `fit_transform` there.
 
         Raises
         ------
@@ -183,7 +186,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
-        residuals = np.asarray(frequencies) - self._regression.predict(temperatures)
+        residuals = np.asarray(frequencies) - self.regression_.predict(temperatures)
         return frame_like(X, residuals, self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -208,8 +211,13 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         return self._split(X, values)
 
+    def _learn(self, temperatures: Any, frequencies: Any) -> "TemperatureCompensator":
+        self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
+        self.estimator_ = self.regression_.estimator_
+        return self
+
     def _split(self, X: Any, values: NDArray) -> tuple[Any, Any]:
-        """The other columns and the targets, as frames where X is one."""
+        """The other columns and the targets, as frames if X is one."""
         columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
         others = np.delete(np.arange(len(columns)), self.targets_)
         return tuple(frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
@@ -217,11 +225,11 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     def _folds(self, X: Any) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         folds = list(check_cv(self.cv).split(X))
         tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
-        odd = np.flatnonzero(tested != 1)
-        if odd.size:
+        wrong = np.flatnonzero(tested != 1)
+        if wrong.size:
             raise ValueError(
-                f"cv is {self.cv!r}, which tests row {odd[0]} {tested[odd[0]]} times ({odd.size} of {len(X)} rows not "
-                "exactly once); expected a partition of the rows, such as KFold makes"
+                f"cv is {self.cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
+                "rows not exactly once); expected a partition of the rows, such as KFold makes"
             )
         return folds
 
@@ -232,7 +240,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
 
 def _positions(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
-    """Positions of the targets among the columns, by name or by index."""
+    """Positions of the targets, which are given by name or by position."""
     targets = list(targets)
     if targets and all(isinstance(target, str) for target in targets):
         if names is None:

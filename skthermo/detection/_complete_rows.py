@@ -1,4 +1,4 @@
-"""Regression on records with gaps."""
+"""Regression on records with missing values."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from skthermo._validation import BaseSearchCV, _BaseImputer, is_model
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
-    """Any regressor, given the rows that it can take; NaN is predicted in the others."""
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
 
     def __init__(self, estimator: BaseEstimator):
         self.estimator = estimator
@@ -31,7 +31,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
                 f"{type(self.estimator).__name__}"
             )
         self.n_targets_ = y.shape[1]
-        self.estimator_ = clone(self.estimator).fit(X[usable], self._as_wanted(y[usable]))
+        self.estimator_ = clone(self.estimator).fit(X[usable], self._as_target(y[usable]))
         return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:
@@ -51,15 +51,18 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     def _predictable(self, X: Any) -> NDArray[np.bool_]:
         return np.ones(len(X), dtype=bool) if takes_nan(self.estimator) else _complete(X)
 
-    def _as_wanted(self, y: Any) -> Any:
-        """One target as a vector, unless the regressor always wants columns."""
-        if y.shape[1] > 1 or not get_tags(_innermost(self.estimator)).target_tags.single_output:
+    def _as_target(self, y: Any) -> Any:
+        """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
+        if y.shape[1] > 1 or not get_tags(_final_estimator(self.estimator)).target_tags.single_output:
             return y
         return y.squeeze(axis=1)
 
 
 def takes_nan(estimator: BaseEstimator) -> bool:
-    """Whether NaN may stand in X; scikit-learn's tag does not look into what wraps other estimators."""
+    """Whether an estimator accepts NaN in X.
+
+    scikit-learn's tag does not say so for estimators inside a pipeline, a search or another wrapper.
+    """
     if isinstance(estimator, Pipeline):
         for step in (step for _, step in estimator.steps if step not in (None, "passthrough")):
             if not takes_nan(step):
@@ -75,15 +78,15 @@ def takes_nan(estimator: BaseEstimator) -> bool:
 
 
 def takes_missing_targets(estimator: BaseEstimator) -> bool:
-    """Whether NaN may stand in y: a chain with an FE model leaves rows out itself, after its lags."""
-    return is_model(getattr(_innermost(estimator), "model", None))
+    """Whether an estimator accepts NaN in y: one with an FE model leaves out incomplete rows itself, after its lags."""
+    return is_model(getattr(_final_estimator(estimator), "model", None))
 
 
-def _innermost(estimator: BaseEstimator) -> BaseEstimator:
-    """What learns the targets at last, in a pipeline or a search."""
+def _final_estimator(estimator: BaseEstimator) -> BaseEstimator:
+    """The last estimator of a pipeline, or the one inside a search."""
     if isinstance(estimator, Pipeline):
-        return _innermost(estimator.steps[-1][1])
-    return _innermost(estimator.estimator) if isinstance(estimator, BaseSearchCV) else estimator
+        return _final_estimator(estimator.steps[-1][1])
+    return _final_estimator(estimator.estimator) if isinstance(estimator, BaseSearchCV) else estimator
 
 
 def _complete(values: Any) -> NDArray[np.bool_]:

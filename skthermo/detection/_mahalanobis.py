@@ -1,18 +1,15 @@
 """Damage index and alarm by Mahalanobis distance."""
 
-import warnings
-from numbers import Real
-
 import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OutlierMixin, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
 
-from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._arrays import Array
+from skthermo._validation import HasMethods
+from skthermo.detection._base import DamageDetector
 
 
-class MahalanobisDetector(OutlierMixin, BaseEstimator):
+class MahalanobisDetector(DamageDetector):
     """Alarm where frequencies are far from a healthy baseline.
 
     The damage index is the *unsquared* Mahalanobis distance, eq. (20),
@@ -39,9 +36,16 @@ class MahalanobisDetector(OutlierMixin, BaseEstimator):
     feature_names_in_ : ndarray of str
         Names of the modes, where `fit` saw a frame with such names.
 
+    See Also
+    --------
+    OutlierDetector : Any of scikit-learn's outlier detectors, for a baseline that is not normally distributed.
+
     Notes
     -----
-    Rows with a missing mode do not enter the baseline; their damage index is NaN, and
+    `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode,
+    or a mode that is a combination of others.
+
+    Rows with a missing mode are left out of the baseline; their damage index is NaN, and
     ``predict`` raises no alarm there.
 
     References
@@ -60,7 +64,7 @@ class MahalanobisDetector(OutlierMixin, BaseEstimator):
     """
 
     _parameter_constraints: dict = {
-        "contamination": [Interval(Real, 0, 0.5, closed="right")],
+        **DamageDetector._parameter_constraints,
         "covariance": [HasMethods(["fit", "mahalanobis"]), None],
     }
 
@@ -68,113 +72,12 @@ class MahalanobisDetector(OutlierMixin, BaseEstimator):
         self.contamination = contamination
         self.covariance = covariance
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> "MahalanobisDetector":
-        """Learn mean, covariance and threshold of a healthy baseline.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz; rows with NaN are left out.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        MahalanobisDetector
-            The fitted detector.
-
-        Raises
-        ------
-        ValueError
-            If the complete rows are too few, or too much alike, for a covariance that can be
-            inverted.
-        """
-        F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
-        complete = F[~np.isnan(F).any(axis=1)]
-        if len(complete) < 2:
-            raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
+    def _learn(self, complete: Array) -> None:
         covariance = EmpiricalCovariance() if self.covariance is None else clone(self.covariance)
         self.covariance_ = covariance.fit(complete)
         self._check_invertible(len(complete))
-        self.threshold_ = np.quantile(self._distance(complete), 1 - self.contamination)
-        self.offset_ = -self.threshold_
-        return self
 
-    def damage_index(self, X: ArrayLike) -> NDArray[np.float64] | pd.Series:
-        """Unsquared Mahalanobis distance from the baseline, eq. (20).
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray or Series of shape (n_samples,)
-            Dimensionless; NaN where a mode is missing. A frame gives a series on its index.
-        """
-        check_is_fitted(self)
-        F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        index = np.full(len(F), np.nan)
-        complete = ~np.isnan(F).any(axis=1)
-        if complete.any():
-            index[complete] = self._distance(F[complete])
-        return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
-
-    def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Negative damage index: higher is healthier.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-        """
-        return -np.asarray(self.damage_index(X))
-
-    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Threshold minus damage index: negative is an alarm.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-        """
-        return self.score_samples(X) - self.offset_
-
-    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
-        """Alarm or not.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-            -1 where the damage index exceeds the threshold, +1 elsewhere, also where a mode
-            is missing; one warning counts those rows.
-        """
-        decision = self.decision_function(X)
-        unknown = int(np.isnan(decision).sum())
-        if unknown:
-            warnings.warn(
-                f"{unknown} of {len(decision)} rows have a missing mode: no alarm is raised there",
-                UserWarning,
-                stacklevel=2,
-            )
-        return np.where(decision < 0, -1, 1)
-
-    def _distance(self, complete: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _index(self, complete: Array) -> Array:
         return np.sqrt(self.covariance_.mahalanobis(complete))
 
     def _check_invertible(self, n_rows: int) -> None:
@@ -186,8 +89,3 @@ class MahalanobisDetector(OutlierMixin, BaseEstimator):
                 f"(rank {rank}); expected more than {len(covariance)} rows, no mode that is constant or a copy "
                 "of others, or a shrunk covariance such as LedoitWolf()"
             )
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags

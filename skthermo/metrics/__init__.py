@@ -1,4 +1,4 @@
-"""What a detector achieves, and how well frequencies are predicted."""
+"""How well damage is detected, and how well frequencies are predicted."""
 
 from skthermo.metrics._detectability import (
     minimum_detectable_damage,

@@ -1,4 +1,4 @@
-"""How often alarms are false, how often damage is found, and how small it may be."""
+"""Probability of false alarm, probability of detection, minimum detectable damage."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,11 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     Parameters
     ----------
     damage_index : array-like of shape (n_samples,)
-        Damage index of records of the healthy structure that the baseline has not seen; NaN is
-        ignored. The Mahalanobis index is unsquared, and so must the threshold be.
+        Damage index of records of the healthy structure that are not in the baseline; NaN is
+        ignored. `MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
+        of that.
     threshold : float
-        Alarm above it.
+        A damage index above it is an alarm.
 
     Returns
     -------
@@ -44,7 +45,7 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the damaged structure; NaN is ignored.
     threshold : float
-        Alarm above it.
+        A damage index above it is an alarm.
 
     Returns
     -------
@@ -66,27 +67,28 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
 
 
 def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: float = 0.9) -> float:
-    """Smallest tested severity from which on damage is detected reliably (MDD).
+    """Smallest tested severity from which damage is detected reliably (MDD).
 
     Parameters
     ----------
     severities : array-like of shape (n_severities,)
-        Tested severities in any order, such as 0.1, 0.2, 0.3; of strengthening, -0.1, -0.2, -0.3.
+        Tested severities in any order, such as 0.1, 0.2, 0.3, or -0.1, -0.2, -0.3 for strengthening.
     pod : array-like of shape (n_severities,)
-        Probability of detection at each, between 0 and 1; NaN counts as not detected.
+        Probability of detection (POD) at each severity, between 0 and 1; NaN counts as not detected.
     level : float, default=0.9
         POD that counts as reliable.
 
     Returns
     -------
     float
-        The severity of smallest magnitude at which, and at every larger one, the POD reaches the
-        level; NaN if it does not at the largest. Nothing is interpolated between tested severities.
+        The smallest severity, in magnitude, for which the POD reaches the level there and at every
+        larger severity. NaN if the POD does not reach it at the largest one. There is no
+        interpolation between tested severities.
 
     Raises
     ------
     ValueError
-        If lengths differ, a severity repeats or is NaN, or a probability is not within 0 and 1.
+        If lengths differ, a severity is NaN or occurs twice, or a probability is not between 0 and 1.
 
     Examples
     --------

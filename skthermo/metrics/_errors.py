@@ -22,7 +22,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     y_true : array-like or DataFrame of shape (n_samples, n_modes)
         Measured frequencies in Hz.
     y_pred : array-like or DataFrame of shape (n_samples, n_modes)
-        Predicted frequencies in Hz. Where either is NaN, the value is ignored.
+        Predicted frequencies in Hz. A pair in which either is NaN is ignored.
 
     Returns
     -------
@@ -45,26 +45,26 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
 
 
 def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None) -> pd.DataFrame:
-    """MAPE of every scenario and mode, with averages, as in Table 2 of the paper.
+    """Mean absolute percentage errors by scenario and mode, as in Table 2 of the paper.
 
     Parameters
     ----------
     y_true : array-like or DataFrame of shape (n_samples, n_modes)
         Measured frequencies in Hz.
     y_pred : array-like or DataFrame of shape (n_samples, n_modes)
-        Predicted frequencies in Hz. Where either is NaN, the value is ignored.
+        Predicted frequencies in Hz. A pair in which either is NaN is ignored.
     scenarios : sequence of length n_samples, optional
-        Scenario of every row, such as "SH-0" or "SB-50". By default all rows are one, "all".
+        Scenario of every row, such as "SH-0" or "SB-50". By default all rows belong to one, "all".
 
     Returns
     -------
     DataFrame of shape (n_scenarios + 1, n_modes + 1)
-        In percent; the last row and the last column are averages.
+        In percent; the last row and the last column are averages over scenarios and modes.
 
     Raises
     ------
     ValueError
-        If shapes, indices or the number of scenarios disagree.
+        If shapes or indices differ, there is not one scenario for each row, or one is called "Average".
 
     References
     ----------
@@ -84,7 +84,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     if labels.shape != (len(measured),):
         raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
     if AVERAGE in labels:
-        raise ValueError(f"a scenario is called {AVERAGE!r}; expected another name: the row of averages has it")
+        raise ValueError(f"a scenario is called {AVERAGE!r}; expected another name: it is that of the averages")
     table = pd.DataFrame(
         {label: mape(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
         index=column_names(y_true, "f"),
@@ -126,12 +126,12 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
 
 
 def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, float]:
-    """Scores for ``cross_validate`` and ``GridSearchCV`` that ignore rows with NaN and count them.
+    """Scores for ``cross_validate`` and ``GridSearchCV`` from rows without NaN, and the share of these rows.
 
     Parameters
     ----------
     estimator : estimator
-        Fitted; predicts frequencies.
+        Fitted estimator that predicts frequencies.
     X : array-like or DataFrame of shape (n_samples, n_sensors)
         Temperatures in degrees Celsius.
     y : array-like or DataFrame of shape (n_samples, n_modes)

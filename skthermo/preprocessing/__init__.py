@@ -1,4 +1,4 @@
-"""Temperatures and frequencies made ready: lags, gaps, bias."""
+"""Preparing temperatures and frequencies: lags, gaps, offset from the model."""
 
 from skthermo.preprocessing._bias import BiasAligner
 from skthermo.preprocessing._impute import KNNGapImputer

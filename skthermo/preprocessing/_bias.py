@@ -1,4 +1,4 @@
-"""The offset between a structure and its model."""
+"""Removes the offset between measured frequencies and those of an FE model."""
 
 from typing import Any, Literal
 
@@ -27,17 +27,17 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     Parameters
     ----------
     reference : array-like of shape (n_modes,), FE model or None, default=None
-        What the means become: a vector in Hz, a model's nominal frequencies, or zero (one
-        for ``method="scale"``).
+        Means of the frequencies after `transform`: a vector in Hz, or an FE model, which stands for
+        its nominal frequencies. None stands for zeros, or for ones with ``method="scale"``.
     method : {"shift", "scale"}, default="shift"
         ``F - mean(F) + reference``, or ``F / mean(F) * reference``, which keeps relative changes.
 
     Attributes
     ----------
     mean_ : ndarray of shape (n_modes,)
-        Mean of the measured frequencies in Hz, NaN left out.
+        Means of the measured frequencies in Hz, NaN ignored.
     reference_ : ndarray of shape (n_modes,)
-        What it becomes.
+        Means after `transform`, in Hz.
     n_features_in_ : int
         Number of modes.
     feature_names_in_ : ndarray of str
@@ -68,12 +68,12 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: None = None) -> "BiasAligner":
-        """Learn the means.
+        """Compute the means of measured frequencies.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
-            Measured frequencies in Hz; NaN is left out.
+            Measured frequencies in Hz; NaN is ignored.
         y : None
             Ignored.
 
@@ -85,8 +85,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If a mode was never measured, the reference has another number of modes, or a mean
-            to scale by is zero.
+            If a mode is NaN in every row, the reference has another number of modes, or, with
+            ``method="scale"``, a mean or a reference is zero.
         """
         F = self._validated(X, reset=True)
         check_columns(frame_like(X, F, self.get_feature_names_out()), "frequency")
@@ -96,11 +96,11 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             for what, values in (("mean", self.mean_), ("reference", self.reference_)):
                 if (values == 0).any():
                     name = self.get_feature_names_out()[values == 0][0]
-                    raise ValueError(f"the {what} of mode {name!r} is zero; expected one to scale by")
+                    raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Measured frequencies to the model's domain.
+        """Shift or scale measured frequencies to the reference.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         return frame_like(X, F - self.mean_ + self.reference_, self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """The model's frequencies to the measured domain.
+        """Shift or scale the model's frequencies back to the measured ones.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         if isinstance(X, pd.DataFrame) and hasattr(self, "feature_names_in_"):
             F = self._validated(X, reset=False)
-        else:  # as a model gives them, without names
+        else:  # frequencies of a model have no column names
             F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")

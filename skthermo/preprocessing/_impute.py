@@ -1,4 +1,4 @@
-"""Gaps in monitoring records."""
+"""Fills gaps in monitoring records."""
 
 from typing import Any
 
@@ -22,16 +22,16 @@ FLOATS = [np.float64, np.float32]
 
 
 class KNNGapImputer(KNNImputer):
-    """Fill gaps with the mean of the nearest complete neighbours.
+    """Fill gaps with the mean of the nearest records in which the value is present.
 
-    scikit-learn's ``KNNImputer`` with the ten neighbours of the paper, at the scale of years of hourly
-    records; a frame stays a frame with its index, and a column without any value is an error and not
-    dropped.
+    scikit-learn's ``KNNImputer``, fast enough for years of hourly records. It takes ten neighbours, as the
+    paper does; a frame stays a frame with its index; and a column without any value is an error instead of
+    being dropped.
 
     Parameters
     ----------
     missing_values : int, float, str, numpy.nan, None or pandas.NA, default=numpy.nan
-        What stands for a missing value.
+        The value that marks a missing value.
     n_neighbors : int, default=10
         Number of neighbours.
     weights : {"uniform", "distance"} or callable, default="uniform"
@@ -39,11 +39,24 @@ class KNNGapImputer(KNNImputer):
     metric : {"nan_euclidean"} or callable, default="nan_euclidean"
         Distance between rows.
     copy : bool, default=True
-        Whether to leave the input as it is.
+        True leaves the input unchanged; False may overwrite it.
     add_indicator : bool, default=False
-        Whether to append columns that mark what was missing.
+        Whether to append a column of zeros and ones for each column with gaps; 1 marks a gap.
     keep_empty_features : bool, default=False
-        True fills a column without any value with zeros instead of refusing it.
+        True fills a column without any value with zeros; otherwise it is an error.
+
+    Attributes
+    ----------
+    is_empty_ : ndarray of bool
+        Columns that had no value in `fit`.
+    donors_ : object or None
+        Records of `fit`, prepared for the search of neighbours; None where ``KNNImputer`` does the search.
+    indicator_ : MissingIndicator or None
+        Makes the columns of ``add_indicator``.
+    n_features_in_ : int
+        Number of columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
 
     See Also
     --------
@@ -51,12 +64,15 @@ class KNNGapImputer(KNNImputer):
 
     Notes
     -----
-    Values are those of ``KNNImputer``. It computes the distance of every pair of rows, which grows with the
-    square of their number; here trees are searched for each pattern of missing columns, which grows as
-    n log n. Data of few rows or very many patterns, another metric and other ``missing_values`` than NaN are
-    left to it. Where several rows are exactly as far away as the last neighbour, either may choose any; and
-    distances are computed directly here, by an expansion there that loses digits of very small ones, which
-    ``weights="distance"`` can show in the ninth digit.
+    The results are those of ``KNNImputer``. It computes the distances between all pairs of rows, so its time
+    grows with the square of the number of rows n. Here, rows with the same missing columns are searched
+    together by k-d trees, and the time grows as n log n. ``KNNImputer`` itself does the work for few rows,
+    for very many different patterns of missing columns, for another metric, and for other
+    ``missing_values`` than NaN.
+
+    Results can differ in two cases. Where several rows are equally far away, the two may choose different
+    neighbours. And ``KNNImputer`` computes distances by a formula that loses digits of very small ones,
+    which can change the ninth digit with ``weights="distance"``.
 
     Examples
     --------
@@ -91,7 +107,7 @@ class KNNGapImputer(KNNImputer):
         )
 
     def fit(self, X: ArrayLike, y: None = None) -> "KNNGapImputer":
-        """Remember the rows among which neighbours are sought.
+        """Store the records among which neighbours are searched.
 
         Parameters
         ----------
@@ -108,20 +124,20 @@ class KNNGapImputer(KNNImputer):
         Raises
         ------
         ValueError
-            If a column holds no value at all, unless ``keep_empty_features``.
+            If a column has no value, unless ``keep_empty_features=True``.
         """
         super().fit(X, y)
         kept = set(super().get_feature_names_out())
-        self._is_empty = np.array([name not in kept for name in _check_feature_names_in(self, None)])
-        if self._is_empty.any() and not self.keep_empty_features:
-            empty = list(_check_feature_names_in(self, None)[self._is_empty])
+        self.is_empty_ = np.array([name not in kept for name in _check_feature_names_in(self, None)])
+        if self.is_empty_.any() and not self.keep_empty_features:
+            empty = list(_check_feature_names_in(self, None)[self.is_empty_])
             raise ValueError(
                 f"the columns {empty} are missing in all {_num_samples(X)} rows; expected values to "
                 "impute from: leave them out, or keep_empty_features=True fills them with zeros"
             )
-        self._donors = None
+        self.donors_ = None
         if self.metric == "nan_euclidean" and isinstance(self.missing_values, float) and np.isnan(self.missing_values):
-            self._donors = Donors(check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True))
+            self.donors_ = Donors(check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True))
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
@@ -139,9 +155,9 @@ class KNNGapImputer(KNNImputer):
         """
         check_is_fitted(self)
         values = None
-        if self._donors is not None:
+        if self.donors_ is not None:
             values = validate_data(self, X, dtype=FLOATS, ensure_all_finite="allow-nan", reset=False)
-        if values is None or not self._donors.are_worth_trees(np.isnan(values)):
+        if values is None or not self.donors_.trees_are_faster(np.isnan(values)):
             return frame_like(X, super().transform(X), self.get_feature_names_out())
         filled = self._filled(values)
         if self.add_indicator:
@@ -149,14 +165,14 @@ class KNNGapImputer(KNNImputer):
         return frame_like(X, filled, self.get_feature_names_out())
 
     def _filled(self, values: NDArray) -> NDArray:
-        """Weighted means of the nearest donors, for each pattern of missing columns and each of these."""
+        """Fill each missing column of rows with the same missing columns with means of their nearest donors."""
         filled = values.copy()
         for missing, rows in row_patterns(np.isnan(values)):
             observed = ~missing
-            for column in np.flatnonzero(missing & ~self._is_empty):
-                distances, donors = self._donors.nearest(values[rows], observed, column, self.n_neighbors)
-                filled[rows, column] = self._mean(distances, self._donors.values[donors, column], column)
-        filled[:, self._is_empty] = 0
+            for column in np.flatnonzero(missing & ~self.is_empty_):
+                distances, donors = self.donors_.nearest(values[rows], observed, column, self.n_neighbors)
+                filled[rows, column] = self._mean(distances, self.donors_.values[donors, column], column)
+        filled[:, self.is_empty_] = 0
         return filled
 
     def _mean(self, distances: NDArray, values: NDArray, column: int) -> NDArray:
@@ -164,12 +180,12 @@ class KNNGapImputer(KNNImputer):
         weights = _get_weights(np.where(present, distances, np.nan), self.weights)
         weights = np.where(present, 1.0 if weights is None else weights, 0.0)
         total = weights.sum(axis=1)
-        mean = np.full(len(values), self._donors.mean(column))
+        mean = np.full(len(values), self.donors_.mean(column))
         np.divide((weights * np.where(present, values, 0)).sum(axis=1), total, out=mean, where=total > 0)
         return mean
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: those of the input, and of the indicators where asked for.
+        """Names of the columns: those of the input, then those of ``add_indicator``.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Temperatures of the hours before, as columns."""
+"""Earlier temperatures as additional columns."""
 
 from collections.abc import Sequence
 from datetime import timedelta
@@ -20,12 +20,12 @@ from skthermo._validation import (
     validate_data,
 )
 
-STALE_AFTER = 6
-MISSING = -1
+DEFAULT_TOLERANCE = 6  # times freq
+MISSING = -1  # instead of the number of a row
 
 
 class LagFeatures(TransformerMixin, BaseEstimator):
-    """Current and earlier values of every sensor, which carry a structure's thermal inertia.
+    """Current and earlier values of every sensor: a structure follows the temperature with delay.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         t, t-1, ..., t-23. Or an explicit list of lags, such as ``[0, 1, 24]``.
     freq : str or timedelta, optional
         Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most
-        frequent step between the records of `fit`.
+        frequent time between consecutive records of `fit`.
     tolerance : str or timedelta, optional
-        How much older than t - k freq the record taken for lag k may be; "0h" wants the very stamp. By
-        default 6 freq.
+        How much older than t - k freq the record for lag k may be; "0h" allows only records at exactly
+        that time. By default 6 freq.
     padding : {"edge", "nan"}, default="edge"
-        What stands before the first record: its own values, or NaN.
+        Values before the first record: those of the first record, or NaN.
 
     Attributes
     ----------
@@ -48,7 +48,9 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     freq_ : Timedelta or None
         Length of one lag; None where rows are consecutive.
     tolerance_ : Timedelta or None
-        How much older a record may be; None where rows are consecutive.
+        How much older the record for a lag may be; None where rows are consecutive.
+    history_ : DataFrame or None
+        Records of `fit`, to which lags of `transform` reach back; None where rows are consecutive.
     n_features_in_ : int
         Number of sensors.
     feature_names_in_ : ndarray of str
@@ -56,10 +58,14 @@ class LagFeatures(TransformerMixin, BaseEstimator):
 
     Notes
     -----
-    On an array, or a frame without DatetimeIndex, rows are consecutive records. On a
-    DatetimeIndex, lag k is the last record at or before t - k freq, NaN where that is older than
-    the tolerance; records seen in `fit` are the history of those in `transform`; rows may
-    come in any order and keep it. NaN is carried along.
+    On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of
+    `fit` are not used in `transform`.
+
+    On a DatetimeIndex, lag k is the last record at or before t - k freq, or NaN if that record is older
+    than the tolerance. Records of `fit` and of `transform` are searched together; for a stamp in both, the
+    values of `transform` count. Rows may come in any order, which the result keeps.
+
+    A missing value is NaN in every lag that refers to it.
 
     Examples
     --------
@@ -100,7 +106,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
 
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: None = None) -> "LagFeatures":
-        """Learn the sensors, the step and, on a DatetimeIndex, the history.
+        """Read the lags and, on a DatetimeIndex, store the records.
 
         Parameters
         ----------
@@ -117,12 +123,12 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the lags are not different non-negative integers, ``freq`` or ``tolerance`` come
-            without a DatetimeIndex or are not positive, or stamps repeat.
+            If the lags are not different non-negative integers; if ``freq`` or ``tolerance`` is given
+            without a DatetimeIndex, or is not positive; if a stamp is missing or occurs twice.
         """
         values = self._validated(X, reset=True)
         self.lags_ = _read_lags(self.lags)
-        self.freq_ = self.tolerance_ = None
+        self.freq_ = self.tolerance_ = self.history_ = None
         stamps = _stamps(X)
         if stamps is None:
             for name in ("freq", "tolerance"):
@@ -132,11 +138,11 @@ class LagFeatures(TransformerMixin, BaseEstimator):
                         f"expected a frame on one, or {name}=None"
                     )
         else:
-            self.freq_ = _usual_step(stamps) if self.freq is None else _duration(self.freq, "freq")
+            self.freq_ = _most_frequent_step(stamps) if self.freq is None else _duration(self.freq, "freq")
             self.tolerance_ = (
-                STALE_AFTER * self.freq_ if self.tolerance is None else _duration(self.tolerance, "tolerance")
+                DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else _duration(self.tolerance, "tolerance")
             )
-            self._history = (stamps, values.copy())
+            self.history_ = frame_like(X, values.copy(), _check_feature_names_in(self, None))
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
@@ -196,16 +202,16 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         return lagged.reshape(-1, n_rows).T
 
     def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> NDArray:
-        old_stamps, old_values = self._history
+        old_stamps, old_values = self.history_.index, self.history_.to_numpy()
         if (old_stamps.tz is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {stamps.tz}; expected {old_stamps.tz}, as in fit")
         own = stamps.as_unit("ns").asi8
         old = old_stamps.as_unit("ns").asi8
-        rows_per_lag = _even_rows(own, self.freq_.value)
+        rows_per_lag = _rows_per_step(own, self.freq_.value)
         if rows_per_lag and np.array_equal(own, old):
             return self._by_row(values, [lag * rows_per_lag for lag in self.lags_])
-        earlier = ~np.isin(old, own)
-        known = np.concatenate([old[earlier], own])
+        only_old = ~np.isin(old, own)
+        known = np.concatenate([old[only_old], own])
         order = np.argsort(known)
         ascending = known[order]
         sources = []
@@ -216,7 +222,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             before = at < 0
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        return _gather(np.concatenate([old_values[earlier], values]), sources)
+        return _rows_by_lag(np.concatenate([old_values[only_old], values]), sources)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -224,8 +230,8 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         return tags
 
 
-def _gather(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
-    """Rows of values by lag, one block of columns for each sensor; column by column, as memory lies."""
+def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
+    """Values of the source rows of every lag, one block of columns for each sensor."""
     sensors = np.ascontiguousarray(values.T)
     lagged = np.empty((len(sensors), len(sources), len(sources[0])), dtype=values.dtype)
     for k, source in enumerate(sources):
@@ -235,8 +241,8 @@ def _gather(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
     return lagged.reshape(-1, len(sources[0])).T
 
 
-def _even_rows(stamps: NDArray[np.int64], step: int) -> int | None:
-    """How many rows a step spans, where stamps ascend evenly and it spans whole ones."""
+def _rows_per_step(stamps: NDArray[np.int64], step: int) -> int | None:
+    """Number of rows in a step, if stamps are equally spaced and the step is a multiple of their spacing."""
     steps = np.diff(stamps)
     even = steps.size and steps[0] > 0 and step % steps[0] == 0 and (steps == steps[0]).all()
     return int(step // steps[0]) if even else None
@@ -267,7 +273,7 @@ def _stamps(X: Any) -> pd.DatetimeIndex | None:
     return index
 
 
-def _usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
+def _most_frequent_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
     steps = np.diff(np.sort(stamps.as_unit("ns").asi8))
     if not steps.size:
         raise ValueError("X has 1 sample, whose stamp gives no step between records; expected freq, such as '1h'")

@@ -1,7 +1,8 @@
-"""Nearest donors of incomplete rows, by trees for each pattern of missing columns.
+"""Nearest neighbours of rows with gaps (receivers) among the rows that fill them (donors).
 
-Among donors that share the same observed columns with a receiver, the NaN-aware Euclidean distance is
-an ordinary one in those columns, times the square root of (all columns / shared columns).
+A pattern is a set of missing columns. For a receiver and all donors of one pattern, the columns that both
+have are the same. The distance that ignores NaN is then the Euclidean distance in these shared columns,
+times the square root of (all columns / shared columns), and a k-d tree can find the nearest donors.
 """
 
 import math
@@ -16,14 +17,14 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
-SMALL_POOL = 256  # below it, all distances are faster than a tree
-BLOCK = 512  # receivers that are asked together
-FEW_PAIRS = 10_000_000  # below it, so they are for the whole data
-PAIRS_PER_POOL = 2000  # about as many distances as one more pool costs
+SMALL_POOL = 256  # up to so many donors, computing all distances is faster than a tree
+BLOCK = 512  # receivers in one query of a tree
+FEW_PAIRS = 10_000_000  # below so many pairs of receiver and donor, computing all distances is faster
+PAIRS_PER_POOL = 2000  # searching one pool takes about as long as so many distances
 
 
 def row_patterns(missing: Mask) -> list[tuple[Mask, Rows]]:
-    """Distinct rows of a mask, and where each stands."""
+    """The distinct rows of a mask, each with the positions at which it occurs."""
     packed = np.packbits(missing, axis=1)
     _, first, inverse = np.unique(packed, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(inverse.ravel(), kind="stable")
@@ -33,18 +34,18 @@ def row_patterns(missing: Mask) -> list[tuple[Mask, Rows]]:
 
 
 class Donors:
-    """Rows that give values, grouped by what they miss."""
+    """Rows from which gaps are filled, grouped by their missing columns."""
 
     def __init__(self, values: Array):
         self.values = values
         self.patterns = row_patterns(np.isnan(values))
 
     def mean(self, column: int) -> float:
-        """Mean of a column over the donors that have it."""
+        """Mean of a column, NaN ignored."""
         return float(np.nanmean(self.values[:, column]))
 
-    def are_worth_trees(self, missing: Mask) -> bool:
-        """Whether trees for every pair of patterns cost less than the distances of every pair of rows."""
+    def trees_are_faster(self, missing: Mask) -> bool:
+        """Whether searching trees is expected to take less time than computing all distances."""
         gappy = missing[missing.any(axis=1)]
         n_pairs = len(gappy) * len(self.values)
         if n_pairs < FEW_PAIRS:
@@ -52,24 +53,25 @@ class Donors:
         return len(row_patterns(gappy)) * len(self.patterns) * PAIRS_PER_POOL < n_pairs
 
     def nearest(self, receivers: Array, observed: Mask, column: int, n_neighbors: int) -> tuple[Array, Rows]:
-        """Distances and rows of the nearest donors that have a column, (n_receivers, n_neighbors).
+        """The nearest donors that have a value in a column.
 
-        Where there are fewer donors, distances are infinite and rows 0.
+        Returns their distances and row numbers, both (n_receivers, n_neighbors) and by ascending distance.
+        If there are fewer donors, the remaining distances are infinite and row numbers 0.
         """
         distances = np.full((len(receivers), n_neighbors), np.inf)
         rows = np.zeros((len(receivers), n_neighbors), dtype=np.intp)
         for shared, members in self._pools(observed, column):
-            stretch = np.sqrt(len(shared) / shared.sum())
+            scale = np.sqrt(len(shared) / shared.sum())
             search = _searcher(self.values[np.ix_(members, shared)], n_neighbors)
             points = receivers[:, shared]
-            # Receivers that need only look nearby are asked together, so that their bound is tight.
+            # A query has one bound for all its receivers, so those with near neighbours go together.
             for block in np.array_split(np.argsort(distances[:, -1]), math.ceil(len(points) / BLOCK)):
-                found, at = search(points[block], distances[block[-1], -1] / stretch)
-                _merge(distances, rows, block, found * stretch, members[at])
+                found, at = search(points[block], distances[block[-1], -1] / scale)
+                _merge(distances, rows, block, found * scale, members[at])
         return distances, rows
 
     def _pools(self, observed: Mask, column: int) -> Iterator[tuple[Mask, Rows]]:
-        """Columns shared with the receivers, and the donors that share just these; largest pool first."""
+        """Donors that share the same columns with the receivers, as (columns, rows); largest pool first."""
         pools: dict[bytes, tuple[Mask, list[Rows]]] = {}
         for missing, rows in self.patterns:
             shared = observed & ~missing
@@ -80,14 +82,18 @@ class Donors:
 
 
 def _searcher(pool: Array, n_neighbors: int) -> Callable[[Array, float], tuple[Array, Rows]]:
-    """Search of a pool: distances and positions of the nearest, infinite and 0 beyond a distance."""
+    """A function that finds the nearest rows of a pool within a distance.
+
+    It gives their distances and positions; beyond that distance these are infinite and 0.
+    """
     k = min(n_neighbors, len(pool))
     if len(pool) <= SMALL_POOL:
         return lambda points, within: _smallest(cdist(points, pool), k)
-    tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)  # most of the time goes into building
+    # Building the tree takes most of the time, and these options make it quick.
+    tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)
 
     def search(points: Array, within: float) -> tuple[Array, Rows]:
-        # What is just as far away as the bound counts as inside, rounding allowed for.
+        # A neighbour exactly at the bound must be found in spite of rounding.
         found, at = tree.query(points, k=[*range(1, k + 1)], distance_upper_bound=within * (1 + 1e-9) + 1e-300)
         return found, np.where(np.isinf(found), 0, at)
 
@@ -100,7 +106,7 @@ def _smallest(distances: Array, k: int) -> tuple[Array, Rows]:
 
 
 def _merge(distances: Array, rows: Rows, block: Rows, found: Array, found_rows: Rows) -> None:
-    """Keep the nearest of both, ascending, in a block of the first two arrays."""
+    """Replace the nearest donors of a block of receivers where a new one is nearer, in place."""
     closer = (found < distances[block, -1:]).any(axis=1)
     block, found, found_rows = block[closer], found[closer], found_rows[closer]
     both = np.hstack([distances[block], found])

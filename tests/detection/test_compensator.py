@@ -364,3 +364,10 @@ def test_other_columns_than_in_fit_are_refused():
         fitted.transform(X[MODES + list(T.columns)])
     with pytest.raises(ValueError, match="9 features"):
         compensator(targets=POSITIONS).fit(X.to_numpy()).transform(X.to_numpy()[:, :5])
+
+
+@pytest.mark.parametrize("estimator", [Ridge(alpha=-1), make_pipeline(StandardScaler(), Ridge(alpha=-1))], ids=str)
+@pytest.mark.parametrize("method", ["fit", "fit_transform"])
+def test_parameters_of_the_estimator_are_checked(method, estimator):
+    with pytest.raises(ValueError, match="'alpha' parameter of Ridge must be"):
+        getattr(compensator(estimator), method)(X)

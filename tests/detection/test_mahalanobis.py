@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.distance import mahalanobis
 from scipy.stats import chi
-from sklearn.covariance import LedoitWolf, MinCovDet
+from sklearn.covariance import LedoitWolf, MinCovDet, ledoit_wolf
 
 from skthermo.detection import MahalanobisDetector
 
@@ -90,5 +90,13 @@ def test_bad_baselines_are_named(X, message):
         MahalanobisDetector().fit(X)
 
 
+def test_parameters_of_the_covariance_are_checked():
+    with pytest.raises(ValueError, match="'block_size' parameter of LedoitWolf must be an int"):
+        MahalanobisDetector(covariance=LedoitWolf(block_size="x")).fit(F)
+
+
 def test_few_records_do_with_a_shrunk_covariance():
-    assert MahalanobisDetector(covariance=LedoitWolf()).fit(F[:3]).threshold_ > 0
+    detector = MahalanobisDetector(covariance=LedoitWolf()).fit(F[:3])
+    inverse = np.linalg.inv(ledoit_wolf(F[:3])[0])
+    expected = [mahalanobis(row, F[:3].mean(axis=0), inverse) for row in F[:3]]
+    assert detector.threshold_ == pytest.approx(np.quantile(expected, 0.98), rel=1e-10)

@@ -104,9 +104,9 @@ def test_donors_are_a_copy():
 def test_trees_are_for_many_rows_of_few_patterns():
     rng = np.random.default_rng(0)
     few_patterns, many_patterns = (np.where(rng.random((9000, p)) < 0.1, np.nan, 1.0) for p in (6, 20))
-    assert _nearest.Donors(few_patterns).are_worth_trees(np.isnan(few_patterns))
-    assert not _nearest.Donors(few_patterns[:2000]).are_worth_trees(np.isnan(few_patterns[:2000]))
-    assert not _nearest.Donors(many_patterns).are_worth_trees(np.isnan(many_patterns))
+    assert _nearest.Donors(few_patterns).trees_are_faster(np.isnan(few_patterns))
+    assert not _nearest.Donors(few_patterns[:2000]).trees_are_faster(np.isnan(few_patterns[:2000]))
+    assert not _nearest.Donors(many_patterns).trees_are_faster(np.isnan(many_patterns))
 
 
 def test_imputer_keeps_arrays_and_single_precision():

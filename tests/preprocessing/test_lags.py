@@ -60,8 +60,8 @@ def test_a_regular_index_gives_the_same_as_rows():
 
 @pytest.mark.parametrize("freq", ["1h", "2h", "90min"])
 @pytest.mark.parametrize("padding", ["edge", "nan"])
-def test_even_records_take_a_short_way_to_the_same_values(freq, padding):
-    """Without its last row the frame is another than in fit, and goes the long way."""
+def test_evenly_spaced_records_of_fit_take_a_shortcut_to_the_same_values(freq, padding):
+    """Without its last row, the frame is not that of fit, and the shortcut is not taken."""
     lags = LagFeatures([0, 1, 3], freq=freq, padding=padding).fit(T)
     pd.testing.assert_frame_equal(lags.transform(T).iloc[:-1], lags.transform(T.iloc[:-1]), check_freq=False)
 
@@ -71,6 +71,12 @@ def test_records_of_fit_are_the_history_of_transform():
     np.testing.assert_array_equal(lags.transform(T.iloc[20:])[["T1_lag0", "T1_lag1", "T1_lag2"]].iloc[0], [20, 19, 18])
     np.testing.assert_array_equal(lags.transform(T.iloc[[25]])["T1_lag1"], [19])  # five hours old
     assert np.isnan(lags.transform(T.iloc[[29]])["T1_lag1"]).all()  # nine hours old
+
+
+def test_history_holds_the_records_of_fit_and_only_where_lags_go_by_time():
+    lags = LagFeatures(3).fit(T)
+    pd.testing.assert_frame_equal(lags.history_, T)
+    assert lags.fit(T.to_numpy()).history_ is None
 
 
 def test_history_is_a_copy():

@@ -1,0 +1,146 @@
+"""The part that all damage detectors share: threshold, scores and alarms."""
+
+import warnings
+from abc import ABC, abstractmethod
+from numbers import Real
+from typing import Self
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, OutlierMixin
+
+from skthermo._arrays import Array
+from skthermo._validation import Interval, _fit_context, check_is_fitted, validate_data
+
+
+class DamageDetector(OutlierMixin, BaseEstimator, ABC):
+    """Base of detectors that learn a healthy baseline and give every record a damage index.
+
+    A detector has the parameter ``contamination`` and two methods: `_learn` and `_index`. Both
+    get rows in which every mode is present.
+    """
+
+    _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
+
+    @abstractmethod
+    def _learn(self, complete: Array) -> None:
+        """Learn the baseline from its complete rows."""
+
+    @abstractmethod
+    def _index(self, complete: Array) -> Array:
+        """Damage index of complete rows; higher is more damaged."""
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: ArrayLike, y: None = None) -> Self:
+        """Learn a healthy baseline and set the threshold.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz; rows with NaN are left out.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        object
+            The fitted detector.
+
+        Raises
+        ------
+        ValueError
+            If fewer than two rows are complete, or the detector cannot learn from them.
+        """
+        F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
+        complete = F[_is_complete(F)]
+        if len(complete) < 2:
+            raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
+        self._learn(complete)
+        self.threshold_ = np.quantile(self._index(complete), 1 - self.contamination)
+        self.offset_ = -self.threshold_
+        return self
+
+    def damage_index(self, X: ArrayLike) -> NDArray[np.float64] | pd.Series:
+        """Damage index of every record: higher is more damaged.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        ndarray or Series of shape (n_samples,)
+            Dimensionless; NaN where a mode is missing. A frame gives a series on its index.
+        """
+        check_is_fitted(self)
+        F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
+        index = np.full(len(F), np.nan)
+        complete = _is_complete(F)
+        if complete.any():
+            index[complete] = self._index(F[complete])
+        return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
+
+    def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Negative damage index: higher is healthier.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            NaN where a mode is missing.
+        """
+        return -np.asarray(self.damage_index(X))
+
+    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Threshold minus damage index: negative is an alarm.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            NaN where a mode is missing.
+        """
+        return self.score_samples(X) - self.offset_
+
+    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
+        """Whether each record raises an alarm.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            -1 (alarm) where the damage index exceeds the threshold, else +1. Rows with a missing
+            mode get +1, and one warning counts them.
+        """
+        decision = self.decision_function(X)
+        unknown = int(np.isnan(decision).sum())
+        if unknown:
+            warnings.warn(
+                f"{unknown} of {len(decision)} rows have a missing mode: no alarm is raised there",
+                UserWarning,
+                stacklevel=2,
+            )
+        return np.where(decision < 0, -1, 1)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
+
+
+def _is_complete(F: Array) -> NDArray[np.bool_]:
+    return ~np.isnan(F).any(axis=1)

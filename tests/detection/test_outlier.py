@@ -1,0 +1,133 @@
+"""scikit-learn's outlier detectors as damage detectors."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import BaseEstimator, OutlierMixin
+from sklearn.covariance import EllipticEnvelope, MinCovDet
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV
+from sklearn.neighbors import LocalOutlierFactor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import OneClassSVM
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+
+RNG = np.random.default_rng(0)
+STAMPS = pd.date_range("2025", periods=400, freq="h")
+F = pd.DataFrame(RNG.normal([4, 9, 12], [0.04, 0.1, 0.2], (400, 3)), STAMPS, ["f1", "f2", "f3"])
+DAMAGED = F - [0.4, 1.0, 2.0]  # ten standard deviations
+DETECTORS = [
+    IsolationForest(random_state=0),
+    OneClassSVM(nu=0.1),
+    LocalOutlierFactor(novelty=True),
+    EllipticEnvelope(random_state=0),
+    make_pipeline(StandardScaler(), LocalOutlierFactor(novelty=True)),
+]
+
+
+class FromZero(OutlierMixin, BaseEstimator):
+    """Scores by the distance of the first column from zero."""
+
+    def fit(self, X, y=None):
+        return self
+
+    def score_samples(self, X):
+        return -np.abs(X[:, 0])
+
+
+def test_index_is_minus_the_score_and_the_threshold_its_quantile():
+    baseline = np.arange(101.0)[:, np.newaxis]
+    detector = OutlierDetector(FromZero(), contamination=0.05).fit(baseline)
+    np.testing.assert_array_equal(detector.damage_index(baseline), np.arange(101.0))
+    assert detector.threshold_ == 95
+    assert detector.offset_ == -95
+    np.testing.assert_array_equal(detector.score_samples([[-96.0]]), [-96])
+    np.testing.assert_array_equal(detector.decision_function([[-96.0], [90.0]]), [-1, 5])
+    np.testing.assert_array_equal(detector.predict([[95.0], [-96.0]]), [1, -1])
+
+
+@pytest.mark.parametrize("estimator", DETECTORS, ids=lambda e: type(e[-1] if hasattr(e, "steps") else e).__name__)
+def test_any_outlier_detector_serves(estimator):
+    detector = OutlierDetector(estimator).fit(F)
+    assert detector.estimator_ is not estimator
+    np.testing.assert_array_equal(detector.damage_index(F), -detector.estimator_.score_samples(F.to_numpy()))
+    assert (detector.predict(F) == -1).mean() == 0.02
+    assert (detector.predict(DAMAGED) == -1).all()
+    assert not [name for name in vars(estimator) if name.endswith("_")]
+
+
+def test_the_estimators_own_threshold_is_not_used():
+    own, other = (IsolationForest(random_state=0, contamination=share) for share in (0.01, 0.4))
+    assert OutlierDetector(own).fit(F).threshold_ == OutlierDetector(other).fit(F).threshold_
+
+
+def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance():
+    envelope = OutlierDetector(EllipticEnvelope(random_state=0)).fit(F)
+    robust = MahalanobisDetector(covariance=MinCovDet(random_state=0)).fit(F)
+    np.testing.assert_allclose(envelope.damage_index(DAMAGED), robust.damage_index(DAMAGED) ** 2, rtol=1e-12)
+    np.testing.assert_array_equal(envelope.predict(F), robust.predict(F))
+
+
+def test_missing_modes_give_no_index_and_no_alarm():
+    holed = DAMAGED.copy()
+    holed.iloc[[3, 7], 1] = np.nan
+    detector = OutlierDetector(IsolationForest(random_state=0)).fit(F)
+    index = detector.damage_index(holed)
+    assert index.index.equals(STAMPS)
+    np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
+    with pytest.warns(UserWarning, match="2 of 400 rows have a missing mode"):
+        alarms = detector.predict(holed)
+    np.testing.assert_array_equal(np.flatnonzero(alarms == 1), [3, 7])
+    without = OutlierDetector(IsolationForest(random_state=0)).fit(holed.drop(index=STAMPS[[3, 7]]))
+    assert OutlierDetector(IsolationForest(random_state=0)).fit(holed).threshold_ == without.threshold_
+
+
+def test_residuals_of_a_compensator_are_scored_in_a_pipeline():
+    healthy, damaged = (
+        campaign.temperatures.join(campaign.frequencies)
+        for campaign in (make_truss_campaign(random_state=0), make_truss_campaign(damage={"bottom": 0.3}))
+    )
+    targets = [name for name in healthy if name.startswith("f")]
+    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
+    pipeline = make_pipeline(compensator, StandardScaler(), OutlierDetector(OneClassSVM())).fit(healthy)
+    residuals = StandardScaler().fit_transform(compensator.fit_transform(healthy))
+    assert pipeline[-1].threshold_ == OutlierDetector(OneClassSVM()).fit(residuals).threshold_
+    assert (pipeline.predict(damaged) == -1).mean() > 0.95
+
+
+def test_parameters_of_the_estimator_can_be_searched():
+    def distance_of_damage(detector, records, y=None):
+        return float(detector.decision_function(records).mean() - detector.decision_function(records - 1).mean())
+
+    search = GridSearchCV(OutlierDetector(OneClassSVM()), {"estimator__nu": [0.01, 0.5]}, scoring=distance_of_damage)
+    assert search.fit(F).best_params_ == {"estimator__nu": 0.5}  # its score is a sum over support vectors
+
+
+@pytest.mark.parametrize(
+    ("estimator", "message"),
+    [
+        (
+            LocalOutlierFactor(),
+            r"estimator is LocalOutlierFactor\(\), which has no score_samples; expected an outlier detector that "
+            r"scores new records, such as IsolationForest\(\) or LocalOutlierFactor\(novelty=True\)",
+        ),
+        (Ridge(), r"estimator is Ridge\(\), which has no score_samples"),
+        (make_pipeline(StandardScaler(), Ridge()), "has no score_samples"),
+        (None, "'estimator' parameter of OutlierDetector must be an object implementing 'fit'. Got None"),
+        (IsolationForest(n_estimators=0), "'n_estimators' parameter of IsolationForest must be"),
+    ],
+    ids=["lof", "regressor", "pipeline", "none", "nested parameter"],
+)
+def test_estimators_that_cannot_serve_are_named(estimator, message):
+    with pytest.raises(ValueError, match=message):
+        OutlierDetector(estimator).fit(F)
+
+
+@pytest.mark.parametrize("contamination", [0, 0.6, "auto"])
+def test_contamination_is_a_share(contamination):
+    with pytest.raises(ValueError, match="'contamination' parameter of OutlierDetector must be a float in the range"):
+        OutlierDetector(IsolationForest(), contamination).fit(F)
