@@ -11,6 +11,26 @@ Matrix: TypeAlias = Array | scipy.sparse.csc_array
 RandomState: TypeAlias = int | np.random.RandomState | None
 
 
+def real_array(values: Any, what: str) -> Array:
+    """An array of floats; complex numbers, sparse matrices and what is not a number are errors.
+
+    Raises
+    ------
+    ValueError
+        Names what was given.
+    """
+    if scipy.sparse.issparse(values):
+        raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
+    if np.iscomplexobj(values):
+        raise ValueError(f"{what} is complex; expected real numbers")
+    if isinstance(values, np.ma.MaskedArray):
+        values = values.astype(float).filled(np.nan)
+    try:
+        return as_floats(values)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
+
+
 def as_floats(values: ArrayLike) -> Array:
     """An array of floats; missing values of a nullable pandas column become NaN."""
     if hasattr(values, "iloc"):  # a pandas frame or series

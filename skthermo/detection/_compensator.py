@@ -23,9 +23,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     estimator : regressor
-        Predicts the targets from all other columns: any of scikit-learn's regressors (inside a
-        ``MultiOutputRegressor`` if it takes one target only), a pipeline with `LagFeatures`, or
-        `DataInformedFEM`.
+        Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
+        target is fitted once for each), a pipeline with `LagFeatures`, or `DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.

@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.utils import get_tags
 
 from skthermo._arrays import as_columns, as_floats
+from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, is_model
 
 
@@ -31,7 +32,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
                 f"{type(self.estimator).__name__}"
             )
         self.n_targets_ = y.shape[1]
-        self.estimator_ = clone(self.estimator).fit(X[usable], self._as_target(y[usable]))
+        self.estimator_ = fit_outputs(self.estimator, X[usable], self._as_target(y[usable]))
         return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:

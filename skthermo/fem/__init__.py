@@ -1,5 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
+from skthermo.fem._bounds import Bounds, check_bounds
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -8,12 +9,12 @@ from skthermo.fem._protocol import (
     LocalModel,
     ModalModel,
 )
-from skthermo.fem._theta import check_bounds, check_theta
+from skthermo.fem._theta import check_theta
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, load_affine, probe
-from skthermo.fem.modal import LocalModes, mac, shape_jacobian, share_reordered
+from skthermo.fem.modal import LocalModes, mac, match_modes, shape_jacobian, share_reordered
 from skthermo.fem.sampling import add_noise, check_noise, evaluate, linearise, sample
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Bar",
     "BatchModel",
     "Beam",
+    "Bounds",
     "CallableModel",
     "DamageableModel",
     "DifferentiableModel",
@@ -42,6 +44,7 @@ __all__ = [
     "linearise",
     "load_affine",
     "mac",
+    "match_modes",
     "probe",
     "sample",
     "shape_jacobian",

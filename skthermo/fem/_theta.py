@@ -1,4 +1,4 @@
-"""Rows of parameter multipliers and their bounds."""
+"""Rows of parameter multipliers."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array, real_array
 
 ROWS_PER_CHUNK = 256
 """Largest number of samples solved together."""
@@ -58,7 +58,7 @@ def check_theta(
     names = list(parameter_names)
     if hasattr(theta, "columns") and list(theta.columns) != names:
         raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
-    values = as_floats(theta)
+    values = real_array(theta, "theta")
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(
@@ -75,49 +75,6 @@ def check_theta(
     if one_row and len(rows) != 1:
         raise ValueError(f"theta has {len(rows)} rows; expected one")
     return rows
-
-
-def check_bounds(bounds: ArrayLike, parameter_names: Sequence[str]) -> Array:
-    """Lowest and highest multiplier of every parameter.
-
-    Parameters
-    ----------
-    bounds : float or array-like of shape (n_parameters, 2)
-        A half-width (0.2 means 1 +- 20 %), or lowest and highest multipliers.
-    parameter_names : sequence of str
-        The parameters.
-
-    Returns
-    -------
-    ndarray of shape (n_parameters, 2)
-
-    Raises
-    ------
-    ValueError
-        If a half-width is not between 0 and 1, the shape is another, or a lowest multiplier is
-        not positive or not below the highest.
-
-    Examples
-    --------
-    >>> from skthermo.fem import check_bounds
-    >>> check_bounds(0.2, ["E_deck", "E_arch"])
-    array([[0.8, 1.2],
-           [0.8, 1.2]])
-    """
-    array = np.asarray(bounds, dtype=float)
-    if array.ndim == 0:
-        if not 0 < array < 1:
-            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
-        return np.tile([1 - array, 1 + array], (len(parameter_names), 1))
-    if array.shape != (len(parameter_names), 2):
-        raise ValueError(
-            f"bounds has shape {array.shape}; expected a half-width or ({len(parameter_names)}, 2), lowest "
-            f"and highest multipliers of {list(parameter_names)}"
-        )
-    for name, (lowest, highest) in zip(parameter_names, array, strict=True):
-        if not 0 < lowest < highest < np.inf:
-            raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
-    return array
 
 
 def warn_of_failures(theta: Array, solved: Array, *, stacklevel: int = 4) -> None:

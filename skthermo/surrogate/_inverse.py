@@ -14,7 +14,7 @@ from sklearn.utils import Bunch, check_random_state
 from skthermo._arrays import as_floats
 from skthermo._frames import column_names, frame_like
 from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
-from skthermo.fem import FEModel, add_noise, check_theta, evaluate
+from skthermo.fem import Bounds, FEModel, add_noise, check_theta, evaluate
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
 
@@ -34,8 +34,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Any regressor, between the logarithms of frequencies and of parameters, which are nearly linear in each
         other; both are standardised. One that takes a single output only is fitted once for each parameter. By
         default a small ``MLPRegressor``; see `paper_network` for the paper's.
-    bounds : float or array-like of shape (n_parameters, 2), default=0.3
-        Box of multipliers: a half-width, or lowest and highest of each parameter.
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+        Box of multipliers: a half-width, lowest and highest of each parameter, or a mapping that gives one or the
+        other for every parameter.
     n_samples : int, default=1000
         Number of simulations.
     noise : float or array-like of shape (n_modes,), default=0.0
@@ -96,7 +97,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     _parameter_constraints: dict = {
         "model": [HasMethods(["frequencies"]), None],
         "regressor": [HasMethods(["fit", "predict"]), None],
-        "bounds": [Real, "array-like"],
+        "bounds": [Real, "array-like", dict],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
         "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
@@ -110,7 +111,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         model: FEModel | None = None,
         regressor: BaseEstimator | None = None,
         *,
-        bounds: ArrayLike = 0.3,
+        bounds: Bounds = 0.3,
         n_samples: int = 1000,
         noise: ArrayLike = 0.0,
         reduce: bool | float = False,

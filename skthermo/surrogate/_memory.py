@@ -6,18 +6,17 @@ from typing import Any
 
 import joblib
 from joblib import Memory
-from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
 from skthermo._io import lock
-from skthermo.fem import FEModel, sample, share_reordered
+from skthermo.fem import Bounds, FEModel, check_bounds, sample, share_reordered
 
 ORDER_CHECKS = 256
 
 
 def remembered_simulations(
-    memory: str | Memory | None, model: FEModel, bounds: ArrayLike, n_samples: int, tol: float | None, *, n_jobs, seed
+    memory: str | Memory | None, model: FEModel, bounds: Bounds, n_samples: int, tol: float | None, *, n_jobs, seed
 ) -> tuple[Bunch, float]:
     """`simulations`, read from a memory if they are there; processes that want the same ones wait for the first.
 
@@ -26,7 +25,7 @@ def remembered_simulations(
     ValueError
         If the model cannot be recognised when it comes again.
     """
-    memory = check_memory(memory)
+    memory, bounds = check_memory(memory), check_bounds(bounds, model.parameter_names)
     if memory.location is None:
         return simulations("", model, bounds, n_samples, tol, n_jobs, seed)
     try:

@@ -6,13 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import (
-    InvalidParameterError,
     check_array,
     check_is_fitted,
     clone_sharing_models,
@@ -101,8 +100,10 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         self.targets_ = Standardiser.fitted(y, log=is_positive(y))
         regressor = default_network() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
+        targets = self.targets_.transform(y)
+        targets = targets[:, 0] if self.n_parameters_ == 1 else targets
         with single_blas_thread():
-            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), self.targets_.transform(y))
+            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets)
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         """Multipliers and their standard deviations, (n_samples, n_parameters) each; NaN where not known or asked."""
@@ -139,40 +140,3 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         tags.input_tags.allow_nan = True
         tags.target_tags.multi_output = True
         return tags
-
-
-def fit_outputs(regressor: BaseEstimator, X: Array, y: Array) -> BaseEstimator:
-    """The regressor fitted to all outputs, or a clone of it to each where it takes one only.
-
-    scikit-learn's tag of multiple outputs does not tell them apart: it is False for ``MLPRegressor``.
-    """
-    if y.shape[1] == 1:
-        return regressor.fit(X, y[:, 0])
-    try:
-        return clone(regressor).fit(X, y)
-    except InvalidParameterError:
-        raise
-    except Exception:  # another cause than the number of outputs is raised again here
-        return MultiOutputRegressor(regressor).fit(X, y)
-
-
-def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
-    """Means and standard deviations of all outputs.
-
-    Raises
-    ------
-    ValueError
-        If the regressor has no standard deviations.
-    """
-    if isinstance(regressor, MultiOutputRegressor):
-        parts = [predict_with_std(part, X) for part in regressor.estimators_]
-        means, deviations = (np.hstack(columns) for columns in zip(*parts, strict=True))
-        return means, deviations
-    try:
-        means, deviations = regressor.predict(X, return_std=True)
-    except TypeError as error:
-        raise ValueError(
-            f"{regressor!r} gives no standard deviations; expected a regressor whose predict takes return_std, such as "
-            "GaussianProcessRegressor or BayesianRidge"
-        ) from error
-    return as_columns(means), as_columns(deviations)

@@ -22,7 +22,7 @@ from skthermo._validation import (
     is_model,
     validate_data,
 )
-from skthermo.fem import FEModel, check_bounds
+from skthermo.fem import Bounds, FEModel, check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
@@ -48,8 +48,9 @@ class ModelUpdater(BaseEstimator):
     ----------
     model : FE model
         Column j of the frequencies is its mode j. Shapes need an `AffineModel`.
-    bounds : float or array-like of shape (n_parameters, 2), default=0.3
-        Box of multipliers that holds 1: a half-width, or lowest and highest of each parameter.
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+        Box of multipliers that holds 1: a half-width, lowest and highest of each parameter, or a mapping that gives
+        one or the other for every parameter.
     shape_weight : float or array-like of shape (n_modes,), default=0.0
         Weights v. With 0, measured shapes only tell which mode is which.
     n_starts : int, default=1
@@ -133,7 +134,7 @@ class ModelUpdater(BaseEstimator):
 
     _parameter_constraints: dict = {
         "model": [HasMethods(["frequencies"])],
-        "bounds": [Real, "array-like"],
+        "bounds": [Real, "array-like", dict],
         "shape_weight": [Interval(Real, 0, None, closed="left"), "array-like"],
         "n_starts": [Interval(Integral, 1, None, closed="left")],
         "method": [StrOptions({"least_squares", "lbfgs"})],
@@ -147,7 +148,7 @@ class ModelUpdater(BaseEstimator):
         self,
         model: FEModel,
         *,
-        bounds: ArrayLike = 0.3,
+        bounds: Bounds = 0.3,
         shape_weight: ArrayLike = 0.0,
         n_starts: int = 1,
         method: Literal["least_squares", "lbfgs"] = "least_squares",

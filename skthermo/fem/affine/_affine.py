@@ -1,11 +1,12 @@
 """FE models whose matrices are affine in products of the parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import RandomState
+from skthermo.fem._bounds import Bounds
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
@@ -172,12 +173,12 @@ class AffineModel(AffineBase):
         row = check_theta(theta, self.parameter_names, one_row=True)
         return self._twin(self._core.rescaled(row))
 
-    def reduced(self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
+    def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
         """A small model that gives the same frequencies within a box, to a stated error.
 
         Parameters
         ----------
-        bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
             Box of multipliers: a half-width, or lowest and highest of each parameter.
         tol : float, default=1e-5
             Largest relative error of a frequency.
@@ -196,6 +197,13 @@ class AffineModel(AffineBase):
         parameters, degrees, modes = (f"{n} {noun}{'s' * (n != 1)}" for n, noun in counts)
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
+
+    def _changed(
+        self, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+    ) -> "AffineModel":
+        twin = self._twin(change(self._core))
+        twin._parameter_names = names or self._parameter_names
+        return twin
 
     @property
     def _full_core(self) -> AffineCore:

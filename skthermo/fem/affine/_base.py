@@ -2,7 +2,7 @@
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads
 from skthermo.fem._theta import check_theta, warn_of_failures
 from skthermo.fem.affine._core import AffineCore
+from skthermo.fem.affine._read_terms import check_different, check_modes
 from skthermo.fem.modal import LocalModes
 
 Model = TypeVar("Model", bound="AffineBase")
@@ -190,6 +191,69 @@ class AffineBase(ABC):
         core = self._full_core
         return csc_array(core.stiffness.assemble(row)[0]), csc_array(core.mass.assemble(row)[0])
 
+    def with_modes(self: Model, modes: Sequence[int]) -> Model:
+        """A new model whose columns are other modes.
+
+        Parameters
+        ----------
+        modes : sequence of int
+            Ranks of modes of the healthy nominal model, the lowest being 0, in the order of the new columns.
+            `match_modes` proposes them. They need not be among the present columns.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            With these modes as columns. A reduced model is checked anew, and its basis grows if it must.
+
+        Raises
+        ------
+        ValueError
+            If a mode is named twice, is not an integer, or is beyond those that the model has.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss()
+        >>> truss.frequencies([1.0, 1.0, 1.0, 1.0])[0, :4].round(1)
+        array([ 7.5, 27.5, 37.8, 62.6])
+        >>> truss.with_modes([0, 1, 3, 2]).frequencies([1.0, 1.0, 1.0, 1.0]).round(1)
+        array([[ 7.5, 27.5, 62.6, 37.8]])
+        """
+        ranks = check_modes(modes, self._full_core.available)
+        return self._changed(lambda core: core.with_modes(ranks))
+
+    def with_parameters(self: Model, names: Sequence[str]) -> Model:
+        """A new model of fewer parameters; the others stay at their present values.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Parameters that remain, in the order of the new columns of theta.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            With the same modes and damage groups.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown or repeats, or there is none.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss().with_parameters(["top", "bottom"])
+        >>> truss.parameter_names
+        ('top', 'bottom')
+        """
+        kept = check_different(names)
+        unknown = [name for name in kept if name not in self._parameter_names]
+        if unknown:
+            raise ValueError(f"parameters {unknown} are unknown; expected some of {list(self._parameter_names)}")
+        columns = np.array([self._parameter_names.index(name) for name in kept])
+        return self._changed(lambda core: core.with_parameters(columns), kept)
+
     def quiet(self: Model) -> Model:
         """The same model without warnings.
 
@@ -226,6 +290,12 @@ class AffineBase(ABC):
     @abstractmethod
     def rescaled(self: Model, theta: ArrayLike) -> Model:
         """A new model whose nominal state, theta = 1, is this model at a given theta."""
+
+    @abstractmethod
+    def _changed(
+        self: Model, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+    ) -> Model:
+        """A model like this one whose full core is changed, with the parameters of these names."""
 
     @property
     @abstractmethod

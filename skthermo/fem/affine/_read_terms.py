@@ -142,6 +142,19 @@ def check_n_modes(n_modes: int) -> int:
     return n_modes
 
 
+def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:
+    """Checks that ranks of modes are different integers from 0 to below the number available."""
+    ranks = np.asarray(modes)
+    if ranks.ndim != 1 or not ranks.size or not np.issubdtype(ranks.dtype, np.integer):
+        raise ValueError(f"modes is {modes!r}; expected ranks of modes, such as [0, 1, 3, 2], the lowest being 0")
+    outside = ranks[(ranks < 0) | (ranks >= available)]
+    if outside.size:
+        raise ValueError(f"mode {outside[0]} is none of the model's; expected 0 to {available - 1}")
+    if len(np.unique(ranks)) < len(ranks):
+        raise ValueError(f"modes {ranks.tolist()} repeat; expected each once")
+    return ranks.astype(np.intp)
+
+
 def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
     """How often each parameter stands in each key, (n_terms, n_parameters)."""
     return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)

@@ -1,12 +1,13 @@
 """FE models on a small basis of their own mode shapes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, RandomState, as_random_state
-from skthermo.fem._theta import check_bounds, check_theta
+from skthermo.fem._bounds import Bounds, check_bounds
+from skthermo.fem._theta import check_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._basis import Basis, grow_basis, projected_core
 from skthermo.fem.affine._core import AffineCore
@@ -23,7 +24,7 @@ class ReducedModel(AffineBase):
     ----------
     full : AffineModel
         The model to reduce.
-    bounds : float or array-like of shape (n_parameters, 2), default=0.3
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
         Box of multipliers in which the error is controlled. Outside it a warning is given.
     tol : float, default=1e-5
         Largest relative error of a frequency. The basis grows until the errors at fresh
@@ -77,7 +78,7 @@ class ReducedModel(AffineBase):
     def __init__(
         self,
         full: AffineBase,
-        bounds: ArrayLike = 0.3,
+        bounds: Bounds = 0.3,
         *,
         tol: float = 1e-5,
         random_state: RandomState = None,
@@ -108,10 +109,7 @@ class ReducedModel(AffineBase):
         ReducedModel
             Checked against the damaged full model, to the same tolerance.
         """
-        twin = self._twin(self._core)
-        twin._full = self._full.damaged(damage)
-        twin._use(grow_basis(twin._full._core, self._bounds, self._tol, as_random_state(0), start=self._basis))
-        return twin
+        return self._regrown(self._full.damaged(damage), self._bounds)
 
     def rescaled(self, theta: ArrayLike) -> "ReducedModel":
         """A new model on the same basis whose nominal state, theta = 1, is this model at a given theta.
@@ -133,14 +131,12 @@ class ReducedModel(AffineBase):
         twin.check_points_, twin.snapshot_points_ = self.check_points_ / row, self.snapshot_points_ / row
         return twin
 
-    def reduced(
-        self, bounds: ArrayLike = 0.3, *, tol: float = 1e-5, random_state: RandomState = None
-    ) -> "ReducedModel":
+    def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> "ReducedModel":
         """The full model, reduced for another box.
 
         Parameters
         ----------
-        bounds : float or array-like of shape (n_parameters, 2), default=0.3
+        bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
             Box of multipliers: a half-width, or lowest and highest of each parameter.
         tol : float, default=1e-5
             Largest relative error of a frequency.
@@ -166,6 +162,19 @@ class ReducedModel(AffineBase):
         twin._full, twin._bounds, twin._tol, twin._basis = self._full, self._bounds, self._tol, self._basis
         twin.error_, twin.check_points_, twin.snapshot_points_ = self.error_, self.check_points_, self.snapshot_points_
         twin._is_quiet = self._is_quiet
+        return twin
+
+    def _changed(
+        self, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+    ) -> "ReducedModel":
+        kept = [self._parameter_names.index(name) for name in names or self._parameter_names]
+        return self._regrown(self._full._changed(change, names), self._bounds[kept])
+
+    def _regrown(self, full: AffineBase, bounds: Array) -> "ReducedModel":
+        """A reduced model of another full one, whose basis begins with this one's."""
+        twin = self._twin(self._core)
+        twin._full, twin._bounds, twin._parameter_names = full, bounds, full.parameter_names
+        twin._use(grow_basis(full._core, bounds, self._tol, as_random_state(0), start=self._basis))
         return twin
 
     def _use(self, basis: Basis) -> None:

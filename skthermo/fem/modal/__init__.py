@@ -3,6 +3,7 @@
 from skthermo.fem.modal._dense import EigenSolver, dense_solver, hertz
 from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
 from skthermo.fem.modal._mac import mac
+from skthermo.fem.modal._matching import match_modes
 from skthermo.fem.modal._reordering import share_reordered
 from skthermo.fem.modal._shift_invert import ShiftInvertSolver, factorise
 from skthermo.fem.modal._stability import check_supported, count_modes
@@ -18,6 +19,7 @@ __all__ = [
     "factorise",
     "hertz",
     "mac",
+    "match_modes",
     "may_be_missed",
     "pair_modes",
     "repeated_modes",

@@ -4,12 +4,11 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from skthermo._arrays import Array, RandomState, as_random_state
+from skthermo.fem._bounds import Bounds, check_bounds
 from skthermo.fem._protocol import FEModel
-from skthermo.fem._theta import check_bounds
 from skthermo.fem.sampling._evaluate import evaluate
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 def sample(
     model: FEModel,
-    bounds: ArrayLike = 0.3,
+    bounds: Bounds = 0.3,
     n_samples: int = 1000,
     *,
     method: Literal["uniform", "lhs", "sobol"] = "uniform",
@@ -32,8 +31,9 @@ def sample(
     ----------
     model : FE model
         Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
-    bounds : float or array-like of shape (n_parameters, 2), default=0.3
-        A half-width (0.2 means 1 +- 20 %), or lowest and highest multipliers.
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+        A half-width (0.2 means 1 +- 20 %), lowest and highest multipliers, or a mapping that gives one or the
+        other for every parameter.
     n_samples : int, default=1000
         Number of rows.
     method : {"uniform", "lhs", "sobol"}, default="uniform"

@@ -1,0 +1,87 @@
+"""Bounds on parameter multipliers."""
+
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, real_array
+
+Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
+
+
+def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
+    """Lowest and highest multiplier of every parameter.
+
+    Parameters
+    ----------
+    bounds : float, array-like of shape (n_parameters, 2), or mapping of str to float or pair of floats
+        A half-width (0.2 means 1 +- 20 %), lowest and highest multipliers, or a mapping that gives
+        one or the other for every parameter.
+    parameter_names : sequence of str
+        The parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_parameters, 2)
+
+    Raises
+    ------
+    ValueError
+        If a half-width is not between 0 and 1, the shape is another, a lowest multiplier is
+        not positive or not below the highest, or a mapping leaves out a parameter or names an unknown one.
+
+    Examples
+    --------
+    >>> from skthermo.fem import check_bounds
+    >>> check_bounds(0.2, ["E_deck", "E_arch"])
+    array([[0.8, 1.2],
+           [0.8, 1.2]])
+    >>> check_bounds({"E_arch": (0.9, 1.5), "E_deck": 0.3}, ["E_deck", "E_arch"])
+    array([[0.7, 1.3],
+           [0.9, 1.5]])
+    """
+    names = list(parameter_names)
+    if isinstance(bounds, Mapping):
+        widths = by_parameter(bounds, names, "bounds")
+        return np.vstack([check_bounds(_pair(width, name), [name]) for name, width in zip(names, widths, strict=True)])
+    array = real_array(bounds, "bounds")
+    if array.ndim == 0:
+        if not 0 < array < 1:
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
+        return np.tile([1 - array, 1 + array], (len(names), 1))
+    if array.shape != (len(names), 2):
+        raise ValueError(
+            f"bounds has shape {array.shape}; expected a half-width, ({len(names)}, 2), lowest and highest multipliers "
+            f"of {names}, or a mapping of these names"
+        )
+    for name, (lowest, highest) in zip(names, array, strict=True):
+        if not 0 < lowest < highest < np.inf:
+            raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
+    return array
+
+
+def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
+    """Values of a mapping in the order of the parameters; each parameter must be there, and no other."""
+    unknown = [name for name in values if name not in parameter_names]
+    missing = [name for name in parameter_names if name not in values]
+    if unknown or missing:
+        problem = f"names {unknown}" if unknown else f"leaves out {missing}"
+        raise ValueError(f"{what} {problem}; expected each of the parameters {list(parameter_names)}")
+    return [values[name] for name in parameter_names]
+
+
+def _pair(width: Any, name: str) -> Any:
+    """A half-width, or lowest and highest as the only row."""
+    if np.ndim(width) == 0:
+        if not (isinstance(width, Real) and 0 < width < 1):
+            raise ValueError(
+                f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
+                "highest)"
+            )
+        return width
+    if np.shape(width) != (2,):
+        raise ValueError(f"bounds of parameter {name!r} are {width!r}; expected a half-width or (lowest, highest)")
+    return [width]
