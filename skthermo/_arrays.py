@@ -1,5 +1,6 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
+Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
 RandomState: TypeAlias = int | np.random.RandomState | None
 
 

@@ -1,6 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
-from skthermo.fem._bounds import Bounds, check_bounds
+from skthermo.fem._bounds import check_bounds
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -22,7 +22,6 @@ __all__ = [
     "Bar",
     "BatchModel",
     "Beam",
-    "Bounds",
     "CallableModel",
     "DamageableModel",
     "DifferentiableModel",

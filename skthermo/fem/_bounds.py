@@ -2,14 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, real_array
-
-Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
+from skthermo._arrays import Array, Bounds, real_array
 
 
 def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import Bounds, as_floats
 from skthermo._frames import column_names, frame_like
 from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
-from skthermo.fem import Bounds, FEModel, add_noise, check_theta, evaluate
+from skthermo.fem import FEModel, add_noise, check_theta, evaluate
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
 

@@ -9,8 +9,9 @@ from joblib import Memory
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
+from skthermo._arrays import Bounds
 from skthermo._io import lock
-from skthermo.fem import Bounds, FEModel, check_bounds, sample, share_reordered
+from skthermo.fem import FEModel, check_bounds, sample, share_reordered
 
 ORDER_CHECKS = 256
 

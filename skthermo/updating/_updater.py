@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import Bounds, as_floats
 from skthermo._frames import column_names
 from skthermo._validation import (
     HasMethods,
@@ -22,7 +22,7 @@ from skthermo._validation import (
     is_model,
     validate_data,
 )
-from skthermo.fem import Bounds, FEModel, check_bounds
+from skthermo.fem import FEModel, check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise

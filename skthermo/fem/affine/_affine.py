@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import RandomState
-from skthermo.fem._bounds import Bounds
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore

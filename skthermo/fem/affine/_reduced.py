@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, RandomState, as_random_state
-from skthermo.fem._bounds import Bounds, check_bounds
+from skthermo._arrays import Array, Bounds, RandomState, as_random_state
+from skthermo.fem._bounds import check_bounds
 from skthermo.fem._theta import check_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._basis import Basis, grow_basis, projected_core

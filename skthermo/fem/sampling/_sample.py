@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from skthermo._arrays import Array, RandomState, as_random_state
-from skthermo.fem._bounds import Bounds, check_bounds
+from skthermo._arrays import Array, Bounds, RandomState, as_random_state
+from skthermo.fem._bounds import check_bounds
 from skthermo.fem._protocol import FEModel
 from skthermo.fem.sampling._evaluate import evaluate
 
