@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import RandomState
+from skthermo._arrays import Bounds, RandomState
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
