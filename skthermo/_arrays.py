@@ -21,12 +21,12 @@ def real_array(values: Any, what: str) -> Array:
     ValueError
         Names what was given.
     """
+    if values is None:
+        raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if np.iscomplexobj(values):
         raise ValueError(f"{what} is complex; expected real numbers")
-    if isinstance(values, np.ma.MaskedArray):
-        values = values.astype(float).filled(np.nan)
     try:
         return as_floats(values)
     except (TypeError, ValueError) as error:
@@ -34,10 +34,36 @@ def real_array(values: Any, what: str) -> Array:
 
 
 def as_floats(values: ArrayLike) -> Array:
-    """An array of floats; missing values of a nullable pandas column become NaN."""
-    if hasattr(values, "iloc"):  # a pandas frame or series
-        return values.to_numpy(dtype=float, na_value=np.nan)
-    return np.asarray(values, dtype=float)
+    """An array of floats; values that are masked or missing become NaN.
+
+    Raises
+    ------
+    ValueError
+        If they are complex.
+    """
+    values = without_mask(values)
+    is_pandas = hasattr(values, "iloc")
+    array = values if is_pandas else np.asarray(values)
+    if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):
+        raise ValueError("the values are complex; expected real numbers")
+    try:
+        return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
+    except TypeError:  # pandas' NA among objects is no float
+        return without_missing(np.asarray(array, dtype=object)).astype(float)
+
+
+def without_mask(values: Any) -> Any:
+    """A masked array as an array with NaN where it is masked; anything else as it is."""
+    if not isinstance(values, np.ma.MaskedArray):
+        return values
+    return (values if values.dtype.kind in "fc" else values.astype(float)).filled(np.nan)
+
+
+def without_missing(objects: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Objects with NaN in place of None and of pandas' NA."""
+    from pandas import isna
+
+    return np.where(isna(objects), np.nan, objects)
 
 
 def as_columns(values: ArrayLike) -> Array:
@@ -52,7 +78,18 @@ def as_dense(matrix: Matrix) -> Array:
 
 
 def as_random_state(seed: Any) -> np.random.RandomState:
-    """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas."""
+    """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas.
+
+    Raises
+    ------
+    ValueError
+        If the seed is something else, such as a numpy Generator.
+    """
     from sklearn.utils import check_random_state
 
-    return check_random_state(seed)
+    try:
+        return check_random_state(seed)
+    except ValueError as error:
+        raise ValueError(
+            f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState"
+        ) from error

@@ -1,6 +1,6 @@
 """Tables of records: pandas frames in and out, and checks of rows and columns."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,20 @@ from skthermo._arrays import as_floats
 from skthermo._validation import _num_samples
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
+ABSOLUTE_ZERO = -273.15  # degrees Celsius
 
 
-def frame_like(X: Any, values: NDArray, columns: Sequence[str]) -> Any:
-    """Values as a frame with X's index where X is a frame, else as they are."""
+def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
+    """Values as a frame with X's index where X is a frame, else as they are; by default with X's columns too."""
     if not isinstance(X, pd.DataFrame):
         return values
-    return pd.DataFrame(values, index=X.index, columns=list(columns), copy=False)
+    return pd.DataFrame(values, index=X.index, columns=X.columns if columns is None else list(columns), copy=False)
 
 
-def column_names(X: Any, default: str) -> list[str]:
+def column_names(X: Any, default: str) -> list[Hashable]:
     """Names of X's columns, for messages and outputs: a frame's own, else default1, default2, ..."""
-    if isinstance(X, pd.DataFrame):
-        return [str(name) for name in X.columns]
+    if hasattr(X, "columns"):
+        return list(X.columns)
     return [f"{default}{i + 1}" for i in range(np.shape(X)[1])]
 
 
@@ -46,6 +47,37 @@ def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
             )
 
 
+def check_temperatures(T: ArrayLike) -> None:
+    """Refuse what is not degrees Celsius: kelvin, and numbers that stand for a missing value, such as -999.
+
+    Numbers above 100 or below -80 stand for missing values if they are more than 100 away from the rest of their
+    column; so does any number below absolute zero.
+
+    Raises
+    ------
+    ValueError
+        Names the column.
+    """
+    for name, column in zip(column_names(T, PREFIXES["temperature"]), as_floats(T).T, strict=True):
+        values, counts = np.unique(column[np.isfinite(column)], return_counts=True)
+        if not values.size:
+            continue
+        gap = np.diff(values) > 100
+        above = np.logical_or.accumulate(gap & (values[1:] > 100))
+        below = np.logical_or.accumulate((gap & (values[:-1] < -80))[::-1])[::-1]
+        marker = (values < ABSOLUTE_ZERO) | np.append(False, above) | np.append(below, False)
+        if (values > 150).all():
+            raise ValueError(
+                f"temperature column {name!r} lies between {values[0]:g} and {values[-1]:g}, all above 150: kelvin? "
+                "expected degrees Celsius"
+            )
+        if marker.any():
+            raise ValueError(
+                f"temperature column {name!r} is {values[marker][0]:g} in {counts[marker][0]} of {len(column)} rows; "
+                "expected degrees Celsius, and NaN where a value is missing"
+            )
+
+
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     """Refuse two tables of different length or, where both are frames, of different index.
 
@@ -58,7 +90,7 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
         raise ValueError(
             f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
         )
-    if not isinstance(X, pd.DataFrame) or not isinstance(y, pd.DataFrame | pd.Series) or X.index.equals(y.index):
+    if not all(isinstance(table, pd.DataFrame | pd.Series) for table in (X, y)) or X.index.equals(y.index):
         return
     for row, (left, right) in enumerate(zip(X.index, y.index, strict=True)):
         if left != right:

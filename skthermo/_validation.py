@@ -1,15 +1,22 @@
 """The one import point for scikit-learn's private helpers; FE models and seeds inside estimators."""
 
+import sys
+import warnings
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import sklearn.utils
+import sklearn.utils.validation
 from sklearn.base import BaseEstimator, _fit_context, clone
 from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
-from sklearn.utils import check_array, check_random_state
+from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval, InvalidParameterError, StrOptions
-from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, validate_data
+from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted
+
+from skthermo._arrays import without_mask, without_missing
 
 __all__ = [
     "BaseSearchCV",
@@ -29,7 +36,36 @@ __all__ = [
     "seed_parts",
     "seeded",
     "validate_data",
+    "warn_user",
+    "with_nan",
 ]
+
+
+def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
+    """scikit-learn's `validate_data`; what is masked or missing in X is NaN."""
+    return sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
+
+
+def check_array(values: Any, **options: Any) -> Any:
+    """scikit-learn's `check_array`; what is masked or missing is NaN."""
+    return sklearn.utils.check_array(with_nan(values), **options)
+
+
+def warn_user(message: str) -> None:
+    """Warn at the line of the user's own code."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in ("skthermo", "sklearn", "joblib"):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, UserWarning, stacklevel=level)
+
+
+def with_nan(X: Any) -> Any:
+    """NaN in place of masked values, and of None and pandas' NA among objects; anything else as it is."""
+    if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
+        return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
+    if isinstance(X, np.ndarray) and X.dtype == object:
+        return without_missing(np.asarray(X))
+    return without_mask(X)
 
 
 def is_model(candidate: Any) -> bool:

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like
 from skthermo._validation import (
     HasMethods,
@@ -89,7 +89,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             ``method="scale"``, a mean or a reference is zero.
         """
         F = self._validated(X, reset=True)
-        check_columns(frame_like(X, F, self.get_feature_names_out()), "frequency")
+        check_columns(frame_like(X, F), "frequency")
         self.mean_ = np.nanmean(F, axis=0)
         self.reference_ = self._read_reference(F.shape[1])
         if self.method == "scale":
@@ -114,8 +114,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         F = self._validated(X, reset=False)
         if self.method == "scale":
-            return frame_like(X, F / self.mean_ * self.reference_, self.get_feature_names_out())
-        return frame_like(X, F - self.mean_ + self.reference_, self.get_feature_names_out())
+            return frame_like(X, F / self.mean_ * self.reference_)
+        return frame_like(X, F - self.mean_ + self.reference_)
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Shift or scale the model's frequencies back to the measured ones.
@@ -130,15 +130,15 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         ndarray or DataFrame of shape (n_samples, n_modes)
         """
         check_is_fitted(self)
-        if isinstance(X, pd.DataFrame) and hasattr(self, "feature_names_in_"):
+        if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):
             F = self._validated(X, reset=False)
         else:  # frequencies of a model have no column names
             F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
         if self.method == "scale":
-            return frame_like(X, F / self.reference_ * self.mean_, self.get_feature_names_out())
-        return frame_like(X, F - self.reference_ + self.mean_, self.get_feature_names_out())
+            return frame_like(X, F / self.reference_ * self.mean_)
+        return frame_like(X, F - self.reference_ + self.mean_)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
@@ -149,7 +149,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if is_model(self.reference):
             reference = as_floats(self.reference.frequencies(np.ones((1, len(self.reference.parameter_names)))))[0]
         else:
-            reference = as_floats(self.reference)
+            reference = real_array(self.reference, "reference")
         if reference.shape != (n_modes,) or not np.isfinite(reference).all():
             raise ValueError(
                 f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "

@@ -15,6 +15,7 @@ from skthermo._validation import (
     check_array,
     check_is_fitted,
     validate_data,
+    with_nan,
 )
 from skthermo.preprocessing._nearest import Donors, row_patterns
 
@@ -126,6 +127,7 @@ class KNNGapImputer(KNNImputer):
         ValueError
             If a column has no value, unless ``keep_empty_features=True``.
         """
+        X = with_nan(X)
         super().fit(X, y)
         kept = set(super().get_feature_names_out())
         self.is_empty_ = np.array([name not in kept for name in _check_feature_names_in(self, None)])
@@ -154,15 +156,16 @@ class KNNGapImputer(KNNImputer):
             A frame gives a frame on its own index.
         """
         check_is_fitted(self)
-        values = None
+        X, values = with_nan(X), None
+        names = [*getattr(X, "columns", ()), *self.get_feature_names_out()[self.n_features_in_ :]]
         if self.donors_ is not None:
             values = validate_data(self, X, dtype=FLOATS, ensure_all_finite="allow-nan", reset=False)
         if values is None or not self.donors_.trees_are_faster(np.isnan(values)):
-            return frame_like(X, super().transform(X), self.get_feature_names_out())
+            return frame_like(X, np.asarray(super().transform(X)), names)
         filled = self._filled(values)
         if self.add_indicator:
             filled = np.hstack([filled, self.indicator_.transform(np.isnan(values))])
-        return frame_like(X, filled, self.get_feature_names_out())
+        return frame_like(X, filled, names)
 
     def _filled(self, values: NDArray) -> NDArray:
         """Fill each missing column of rows with the same missing columns with means of their nearest donors."""

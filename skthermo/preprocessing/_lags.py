@@ -1,6 +1,6 @@
 """Earlier temperatures as additional columns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal
@@ -19,9 +19,13 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo.preprocessing._stamps import as_duration, as_stamps
 
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row
+MOST_LAGS = 10_000  # or as many as there are rows
+MOST_BYTES = 16 * 2**30
+FARTHEST = np.timedelta64(100 * 365, "D")
 
 
 class LagFeatures(TransformerMixin, BaseEstimator):
@@ -45,12 +49,16 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     ----------
     lags_ : list of int
         Lags in the order of each sensor's columns.
-    freq_ : Timedelta or None
+    freq_ : numpy.timedelta64 or None
         Length of one lag; None where rows are consecutive.
-    tolerance_ : Timedelta or None
+    tolerance_ : numpy.timedelta64 or None
         How much older the record for a lag may be; None where rows are consecutive.
-    history_ : DataFrame or None
+    history_ : ndarray of shape (n_samples, n_sensors) or None
         Records of `fit`, to which lags of `transform` reach back; None where rows are consecutive.
+    stamps_ : ndarray of datetime64 or None
+        Their stamps, in UTC where they have a time zone.
+    time_zone_ : str or None
+        Time zone of the stamps.
     n_features_in_ : int
         Number of sensors.
     feature_names_in_ : ndarray of str
@@ -59,7 +67,8 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     Notes
     -----
     On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of
-    `fit` are not used in `transform`.
+    `fit` are not used in `transform`. An index of periods, or of other objects that are stamps, is taken as a
+    DatetimeIndex, a period as its start.
 
     On a DatetimeIndex, lag k is the last record at or before t - k freq, or NaN if that record is older
     than the tolerance. Records of `fit` and of `transform` are searched together; for a stamp in both, the
@@ -123,12 +132,15 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the lags are not different non-negative integers; if ``freq`` or ``tolerance`` is given
-            without a DatetimeIndex, or is not positive; if a stamp is missing or occurs twice.
+            If the lags are not different non-negative integers; if they are more than 10,000 and more than the
+            rows, reach back more than 100 years or give a result of more than 16 GiB; if ``freq`` or
+            ``tolerance`` is given without a DatetimeIndex, is not positive or has no fixed length, as a month;
+            if a stamp is missing or occurs twice; if the index holds durations, or stamps as text.
         """
         values = self._validated(X, reset=True)
-        self.lags_ = _read_lags(self.lags)
-        self.freq_ = self.tolerance_ = self.history_ = None
+        self.lags_ = _read_lags(self.lags, len(values))
+        self._check_size(values)
+        self.freq_ = self.tolerance_ = self.history_ = self.stamps_ = self.time_zone_ = None
         stamps = _stamps(X)
         if stamps is None:
             for name in ("freq", "tolerance"):
@@ -138,11 +150,17 @@ class LagFeatures(TransformerMixin, BaseEstimator):
                         f"expected a frame on one, or {name}=None"
                     )
         else:
-            self.freq_ = _most_frequent_step(stamps) if self.freq is None else _duration(self.freq, "freq")
+            self.freq_ = _most_frequent_step(stamps) if self.freq is None else as_duration(self.freq, "freq")
             self.tolerance_ = (
-                DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else _duration(self.tolerance, "tolerance")
+                DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else as_duration(self.tolerance, "tolerance")
             )
-            self.history_ = frame_like(X, values.copy(), _check_feature_names_in(self, None))
+            if max(self.lags_) > FARTHEST / self.freq_:
+                raise ValueError(
+                    f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
+                )
+            self.history_ = values.copy()
+            self.stamps_ = _nanoseconds(stamps).view("datetime64[ns]")
+            self.time_zone_ = _time_zone(stamps)
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
@@ -161,17 +179,19 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the number or names of sensors, or the kind of index, differ from `fit`.
+            If the number or names of sensors, or the kind of index, differ from `fit`; if the result would
+            take more than 16 GiB.
         """
         check_is_fitted(self)
         values = self._validated(X, reset=False)
+        self._check_size(values)
         stamps = _stamps(X)
         if (stamps is None) != (self.freq_ is None):
             kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
         lagged = self._by_row(values, self.lags_) if stamps is None else self._by_time(stamps, values)
-        return frame_like(X, lagged, self.get_feature_names_out())
+        return frame_like(X, lagged, self._lag_names(getattr(X, "columns", ())))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the columns: sensor_lag0, sensor_lag1, ...
@@ -186,8 +206,19 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         ndarray of str
         """
         check_is_fitted(self)
-        sensors = _check_feature_names_in(self, input_features)
-        return np.array([f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_], dtype=object)
+        return np.array(self._lag_names(_check_feature_names_in(self, input_features)), dtype=object)
+
+    def _lag_names(self, sensors: Iterable[Any]) -> list[str]:
+        return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
+
+    def _check_size(self, values: NDArray) -> None:
+        size = values.nbytes * len(self.lags_)
+        if size > MOST_BYTES:
+            raise ValueError(
+                f"{len(self.lags_)} lags of {values.shape[0]} rows and {values.shape[1]} sensors take "
+                f"{size / 2**30:.0f} GiB; expected at most {MOST_BYTES / 2**30:.0f} GiB: fewer lags, or fewer rows at "
+                "a time"
+            )
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
@@ -202,12 +233,11 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         return lagged.reshape(-1, n_rows).T
 
     def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> NDArray:
-        old_stamps, old_values = self.history_.index, self.history_.to_numpy()
-        if (old_stamps.tz is None) != (stamps.tz is None):
-            raise ValueError(f"X has stamps in time zone {stamps.tz}; expected {old_stamps.tz}, as in fit")
-        own = stamps.as_unit("ns").asi8
-        old = old_stamps.as_unit("ns").asi8
-        rows_per_lag = _rows_per_step(own, self.freq_.value)
+        if (self.time_zone_ is None) != (stamps.tz is None):
+            raise ValueError(f"X has stamps in time zone {_time_zone(stamps)}; expected {self.time_zone_}, as in fit")
+        own, old = _nanoseconds(stamps), self.stamps_.view(np.int64)
+        freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
+        rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
             return self._by_row(values, [lag * rows_per_lag for lag in self.lags_])
         only_old = ~np.isin(old, own)
@@ -216,13 +246,13 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         ascending = known[order]
         sources = []
         for lag in self.lags_:
-            wanted = own - lag * self.freq_.value
+            wanted = own - lag * freq
             at = np.searchsorted(ascending, wanted, side="right") - 1
-            stale = wanted - ascending[at] > self.tolerance_.value
+            stale = wanted - ascending[at] > tolerance
             before = at < 0
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        return _rows_by_lag(np.concatenate([old_values[only_old], values]), sources)
+        return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -248,19 +278,25 @@ def _rows_per_step(stamps: NDArray[np.int64], step: int) -> int | None:
     return int(step // steps[0]) if even else None
 
 
-def _read_lags(lags: Any) -> list[int]:
+def _read_lags(lags: Any, n_rows: int) -> list[int]:
+    count = lags if isinstance(lags, Integral) else len(lags)
+    if count > max(MOST_LAGS, n_rows):
+        raise ValueError(
+            f"lags are {count} for {n_rows} rows; expected at most {MOST_LAGS}, or as many as there are rows"
+        )
     if isinstance(lags, Integral):
         return list(range(lags))
     explicit = list(lags)
-    whole = all(isinstance(lag, Integral) and lag >= 0 for lag in explicit)
+    whole = all(isinstance(lag, Integral) and not isinstance(lag, bool) and lag >= 0 for lag in explicit)
     if not explicit or not whole or len(set(explicit)) < len(explicit):
         raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     return [int(lag) for lag in explicit]
 
 
 def _stamps(X: Any) -> pd.DatetimeIndex | None:
-    index = getattr(X, "index", None)
-    if not isinstance(index, pd.DatetimeIndex):
+    """Stamps of the rows, or None where rows have none and are consecutive."""
+    index = as_stamps(X.index) if isinstance(X, pd.DataFrame) else None
+    if index is None:
         return None
     if index.hasnans:
         raise ValueError(f"X has a missing stamp (NaT) in row {np.flatnonzero(index.isna())[0]}")
@@ -273,21 +309,17 @@ def _stamps(X: Any) -> pd.DatetimeIndex | None:
     return index
 
 
-def _most_frequent_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
-    steps = np.diff(np.sort(stamps.as_unit("ns").asi8))
+def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
+    steps = np.diff(np.sort(_nanoseconds(stamps)))
     if not steps.size:
         raise ValueError("X has 1 sample, whose stamp gives no step between records; expected freq, such as '1h'")
     lengths, counts = np.unique(steps, return_counts=True)
-    return pd.Timedelta(int(lengths[counts.argmax()]), unit="ns")
+    return np.timedelta64(lengths[counts.argmax()], "ns")
 
 
-def _duration(value: Any, name: str) -> pd.Timedelta:
-    numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
-    try:
-        duration = pd.Timedelta(numbered).as_unit("ns")
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{name} is {value!r}; expected a duration such as '1h'") from error
-    without_unit = isinstance(value, str) and not any(letter.isalpha() for letter in value)
-    if without_unit or duration.value < 0 or (name == "freq" and duration.value == 0):
-        raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
-    return duration
+def _nanoseconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
+    return stamps.as_unit("ns").asi8
+
+
+def _time_zone(stamps: pd.DatetimeIndex) -> str | None:
+    return None if stamps.tz is None else str(stamps.tz)

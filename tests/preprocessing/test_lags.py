@@ -75,7 +75,8 @@ def test_records_of_fit_are_the_history_of_transform():
 
 def test_history_holds_the_records_of_fit_and_only_where_lags_go_by_time():
     lags = LagFeatures(3).fit(T)
-    pd.testing.assert_frame_equal(lags.history_, T)
+    np.testing.assert_array_equal(lags.history_, T)
+    np.testing.assert_array_equal(lags.stamps_, T.index)
     assert lags.fit(T.to_numpy()).history_ is None
 
 
@@ -84,6 +85,11 @@ def test_history_is_a_copy():
     lags = LagFeatures(2, freq="1h").fit(pd.DataFrame(values, index=HOURS[:6], columns=["T1"], copy=False))
     values[:] = 99
     assert lags.transform(T[["T1"]].iloc[[6]])["T1_lag1"].item() == 5
+
+
+def test_old_names_of_units_still_serve():
+    assert LagFeatures(freq="2D").fit(T).freq_ == pd.Timedelta("2D")
+    assert LagFeatures(freq="1 days 2 hours").fit(T).freq_ == pd.Timedelta("26h")
 
 
 def test_a_new_value_at_a_known_stamp_replaces_the_old_one():
@@ -149,6 +155,49 @@ def test_set_output_and_single_precision():
     assert LagFeatures(2).fit_transform(T.to_numpy(dtype=np.float32)).dtype == np.float32
 
 
+OFFSETS = pd.Index([*HOURS[:-1].tz_localize("UTC"), HOURS[-1].tz_localize("Asia/Tokyo")], dtype=object)
+
+
+@pytest.mark.parametrize(
+    "index",
+    [HOURS.to_period("h"), pd.Index(HOURS.to_pydatetime(), dtype=object), HOURS.astype(object)],
+    ids=["periods", "datetimes", "timestamps"],
+)
+def test_other_indices_of_stamps_go_by_time(index):
+    rows = [0, 1, 2, 8, 9, 29]
+    expected = LagFeatures([0, 3], freq="1h").fit(T.iloc[rows])
+    lags = LagFeatures([0, 3], freq="1h").fit(T.set_axis(index).iloc[rows])
+    lagged = lags.transform(T.set_axis(index).iloc[10:20])
+    np.testing.assert_array_equal(lagged, expected.transform(T.iloc[10:20]))
+    assert lagged.index.equals(index[10:20])
+
+
+def test_stamps_of_arrow_go_by_time():
+    pytest.importorskip("pyarrow")
+    rows = [0, 1, 2, 8, 9, 29]
+    arrow = T.set_axis(HOURS.astype("timestamp[us][pyarrow]"))
+    expected = LagFeatures([0, 3], freq="1h").fit_transform(T.iloc[rows])
+    np.testing.assert_array_equal(LagFeatures([0, 3], freq="1h").fit_transform(arrow.iloc[rows]), expected)
+
+
+@pytest.mark.parametrize("index", [list("abc" * 10), range(30), np.arange(30) * 0.5], ids=["text", "range", "numbers"])
+def test_other_labels_are_rows(index):
+    np.testing.assert_array_equal(LagFeatures(2).fit_transform(T.set_axis(index)), LagFeatures(2).fit_transform(T))
+
+
+def test_columns_named_by_integers_keep_their_names():
+    lagged = LagFeatures(2).fit_transform(T.set_axis([3, 7], axis=1))
+    assert list(lagged.columns) == ["3_lag0", "3_lag1", "7_lag0", "7_lag1"]
+
+
+def test_results_that_no_memory_holds_are_refused():
+    one_row = np.zeros((1, 1))
+    many = np.broadcast_to(one_row, (3 * 10**6, 1))
+    assert LagFeatures(10_000).fit(one_row).transform(one_row).shape == (1, 10_000)
+    with pytest.raises(ValueError, match="10000 lags of 3000000 rows and 1 sensors take 224 GiB; expected at most 16"):
+        LagFeatures(10_000).fit(one_row).transform(many)
+
+
 @pytest.mark.parametrize(
     ("options", "X", "message"),
     [
@@ -164,6 +213,23 @@ def test_set_output_and_single_precision():
         ({"lags": 0}, T, "lags"),
         ({}, pd.concat([T, T.iloc[[3]]]), "1 duplicate stamps, the first 2025-01-01 03:00:00 in row 30"),
         ({}, T.set_axis([pd.NaT, *T.index[1:]]), r"missing stamp \(NaT\) in row 0"),
+        ({"freq": "MS"}, T, "freq is 'MS'; expected a duration of fixed length with its unit, such as '10min'"),
+        ({"freq": "M"}, T, "freq is 'M'; expected a duration of fixed length"),
+        ({"freq": "2YE"}, T, "freq is '2YE'; expected a duration of fixed length"),
+        ({"freq": pd.offsets.MonthBegin()}, T, "freq is <MonthBegin>; expected a duration of fixed length"),
+        ({"freq": np.timedelta64(1, "M")}, T, "expected a duration of fixed length"),
+        ({"freq": np.timedelta64("NaT")}, T, "freq is .*NaT.*; expected a .*duration"),
+        ({"tolerance": "MS"}, T, "tolerance is 'MS'; expected a duration of fixed length"),
+        ({"lags": 10**9}, T, "lags are 1000000000 for 30 rows; expected at most 10000, or as many as there are rows"),
+        ({"lags": range(10**6)}, T, "lags are 1000000 for 30 rows"),
+        ({"lags": [0, 10**6]}, T, "lags reach back 1000000 times 0 days 01:00:00; expected at most 100 years"),
+        ({"lags": [True, False]}, T, "expected a positive number or different non-negative integers"),
+        ({}, T.set_axis(HOURS - HOURS[0]), "X has an index of durations, the first 0 days 00:00:00; expected a Date"),
+        ({}, T.set_axis(HOURS.strftime("%Y-%m-%d %H:%M")), "stamps as text, the first '2025-01-01 00:00'; expected"),
+        ({}, T.set_index(HOURS.strftime("%d.%m.%Y %H:%M").astype(object)), "stamps as text"),
+        ({}, T.set_index([np.zeros(30), HOURS]), "stamps on one of the index levels"),
+        ({}, T.set_axis(OFFSETS), "stamps with several offsets from UTC .*utc=True"),
+        ({}, T.set_axis(pd.Index([None, *HOURS[1:].to_pydatetime()], dtype=object)), "missing stamp .NaT. in row 0"),
         ({}, T.iloc[[0]], "X has 1 sample, whose stamp gives no step"),
     ],
 )

@@ -1,0 +1,229 @@
+"""Records in every container: names, missing values, units, and files that keep fitted objects."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.svm import OneClassSVM
+
+from skthermo._arrays import as_floats, as_random_state, real_array
+from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.fem import add_noise
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.surrogate import TemperatureMapper
+
+HOURS = pd.date_range("2025-01-01", periods=60, freq="h")
+RECORDS = pd.DataFrame(
+    np.random.default_rng(0).normal([10, 4, 9], 0.1, (60, 3)), index=HOURS, columns=["T1", "f1", "f2"]
+)
+TRANSFORMERS = [
+    LagFeatures(2),
+    KNNGapImputer(),
+    BiasAligner(),
+    BiasAligner(method="scale"),
+    TemperatureCompensator(make_pipeline(LagFeatures(2), Ridge()), targets=[1, 2]),
+]
+DETECTORS = [MahalanobisDetector(), OutlierDetector(OneClassSVM())]
+each_transformer = pytest.mark.parametrize("estimator", TRANSFORMERS, ids=lambda one: type(one).__name__)
+each_estimator = pytest.mark.parametrize("estimator", TRANSFORMERS + DETECTORS, ids=lambda one: type(one).__name__)
+
+
+def output(estimator, X):
+    return getattr(estimator, "transform" if hasattr(estimator, "transform") else "damage_index")(X)
+
+
+# Missing values
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.ma.masked_array([1, 7, 3], [False, True, False]),
+        np.ma.masked_array([1.0, 7.0, 3.0], [False, True, False]),
+        [1.0, pd.NA, 3],
+        np.array([1.0, pd.NA, None], dtype=object),
+        pd.Series([1, pd.NA, 3], dtype="Int64"),
+        pd.Series([1, pd.NA, 3], dtype=object),
+        pd.DataFrame({"f1": [1, pd.NA, 3], "f2": [1.0, 2.0, 3.0]}, dtype=object)["f1"],
+    ],
+)
+def test_masked_and_missing_values_become_nan(values):
+    np.testing.assert_array_equal(np.isnan(as_floats(values))[:2], [False, True])
+    assert as_floats(values)[0] == 1.0
+
+
+def test_columns_of_objects_become_floats():
+    frame = pd.DataFrame({"f1": [1, pd.NA], "f2": [None, 2.0]}, dtype=object)
+    np.testing.assert_array_equal(as_floats(frame), [[1.0, np.nan], [np.nan, 2.0]])
+
+
+@each_estimator
+def test_masked_values_are_missing_to_estimators(estimator):
+    holed = RECORDS.to_numpy(copy=True)
+    holed[[3, 8], [0, 1]] = np.nan
+    masked = np.ma.masked_array(np.where(np.isnan(holed), 1e6, holed), np.isnan(holed))
+    objects = np.where(np.isnan(holed), pd.NA, holed)
+    expected = output(estimator.fit(holed), holed)
+    for table in (masked, objects, pd.DataFrame(objects), pd.DataFrame(objects).convert_dtypes()):
+        np.testing.assert_allclose(output(estimator.fit(table), table), expected, rtol=0, atol=1e-9)
+
+
+# What is not a real number
+
+
+@pytest.mark.parametrize(
+    "values",
+    [np.array([1j]), [1.0, 1j], pd.Series([1j]), pd.DataFrame({"f1": [1j]}), np.ma.masked_array([1j])],
+    ids=repr,
+)
+def test_complex_numbers_are_refused(values):
+    with pytest.raises(ValueError, match="complex; expected real numbers"):
+        as_floats(values)
+    with pytest.raises(ValueError, match="frequencies is complex; expected real numbers"):
+        real_array(values, "frequencies")
+
+
+def test_what_is_no_number_is_refused():
+    for values in (None, "high", [{}], object()):
+        with pytest.raises(ValueError, match=r"level is .*; expected numbers"):
+            real_array(values, "level")
+
+
+@pytest.mark.parametrize("seed", [np.random.default_rng(0), "seed", -1, 1.5, 2**33])
+def test_seeds_of_another_kind_are_refused(seed):
+    with pytest.raises(
+        ValueError, match=r"random_state is .*; expected None, an integer from 0 to 4294967295 or a num"
+    ):
+        as_random_state(seed)
+    with pytest.raises(ValueError, match=r"random_state is .*numpy\.random\.RandomState"):
+        add_noise([[4.0]], 0.01, random_state=seed)
+
+
+def test_estimators_refuse_a_generator_by_name():
+    with pytest.raises(ValueError, match=r"'random_state' parameter of TemperatureMapper must be .* Got Generator"):
+        TemperatureMapper(random_state=np.random.default_rng(0)).fit([[1.0], [2.0]], [[1.0], [1.1]])
+
+
+# Names and rows
+
+
+def test_frames_keep_their_columns_and_index():
+    frame = RECORDS.set_axis([4, "f1", ("a", 1)], axis=1)
+    assert column_names(frame, "f") == [4, "f1", ("a", 1)]
+    assert column_names(RECORDS.to_numpy(), "f") == ["f1", "f2", "f3"]
+    pd.testing.assert_frame_equal(frame_like(RECORDS, RECORDS.to_numpy()), RECORDS, check_freq=False)
+
+
+@each_transformer
+def test_columns_named_by_integers_keep_their_names(estimator):
+    numbered = RECORDS.set_axis([0, 1, 2], axis=1)
+    expected = {"LagFeatures": [f"{i}_lag{k}" for i in range(3) for k in range(2)], "TemperatureCompensator": [1, 2]}
+    for table in (estimator.fit(numbered).transform(numbered), estimator.fit_transform(numbered)):
+        assert list(table.columns) == expected.get(type(estimator).__name__, [0, 1, 2])
+        assert table.index.equals(HOURS)
+
+
+def test_indicators_of_gaps_have_names_beside_integers():
+    holed = RECORDS.set_axis([5, 6, 7], axis=1)
+    holed.iloc[3, 1] = np.nan
+    assert list(KNNGapImputer(add_indicator=True).fit_transform(holed).columns) == [5, 6, 7, "missingindicator_x1"]
+
+
+def test_series_of_other_rows_are_refused():
+    with pytest.raises(ValueError, match=r"a and b have different indices .row 0"):
+        check_same_rows(RECORDS["f1"], RECORDS["f2"].shift(freq="1h"), ("a", "b"))
+
+
+# Units of temperature
+
+
+def temperatures(**changes):
+    T = pd.DataFrame({"air": np.linspace(-15, 35, 40), "deck": np.linspace(-10, 60, 40)})
+    for column, (rows, value) in changes.items():
+        T.loc[rows, column] = value
+    return T
+
+
+@pytest.mark.parametrize(
+    ("T", "message"),
+    [
+        (
+            temperatures() + 273.15,
+            "column 'air' lies between 258.15 and 308.15, all above 150: kelvin. expected degrees C",
+        ),
+        (temperatures(deck=(slice(None), 293.0)), "column 'deck' lies between 293 and 293, all above 150"),
+        (temperatures(air=([3, 9], -999)), "column 'air' is -999 in 2 of 40 rows; expected degrees Celsius, and NaN"),
+        (temperatures(air=([3], -9999.0)), "column 'air' is -9999 in 1 of 40 rows"),
+        (temperatures(deck=([3, 4, 5], 9999)), "column 'deck' is 9999 in 3 of 40 rows"),
+        (temperatures(deck=([3, 4], 999.9), air=([0], np.nan)), "column 'deck' is 999.9 in 2 of 40 rows"),
+        (temperatures(deck=([3], 9998), air=([4], 20)), "column 'deck' is 9998"),
+        (temperatures(air=([3], -127)), "column 'air' is -127 in 1 of 40 rows"),
+        (temperatures(air=([0, 1], 290.0)), "column 'air' is 290 in 2 of 40 rows"),
+        (np.array([[293.0], [294.0]]), "column 'T1' lies between 293 and 294"),
+    ],
+)
+def test_temperatures_that_are_no_degrees_celsius_are_named(T, message):
+    with pytest.raises(ValueError, match=f"temperature {message}"):
+        check_temperatures(T)
+
+
+@pytest.mark.parametrize(
+    "T",
+    [
+        temperatures(),
+        temperatures(air=(slice(0, 20), np.nan)),
+        temperatures(air=(slice(None), np.nan)),
+        temperatures() * 1.8 + 32,
+        np.linspace(20, 600, 100)[:, np.newaxis],  # a fire
+        np.array([[-70.0], [40.0]]),
+        np.array([[20.0]]),
+    ],
+)
+def test_temperatures_of_every_climate_pass(T):
+    check_temperatures(T)
+
+
+# Polars
+
+
+@each_estimator
+def test_polars_frames_pass_without_a_warning(estimator):
+    polars = pytest.importorskip("polars")
+    frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
+    expected = output(estimator.fit(RECORDS.to_numpy()), RECORDS.to_numpy())
+    np.testing.assert_array_equal(output(estimator.fit(frame), frame), expected)
+
+
+@each_transformer
+def test_polars_frames_come_out_where_they_are_asked_for(estimator):
+    polars = pytest.importorskip("polars")
+    frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
+    asked = type(estimator)(**estimator.get_params(deep=False)).set_output(transform="polars")
+    for table in (frame, RECORDS):
+        for result in (asked.fit(table).transform(table), asked.fit_transform(table)):
+            assert isinstance(result, polars.DataFrame)
+            assert result.columns == list(asked.get_feature_names_out())
+
+
+def test_polars_columns_are_paired_by_name():
+    polars = pytest.importorskip("polars")
+    from skthermo.metrics import mape
+
+    frame = polars.DataFrame({"f1": [4.0, 4.1], "f2": [9.0, None]})
+    np.testing.assert_array_equal(mape(frame, frame[["f2", "f1"]]), [0.0, 0.0])
+
+
+# Files of fitted objects
+
+
+@each_estimator
+def test_objects_fitted_on_frames_are_saved_by_skops(estimator):
+    io = pytest.importorskip("skops.io")
+    fitted = type(estimator)(**estimator.get_params(deep=False)).fit(RECORDS)
+    file = io.dumps(fitted)
+    unknown = io.get_untrusted_types(data=file)
+    assert all(name.startswith("skthermo.") for name in unknown)
+    later = RECORDS.shift(freq="30h")
+    np.testing.assert_array_equal(output(io.loads(file, trusted=unknown), later), output(fitted, later))
