@@ -10,8 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
-from skthermo._frames import check_columns, frame_like
-from skthermo._validation import HasMethods, _check_feature_names_in, _fit_context, check_is_fitted, validate_data
+from skthermo._frames import check_columns, check_temperatures, frame_like
+from skthermo._validation import (
+    HasMethods,
+    _check_feature_names_in,
+    _fit_context,
+    check_is_fitted,
+    validate_data,
+    warn_user,
+)
 from skthermo.detection._complete_rows import CompleteRowsRegressor
 
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
@@ -67,14 +74,17 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Missing values:
 
+    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so
+      that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
+      the pipeline, and to the rows of X where the estimator is no such pipeline.
     - A missing target makes only its own residual NaN. Its row is not used to fit the estimator. Only an
       estimator with an FE model (`DataInformedFEM`, also at the end of a pipeline or in a search) gets all
       rows, because its lags need them; it leaves out incomplete rows itself.
-    - A row with another missing value is used if the estimator accepts NaN: it has scikit-learn's tag
-      ``allow_nan``, or it is a pipeline with an imputer before any step that does not accept NaN. Otherwise
-      the row is not used to fit the estimator, and its residuals are NaN.
-    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose row was removed takes
-      the last record before it. Without a DatetimeIndex, removed rows shift the lags.
+    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to
+      fit the estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold
+      takes the last record before it, or NaN if that is older than the tolerance of `LagFeatures`. Without a
+      DatetimeIndex, the rows of another fold shift the lags.
 
     Examples
     --------
@@ -135,6 +145,11 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         ValueError
             If a target is not among the columns or is named twice; if the targets are all of the columns
             or none; if a target is NaN in every row, or no row is complete.
+
+        Warns
+        -----
+        UserWarning
+            If another column looks like kelvin, or holds numbers that stand for a missing value, such as -999.
         """
         return self._learn(*self._read_baseline(X))
 
@@ -158,12 +173,17 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         ------
         ValueError
             As in `fit`; if there are fewer rows than folds, or ``cv`` does not test every row exactly once.
+
+        Warns
+        -----
+        UserWarning
+            As in `fit`.
         """
         temperatures, frequencies = self._read_baseline(X)
         folds = self._folds(temperatures)
         self._learn(temperatures, frequencies)
         predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=folds)
-        return frame_like(X, np.asarray(frequencies) - predicted, self.get_feature_names_out())
+        return self._residuals(frequencies, predicted)
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Residuals of new records.
@@ -182,11 +202,15 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         ------
         ValueError
             If columns differ from `fit`, or the estimator predicts another number of targets.
+
+        Warns
+        -----
+        UserWarning
+            As in `fit`.
         """
         check_is_fitted(self)
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
-        residuals = np.asarray(frequencies) - self.regression_.predict(temperatures)
-        return frame_like(X, residuals, self.get_feature_names_out())
+        return self._residuals(frequencies, self.regression_.predict(temperatures))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the targets.
@@ -205,10 +229,14 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any]:
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
+        _check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = _positions(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         return self._split(X, values)
+
+    def _residuals(self, frequencies: Any, predicted: NDArray) -> NDArray[np.float64] | pd.DataFrame:
+        return frame_like(frequencies, np.asarray(frequencies) - predicted)
 
     def _learn(self, temperatures: Any, frequencies: Any) -> "TemperatureCompensator":
         self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
@@ -219,7 +247,12 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         """The other columns and the targets, as frames if X is one."""
         columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
         others = np.delete(np.arange(len(columns)), self.targets_)
-        return tuple(frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
+        temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
+        try:
+            check_temperatures(pd.DataFrame(values[:, others], columns=columns[others]))
+        except ValueError as error:  # only a warning, as another column may be something else than a temperature
+            warn_user(str(error))
+        return temperatures, frequencies
 
     def _folds(self, X: Any) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         folds = list(check_cv(self.cv).split(X))
@@ -236,6 +269,16 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def _check_positions_are_names(targets: Any, columns: Any) -> None:
+    """Refuse integer targets where they could be names of columns as well as positions."""
+    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
+    if integers and list(columns) not in ([], list(range(len(columns)))):
+        raise ValueError(
+            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
+            "; expected columns named by text, or 0, 1, 2, ..."
+        )
 
 
 def _positions(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:

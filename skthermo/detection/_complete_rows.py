@@ -3,11 +3,12 @@
 from typing import Any
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.compose import TransformedTargetRegressor
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
 from sklearn.multioutput import MultiOutputRegressor
-from sklearn.pipeline import Pipeline
+from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
 from skthermo._arrays import as_columns, as_floats
@@ -16,47 +17,79 @@ from skthermo._validation import BaseSearchCV, _BaseImputer, is_model
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
-    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
+
+    Transformers at the head of a pipeline that accept NaN get every row, so that lags find the rows before; the
+    rest of the pipeline gets the rows that it accepts.
+    """
 
     def __init__(self, estimator: BaseEstimator):
         self.estimator = estimator
 
     def fit(self, X: Any, y: Any) -> "CompleteRowsRegressor":
-        usable = self._predictable(X)
-        if not takes_missing_targets(self.estimator):
+        head, rest = split_pipeline(self.estimator)
+        self.head_ = None if head is None else clone(head)
+        inputs = X if head is None else self.head_.fit_transform(X)
+        self.takes_nan_ = takes_nan(rest)
+        usable = self._predictable(inputs)
+        if not takes_missing_targets(rest):
             usable &= _complete(y)
         if not usable.any():
-            wanted = "every target" if takes_nan(self.estimator) else "every value"
+            wanted = "every target" if self.takes_nan_ else "every value"
             raise ValueError(
                 f"none of {len(y)} rows to learn from is complete; expected rows with {wanted} for "
-                f"{type(self.estimator).__name__}"
+                f"{type(rest).__name__}"
             )
         self.n_targets_ = y.shape[1]
-        self.estimator_ = fit_outputs(self.estimator, X[usable], self._as_target(y[usable]))
+        self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))
+        self.estimator_ = self.regressor_ if head is None else joined(self.estimator, self.head_, self.regressor_)
         return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:
-        usable = self._predictable(X)
+        inputs = X if self.head_ is None else self.head_.transform(X)
+        usable = self._predictable(inputs)
         predicted = np.full((len(X), self.n_targets_), np.nan)
         if usable.any():
-            values = as_columns(self.estimator_.predict(X[usable]))
+            values = as_columns(self.regressor_.predict(inputs[usable]))
             expected = (int(usable.sum()), self.n_targets_)
             if values.shape != expected:
                 raise ValueError(
-                    f"{type(self.estimator_).__name__} predicted the shape {values.shape}; expected {expected}, a "
+                    f"{type(self.regressor_).__name__} predicted the shape {values.shape}; expected {expected}, a "
                     "column for each target"
                 )
             predicted[usable] = values
         return predicted
 
-    def _predictable(self, X: Any) -> NDArray[np.bool_]:
-        return np.ones(len(X), dtype=bool) if takes_nan(self.estimator) else _complete(X)
+    def _predictable(self, inputs: Any) -> NDArray[np.bool_]:
+        if self.takes_nan_ or scipy.sparse.issparse(inputs):
+            return np.ones(inputs.shape[0], dtype=bool)
+        return _complete(inputs)
 
-    def _as_target(self, y: Any) -> Any:
-        """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
-        if y.shape[1] > 1 or not get_tags(_final_estimator(self.estimator)).target_tags.single_output:
-            return y
-        return y.squeeze(axis=1)
+
+def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstimator]:
+    """The first transformers of a pipeline, as far as they accept NaN and learn without y, and what follows them."""
+    if not isinstance(estimator, Pipeline):
+        return None, estimator
+    steps = [step for _, step in estimator.steps]
+    n_head = next(
+        (i for i, step in enumerate(steps[:-1]) if not takes_nan(step) or learns_from_y(step)), len(steps) - 1
+    )
+    if not n_head:
+        return None, estimator
+    return estimator[:n_head], steps[-1] if n_head == len(steps) - 1 else estimator[n_head:]
+
+
+def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
+    """A fitted pipeline of its fitted parts."""
+    tail = rest.steps if isinstance(rest, Pipeline) else [(pipeline.steps[-1][0], rest)]
+    return Pipeline([*head.steps, *tail], memory=pipeline.memory, verbose=pipeline.verbose)
+
+
+def as_target(estimator: BaseEstimator, y: Any) -> Any:
+    """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
+    if y.shape[1] > 1 or not get_tags(_final_estimator(estimator)).target_tags.single_output:
+        return y
+    return y.squeeze(axis=1)
 
 
 def takes_nan(estimator: BaseEstimator) -> bool:
@@ -64,18 +97,31 @@ def takes_nan(estimator: BaseEstimator) -> bool:
 
     scikit-learn's tag does not say so for estimators inside a pipeline, a search or another wrapper.
     """
+    if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
+        return True
     if isinstance(estimator, Pipeline):
-        for step in (step for _, step in estimator.steps if step not in (None, "passthrough")):
+        for _, step in estimator.steps:
             if not takes_nan(step):
                 return False
             if isinstance(step, _BaseImputer):
                 return True
         return True
+    if isinstance(estimator, ColumnTransformer):
+        return all(takes_nan(part) for _, part, _ in estimator.transformers)
+    if isinstance(estimator, FeatureUnion):
+        return all(takes_nan(part) for _, part in estimator.transformer_list)
     if isinstance(estimator, MultiOutputRegressor | BaseSearchCV):
         return takes_nan(estimator.estimator)
     if isinstance(estimator, TransformedTargetRegressor) and estimator.regressor is not None:
         return takes_nan(estimator.regressor)
     return get_tags(estimator).input_tags.allow_nan
+
+
+def learns_from_y(transformer: BaseEstimator | str | None) -> bool:
+    """Whether a transformer may need the targets, which are not known in every row."""
+    if transformer is None or isinstance(transformer, str):
+        return False
+    return get_tags(transformer).target_tags.required or hasattr(transformer, "estimator")
 
 
 def takes_missing_targets(estimator: BaseEstimator) -> bool:

@@ -43,7 +43,8 @@ class MahalanobisDetector(DamageDetector):
     Notes
     -----
     `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode,
-    or a mode that is a combination of others.
+    or a mode that is a combination of others. The units of the modes do not matter, unless ``covariance`` depends
+    on them, as a shrunk one does.
 
     Rows with a missing mode are left out of the baseline; their damage index is NaN, and
     ``predict`` raises no alarm there.
@@ -75,17 +76,27 @@ class MahalanobisDetector(DamageDetector):
     def _learn(self, complete: Array) -> None:
         covariance = EmpiricalCovariance() if self.covariance is None else clone(self.covariance)
         self.covariance_ = covariance.fit(complete)
-        self._check_invertible(len(complete))
+        scale = _scale(self.covariance_.covariance_, complete)
+        correlation = self.covariance_.covariance_ / np.outer(scale, scale)
+        _check_invertible(correlation, len(complete))
+        if self.covariance is None:  # its own inverse loses modes in a small unit beside others in a large one
+            self.covariance_.precision_ = np.linalg.inv(correlation) / np.outer(scale, scale)
 
     def _index(self, complete: Array) -> Array:
         return np.sqrt(self.covariance_.mahalanobis(complete))
 
-    def _check_invertible(self, n_rows: int) -> None:
-        covariance = self.covariance_.covariance_
-        rank = np.linalg.matrix_rank(covariance, hermitian=True)
-        if rank < len(covariance):
-            raise ValueError(
-                f"the covariance of {n_rows} complete baseline rows and {len(covariance)} modes is singular "
-                f"(rank {rank}); expected more than {len(covariance)} rows, no mode that is constant or a copy "
-                "of others, or a shrunk covariance such as LedoitWolf()"
-            )
+
+def _scale(covariance: Array, complete: Array) -> Array:
+    """Standard deviations of the modes; infinite where a mode is constant, and its deviation only rounding."""
+    deviations = np.sqrt(np.diag(covariance))
+    return np.where(deviations <= 1e-14 * np.abs(complete).max(axis=0), np.inf, deviations)
+
+
+def _check_invertible(correlation: Array, n_rows: int) -> None:
+    rank = np.linalg.matrix_rank(correlation, hermitian=True)
+    if rank < len(correlation):
+        raise ValueError(
+            f"the covariance of {n_rows} complete baseline rows and {len(correlation)} modes is singular "
+            f"(rank {rank}); expected more than {len(correlation)} rows, no mode that is constant or a copy "
+            "of others, or a shrunk covariance such as LedoitWolf()"
+        )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.compose import TransformedTargetRegressor
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.impute import SimpleImputer
 from sklearn.linear_model import LinearRegression, Ridge
@@ -282,6 +282,85 @@ def test_what_cannot_be_predicted_flows_through():
 
     residuals = compensator(Unsure()).fit(X).transform(X)
     np.testing.assert_array_equal(residuals.isna().all(axis=1), X["T1"] > 30)
+
+
+# Lags and gaps
+
+
+def hourly(n_rows=120):
+    """Frequencies that follow the temperature of now and of two hours ago."""
+    hours = pd.date_range("2025-01-01", periods=n_rows, freq="h")
+    T1 = pd.Series(np.random.default_rng(0).normal(10, 5, n_rows), hours)
+    return pd.DataFrame({"T1": T1, "f1": 4 - 0.01 * T1 - 0.02 * T1.shift(2).fillna(0)}).iloc[2:]
+
+
+LAGGED = make_pipeline(LagFeatures([0, 2], freq="1h", tolerance="0h", padding="nan"), LinearRegression())
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        LAGGED,
+        make_pipeline(StandardScaler().set_output(transform="pandas"), *LAGGED),
+        make_pipeline(ColumnTransformer([("lags", LAGGED[0], ["T1"])]), LinearRegression()),
+        make_pipeline(LAGGED[0], PolynomialFeatures(1), LinearRegression()),
+        make_pipeline(LAGGED[0], TemperatureMapper(LinearRegression())),
+    ],
+    ids=["lags", "scaled", "by column", "polynomial", "mapper"],
+)
+def test_what_a_lag_does_not_find_is_missing_and_does_not_train(estimator):
+    records = hourly()
+    if isinstance(estimator[-1], TemperatureMapper):
+        records["f1"] = np.exp(records["f1"])  # it learns logarithms
+    gappy = records.drop(records.index[40:50])
+    gappy.iloc[70, 0] = np.nan
+    residuals = compensator(estimator, targets=["f1"]).fit(gappy).transform(gappy)
+    np.testing.assert_array_equal(np.flatnonzero(residuals["f1"].isna()), [0, 1, 40, 41, 70, 72])
+    np.testing.assert_allclose(residuals.dropna(), 0, atol=1e-9)
+    in_folds = compensator(estimator, targets=["f1"]).fit_transform(gappy)
+    assert in_folds["f1"].notna().sum() > 100
+    np.testing.assert_allclose(in_folds.dropna(), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
+def test_rows_without_a_target_still_are_the_history_of_lags(data):
+    records = hourly()
+    holed = records.copy()
+    holed.iloc[10:20, 1] = np.nan
+    estimator = make_pipeline(LagFeatures([0, 2], padding="nan"), LinearRegression())
+    residuals = np.asarray(compensator(estimator, targets=[1]).fit(data(holed)).transform(data(holed)))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(residuals)), [0, 1, *range(10, 20)])
+    np.testing.assert_allclose(residuals[~np.isnan(residuals)], 0, atol=1e-9)
+
+
+def test_the_fitted_pipeline_is_whole():
+    fitted = compensator(LAGGED, targets=["f1"]).fit(hourly())
+    assert [name for name, _ in fitted.estimator_.steps] == [name for name, _ in LAGGED.steps]
+    lagged = fitted.estimator_[0].transform(hourly()[["T1"]]).dropna()
+    np.testing.assert_allclose(fitted.estimator_[1].predict(lagged), hourly()["f1"].iloc[2:], atol=1e-9)
+
+
+# Units, missing values by number, names
+
+
+@pytest.mark.parametrize("method", ["fit", "fit_transform"])
+def test_kelvin_and_numbers_for_missing_values_are_warned_of_at_the_users_line(method):
+    kelvin, marked = X.copy(), X.copy()
+    kelvin["T2"] += 273.15
+    marked.iloc[5:8, 0] = -999
+    with pytest.warns(UserWarning, match="temperature column 'T2' lies between .* kelvin.*Celsius") as caught:
+        getattr(compensator(), method)(kelvin)
+    assert [warning.filename for warning in caught] == [__file__]
+    with pytest.warns(UserWarning, match="temperature column 'T1' is -999 in 3 of 200 rows; expected .* NaN where"):
+        compensator().fit(X).transform(marked)
+
+
+def test_columns_named_by_integers_keep_their_names():
+    numbered = X.set_axis(range(9), axis=1)
+    residuals = compensator(targets=POSITIONS).fit_transform(numbered)
+    assert list(residuals.columns) == POSITIONS
+    with pytest.raises(ValueError, match=r"targets are the integers \[3\], which may be names or positions"):
+        compensator(targets=[3]).fit(X.set_axis(range(1, 10), axis=1))
 
 
 # Errors

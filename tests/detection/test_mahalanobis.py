@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.distance import mahalanobis
 from scipy.stats import chi
 from sklearn.covariance import LedoitWolf, MinCovDet, ledoit_wolf
@@ -41,11 +43,21 @@ def test_scores_form_one_chain():
     np.testing.assert_array_equal(detector.predict(F) == -1, index > detector.threshold_)
 
 
-def test_index_does_not_depend_on_units():
-    scale = np.array([1.0, 60.0, 0.001])
-    np.testing.assert_allclose(
-        MahalanobisDetector().fit(F * scale).damage_index(F * scale), MahalanobisDetector().fit(F).damage_index(F)
-    )
+@given(st.lists(st.floats(-12, 12), min_size=3, max_size=3))
+def test_index_does_not_depend_on_units(exponents):
+    scale = 10.0 ** np.array(exponents)
+    scaled, plain = MahalanobisDetector().fit(F * scale), MahalanobisDetector().fit(F)
+    np.testing.assert_allclose(scaled.damage_index(F * scale), plain.damage_index(F), rtol=1e-9)
+
+
+def test_copies_of_a_mode_are_found_in_any_unit():
+    with pytest.raises(ValueError, match=r"singular \(rank 3\)"):
+        MahalanobisDetector().fit(np.column_stack([F, F[:, 0] * 1e-9]))
+
+
+def test_a_constant_mode_is_singular_however_it_rounds():
+    with pytest.raises(ValueError, match=r"singular \(rank 3\)"):
+        MahalanobisDetector().fit(np.column_stack([F, np.full(len(F), 4.1)]))
 
 
 @pytest.mark.parametrize("covariance", [LedoitWolf(), MinCovDet(random_state=0)], ids=repr)
