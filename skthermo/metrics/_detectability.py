@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import real_array
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
@@ -72,7 +72,8 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     Parameters
     ----------
     severities : array-like of shape (n_severities,)
-        Tested severities in any order, such as 0.1, 0.2, 0.3, or -0.1, -0.2, -0.3 for strengthening.
+        Tested severities in any order, such as 0.1, 0.2, 0.3, or -0.1, -0.2, -0.3 for strengthening; all of one
+        sign.
     pod : array-like of shape (n_severities,)
         Probability of detection (POD) at each severity, between 0 and 1; NaN counts as not detected.
     level : float, default=0.9
@@ -88,7 +89,8 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     Raises
     ------
     ValueError
-        If lengths differ, a severity is NaN or occurs twice, or a probability is not between 0 and 1.
+        If lengths differ, a severity is not finite or occurs twice, severities are not all positive or all
+        negative, or a probability is not between 0 and 1.
 
     Examples
     --------
@@ -96,24 +98,33 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     >>> minimum_detectable_damage([0.1, 0.2, 0.3], [0.26, 0.95, 1.0])
     0.2
     """
-    s, p = as_floats(severities), as_floats(pod)
+    s, p, reliable_pod = (
+        real_array(values, name) for name, values in (("severities", severities), ("pod", pod), ("level", level))
+    )
     if s.ndim != 1 or s.shape != p.shape or not s.size:
         raise ValueError(f"severities have shape {s.shape} and pod {p.shape}; expected two vectors of one length")
-    if np.isnan(s).any() or len(np.unique(s)) < len(s):
+    if not np.isfinite(s).all() or len(np.unique(s)) < len(s):
         raise ValueError(f"severities are {s.tolist()}; expected different numbers")
-    for name, values in (("pod", p), ("level", np.asarray(level))):
+    if not ((s > 0).all() or (s < 0).all()):
+        raise ValueError(
+            f"severities are {s.tolist()}; expected all positive (damage) or all negative (strengthening), and not 0, "
+            "which is the healthy structure"
+        )
+    for name, values in (("pod", p), ("level", reliable_pod)):
         if ((values < 0) | (values > 1)).any():
             raise ValueError(f"{name} is {values.tolist()}; expected probabilities between 0 and 1, not percent")
+    if reliable_pod.shape or np.isnan(reliable_pod):
+        raise ValueError(f"level is {reliable_pod.tolist()}; expected one probability between 0 and 1")
     descending = np.argsort(-np.abs(s))
-    reliable = np.logical_and.accumulate(p[descending] >= level)
+    reliable = np.logical_and.accumulate(p[descending] >= reliable_pod)
     return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
 def _share_above(damage_index: ArrayLike, threshold: float) -> float:
-    index = as_floats(damage_index)
+    index, limit = real_array(damage_index, "damage_index"), real_array(threshold, "threshold")
     if index.ndim != 1:
         raise ValueError(f"damage_index has shape {index.shape}; expected a vector (n_samples,)")
-    if not np.isfinite(threshold):
-        raise ValueError(f"threshold is {threshold}; expected a finite number")
+    if limit.shape or not np.isfinite(limit):
+        raise ValueError(f"threshold is {limit.tolist()}; expected a finite number")
     present = index[~np.isnan(index)]
-    return float((present > threshold).mean()) if present.size else float("nan")
+    return float((present > limit).mean()) if present.size else float("nan")

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
-from skthermo._arrays import as_columns
+from skthermo._arrays import as_columns, real_array
 from skthermo._frames import check_same_rows, column_names
 
 AVERAGE = "Average"
@@ -22,7 +22,8 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     y_true : array-like or DataFrame of shape (n_samples, n_modes)
         Measured frequencies in Hz.
     y_pred : array-like or DataFrame of shape (n_samples, n_modes)
-        Predicted frequencies in Hz. A pair in which either is NaN is ignored.
+        Predicted frequencies in Hz. A pair in which either is NaN is ignored. Columns of two frames are paired
+        by their names.
 
     Returns
     -------
@@ -32,7 +33,8 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If the shapes or the indices differ.
+        If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
+        one zero.
 
     Examples
     --------
@@ -40,8 +42,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     >>> mape([[2.0, 4.0], [2.0, 4.0]], [[2.02, 4.0], [1.98, float("nan")]])
     array([1., 0.])
     """
-    measured, predicted = _paired(y_true, y_pred)
-    return 100 * pd.DataFrame(np.abs((measured - predicted) / measured)).mean().to_numpy()
+    return _percentages(*_paired_frequencies(y_true, y_pred))
 
 
 def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None) -> pd.DataFrame:
@@ -52,7 +53,8 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     y_true : array-like or DataFrame of shape (n_samples, n_modes)
         Measured frequencies in Hz.
     y_pred : array-like or DataFrame of shape (n_samples, n_modes)
-        Predicted frequencies in Hz. A pair in which either is NaN is ignored.
+        Predicted frequencies in Hz. A pair in which either is NaN is ignored. Columns of two frames are paired
+        by their names.
     scenarios : sequence of length n_samples, optional
         Scenario of every row, such as "SH-0" or "SB-50". By default all rows belong to one, "all".
 
@@ -64,7 +66,8 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     Raises
     ------
     ValueError
-        If shapes or indices differ, there is not one scenario for each row, or one is called "Average".
+        If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
+        one zero; if there is not one scenario for each row, or one is called "Average".
 
     References
     ----------
@@ -79,14 +82,16 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     damaged  3.0      3.0
     Average  2.0      2.0
     """
-    measured, predicted = _paired(y_true, y_pred)
-    labels = np.full(len(measured), "all") if scenarios is None else np.asarray(scenarios)
+    measured, predicted = _paired_frequencies(y_true, y_pred)
+    labels = np.full(len(measured), "all") if scenarios is None else np.asarray(scenarios, dtype=object)
     if labels.shape != (len(measured),):
         raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
+    if pd.isna(labels).any():
+        raise ValueError(f"the scenario of row {np.flatnonzero(pd.isna(labels))[0]} is missing; expected one")
     if AVERAGE in labels:
         raise ValueError(f"a scenario is called {AVERAGE!r}; expected another name: it is that of the averages")
     table = pd.DataFrame(
-        {label: mape(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
+        {label: _percentages(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
         index=column_names(y_true, "f"),
     ).T
     table.loc[AVERAGE] = table.mean()
@@ -102,7 +107,8 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
     y_true : array-like or DataFrame of shape (n_samples, n_columns)
         Measured values.
     y_pred : array-like or DataFrame of shape (n_samples, n_columns)
-        Predicted values. Rows in which either holds NaN are ignored.
+        Predicted values. Rows in which either holds NaN are ignored. Columns of two frames are paired by their
+        names.
 
     Returns
     -------
@@ -112,7 +118,7 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
     Raises
     ------
     ValueError
-        If the shapes or the indices differ.
+        If the shapes, the indices or the names of the columns differ, or a value is infinite.
 
     Examples
     --------
@@ -143,6 +149,11 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
         ``neg_mape`` in percent, negative so that higher is better; ``r2``; ``share_scored``, the
         share of rows in which every mode is both measured and predicted.
 
+    Raises
+    ------
+    ValueError
+        As in `mape`.
+
     Examples
     --------
     >>> import numpy as np
@@ -153,23 +164,58 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     >>> {name: round(score, 2) for name, score in scores.items()}
     {'neg_mape': -15.0, 'r2': -0.01, 'share_scored': 0.75}
     """
-    measured, predicted = _paired(y, estimator.predict(X))
+    measured, predicted = _paired_frequencies(y, estimator.predict(X))
     complete = _complete(measured, predicted)
     return {
-        "neg_mape": -float(mape(measured[complete], predicted[complete]).mean()),
+        "neg_mape": -float(_percentages(measured[complete], predicted[complete]).mean()),
         "r2": complete_r2(measured, predicted),
         "share_scored": float(complete.mean()),
     }
 
 
-def _paired(y_true: ArrayLike, y_pred: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    measured, predicted = (as_columns(values) for values in (y_true, y_pred))
-    if measured.shape != predicted.shape:
+def _paired(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both tables as arrays, the columns of two frames paired by name."""
+    if all(hasattr(table, "columns") for table in (y_true, y_pred)):
+        measured_names, predicted_names = (list(table.columns) for table in (y_true, y_pred))
+        if measured_names != predicted_names:
+            y_pred = y_pred[_same_names(measured_names, predicted_names)]
+    measured, predicted = (
+        as_columns(real_array(values, name)) for name, values in (("y_true", y_true), ("y_pred", y_pred))
+    )
+    if measured.ndim != 2 or measured.shape != predicted.shape:
         raise ValueError(
             f"y_true has shape {measured.shape} and y_pred {predicted.shape}; expected the same (n_samples, n_modes)"
         )
     check_same_rows(y_true, y_pred, ("y_true", "y_pred"))
+    for name, values, table in (("y_true", measured, y_true), ("y_pred", predicted, y_pred)):
+        _refuse(np.isinf(values), table, name, "a finite number, or NaN where a value is missing")
     return measured, predicted
+
+
+def _paired_frequencies(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The same for frequencies, by which errors are divided."""
+    measured, predicted = _paired(y_true, y_pred)
+    _refuse(measured == 0, y_true, "y_true", "another number to divide by")
+    return measured, predicted
+
+
+def _percentages(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 100 * pd.DataFrame(np.abs((measured - predicted) / measured)).mean().to_numpy()
+
+
+def _same_names(measured: list[Any], predicted: list[Any]) -> list[Any]:
+    """The names of measured columns, which must be those of the predicted ones in another order."""
+    if len(set(measured)) < len(measured) or set(measured) != set(predicted) or len(measured) != len(predicted):
+        raise ValueError(f"y_true has the columns {measured} and y_pred {predicted}; expected the same, each once")
+    return measured
+
+
+def _refuse(wrong: NDArray[np.bool_], table: Any, name: str, expected: str) -> None:
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        value = as_columns(table)[row, column]
+        columns = column_names(table if np.ndim(table) == 2 else wrong, "f")
+        raise ValueError(f"row {row} of {columns[column]!r} in {name} is {value:g}; expected {expected}")
 
 
 def _complete(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.bool_]:

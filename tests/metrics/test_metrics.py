@@ -5,11 +5,13 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csr_array
 from sklearn.dummy import DummyRegressor
 from sklearn.metrics import mean_absolute_percentage_error, r2_score
 from sklearn.model_selection import cross_validate
 
 from skthermo.metrics import (
+    complete_r2,
     error_table,
     frequency_scorer,
     mape,
@@ -35,8 +37,9 @@ def test_nothing_to_count_is_nan_and_bad_input_is_named():
     assert np.isnan(probability_of_detection([np.nan], 1.0))
     with pytest.raises(ValueError, match=r"damage_index has shape \(1, 2\)"):
         probability_of_false_alarm([[1.0, 2.0]], 1.0)
-    with pytest.raises(ValueError, match="threshold is nan"):
-        probability_of_detection([1.0], np.nan)
+    for threshold in (np.nan, None, "high", [1.0, 2.0]):
+        with pytest.raises(ValueError, match=f"threshold is .*{str(threshold)[1:-1]}.*; expected"):
+            probability_of_detection([1.0], threshold)
 
 
 @pytest.mark.parametrize(
@@ -60,6 +63,13 @@ def test_minimum_detectable_damage(pod, expected):
     [
         ([0.1, 0.2], [0.5], 0.9, "severities have shape"),
         ([0.1, 0.1], [0.5, 0.6], 0.9, "expected different numbers"),
+        ([0.1, -0.1], [0.5, 0.95], 0.9, r"severities are \[0.1, -0.1\]; expected all positive .damage. or all neg"),
+        ([0.0, 0.1], [0.5, 0.95], 0.9, "not 0, which is the healthy structure"),
+        ([0.1, np.inf], [0.5, 0.95], 0.9, "expected different numbers"),
+        ([0.1, 0.2], [0.5, 0.6], None, "level is None; expected numbers"),
+        ([0.1, 0.2], [0.5, 0.6], np.nan, "level is nan; expected one probability"),
+        ([0.1, 0.2], [0.5, 0.6], [0.9, 0.9], r"level is \[0.9, 0.9\]; expected one probability"),
+        ([0.1, 0.2], [0.5, 0.6j], 0.9, "pod is complex"),
         ([0.1, 0.2], [50, 60], 0.9, "not percent"),
         ([0.1, 0.2], [0.5, 1.1], 0.9, "pod is"),
         ([0.1, 0.2], [0.5, 0.6], 90, "level is 90"),
@@ -110,3 +120,92 @@ def test_scorer_works_in_cross_validation_and_counts_the_rows_it_scored():
     scored = frequency_scorer(model, T, holed)
     assert scored["r2"] == pytest.approx(r2_score(holed[complete], model.predict(T)[complete]))
     assert scored["neg_mape"] == pytest.approx(-mape(holed[complete], model.predict(T)[complete]).mean())
+
+
+# Frames, and values that are no frequencies
+
+TRUE = pd.DataFrame(MEASURED, columns=["f1", "f2"])
+PRED = pd.DataFrame(PREDICTED, columns=["f1", "f2"])
+
+
+@pytest.mark.parametrize("metric", [mape, error_table, complete_r2])
+def test_columns_of_frames_are_paired_by_name(metric):
+    np.testing.assert_array_equal(metric(TRUE, PRED[["f2", "f1"]]), metric(TRUE, PRED))
+    np.testing.assert_array_equal(metric(TRUE, PREDICTED), metric(TRUE, PRED))
+    for other in (
+        PRED.set_axis(["f1", "f3"], axis=1),
+        PRED.set_axis([0, 1], axis=1),
+        PRED[["f1"]],
+        PRED.assign(f3=4.0),
+    ):
+        with pytest.raises(
+            ValueError, match=r"y_true has the columns \['f1', 'f2'\] and y_pred \[.*; expected the same"
+        ):
+            metric(TRUE, other)
+
+
+def test_scores_pair_columns_by_name():
+    class Swapped(DummyRegressor):
+        def predict(self, X):
+            return PRED[["f2", "f1"]]
+
+    T = np.zeros((60, 1))
+    scores = frequency_scorer(Swapped().fit(T, MEASURED), T, TRUE)
+    assert scores["neg_mape"] == pytest.approx(-mape(TRUE, PRED).mean())
+
+
+def test_columns_named_by_integers_keep_their_names():
+    numbered = [frame.set_axis([0, 1], axis=1) for frame in (TRUE, PRED)]
+    assert list(error_table(*numbered).columns) == [0, 1, "Average"]
+
+
+def bad(value, row=7, column=1):
+    values = MEASURED.astype(object)
+    values[row, column] = value
+    return values
+
+
+@pytest.mark.parametrize("metric", [mape, error_table, complete_r2])
+@pytest.mark.parametrize(
+    ("y_true", "y_pred", "message"),
+    [
+        (bad(np.inf), PREDICTED, "row 7 of 'f2' in y_true is inf; expected a finite number, or NaN where"),
+        (TRUE, PRED.mask(PRED.iloc[3, 0] == PRED, -np.inf), "row 3 of 'f1' in y_pred is -inf"),
+        (MEASURED[:, 0], bad(np.inf)[:, 1], "row 7 of 'f1' in y_pred is inf"),
+        (MEASURED + 0j, PREDICTED, "y_true is complex; expected real numbers"),
+        (MEASURED, csr_array(PREDICTED), "y_pred is a sparse matrix; expected a dense array"),
+        (MEASURED, None, "y_pred is None; expected numbers"),
+        (bad("high"), PREDICTED, "y_true is array"),
+        (3.0, 3.0, r"y_true has shape \(\) and y_pred \(\); expected the same \(n_samples, n_modes\)"),
+        (np.ones((2, 2, 2)), np.ones((2, 2, 2)), "expected the same .n_samples, n_modes"),
+        (TRUE["f1"], PRED["f1"].set_axis(range(1, 61)), "y_true and y_pred have different indices"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_no_frequency_is_named(metric, y_true, y_pred, message):
+    with pytest.raises(ValueError, match=message):
+        metric(y_true, y_pred)
+
+
+def test_errors_relative_to_zero_are_refused():
+    for metric in (mape, error_table):
+        with pytest.raises(ValueError, match="row 7 of 'f2' in y_true is 0; expected another number to divide by"):
+            metric(bad(0.0), PREDICTED)
+    with pytest.raises(ValueError, match="the scenario of row 1 is missing"):
+        error_table([1.0, 2.0], [1.0, 2.0], scenarios=["healthy", None])
+
+
+def test_masked_and_missing_values_are_ignored():
+    holed = MEASURED.copy()
+    holed[7, 1] = np.nan
+    masked = np.ma.masked_array(MEASURED, np.isnan(holed))
+    for missing in (
+        masked,
+        bad(pd.NA),
+        bad(None),
+        pd.DataFrame(bad(pd.NA)),
+        pd.DataFrame(MEASURED).convert_dtypes().mask(np.isnan(holed)),
+    ):
+        np.testing.assert_array_equal(mape(missing, PREDICTED), mape(holed, PREDICTED))
+    index = np.ma.masked_array([1.0, 99.0, 3.0, 4.0], [False, True, False, False])
+    assert probability_of_detection(index, 2.0) == pytest.approx(2 / 3)
