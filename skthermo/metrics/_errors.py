@@ -34,7 +34,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     ------
     ValueError
         If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
-        one zero.
+        one not positive.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     ------
     ValueError
         If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
-        one zero; if there is not one scenario for each row, or one is called "Average".
+        one not positive; if there is not one scenario for each row, or one is called "Average".
 
     References
     ----------
@@ -193,9 +193,9 @@ def _paired(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def _paired_frequencies(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same for frequencies, by which errors are divided."""
+    """The same for frequencies: measured ones are positive."""
     measured, predicted = _paired(y_true, y_pred)
-    _refuse(measured == 0, y_true, "y_true", "another number to divide by")
+    _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
     return measured, predicted
 
 

@@ -187,10 +187,15 @@ def test_what_is_no_frequency_is_named(metric, y_true, y_pred, message):
         metric(y_true, y_pred)
 
 
-def test_errors_relative_to_zero_are_refused():
-    for metric in (mape, error_table):
-        with pytest.raises(ValueError, match="row 7 of 'f2' in y_true is 0; expected another number to divide by"):
-            metric(bad(0.0), PREDICTED)
+def test_measured_frequencies_are_positive():
+    for metric, value in ((mape, 0.0), (error_table, 0.0), (mape, -999)):
+        with pytest.raises(
+            ValueError, match=f"row 7 of 'f2' in y_true is {value:g}; expected a positive frequency, or"
+        ):
+            metric(bad(value), PREDICTED)
+
+
+def test_scenarios_are_not_missing():
     with pytest.raises(ValueError, match="the scenario of row 1 is missing"):
         error_table([1.0, 2.0], [1.0, 2.0], scenarios=["healthy", None])
 
