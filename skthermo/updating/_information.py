@@ -1,7 +1,7 @@
 """What measurements can tell about parameters."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -9,19 +9,27 @@ NO_INFORMATION = 1e-12
 """Share of the largest (scaled) eigenvalue below which an information matrix tells nothing."""
 
 
-def cramer_rao(information: Array) -> Array:
+def cramer_rao(information: ArrayLike) -> Array:
     """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix.
 
     Parameters
     ----------
-    information : ndarray of shape (n_parameters, n_parameters)
+    information : array-like of shape (n_parameters, n_parameters)
         Symmetric, perhaps singular.
 
     Returns
     -------
     ndarray of shape (n_parameters, n_parameters)
         Infinite variances and NaN covariances of parameters that cannot be told; all NaN where information is.
+
+    Examples
+    --------
+    >>> from skthermo.updating import cramer_rao
+    >>> cramer_rao([[4.0, 0.0], [0.0, 0.0]])
+    array([[0.25,  nan],
+           [ nan,  inf]])
     """
+    information = np.asarray(information, dtype=float)
     if not np.isfinite(information).all():
         return np.full_like(information, np.nan)
     scale = np.sqrt(np.diagonal(information))
