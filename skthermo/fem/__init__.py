@@ -1,5 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
+from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -36,6 +37,7 @@ __all__ = [
     "Structure",
     "add_noise",
     "check_bounds",
+    "check_dofs",
     "check_noise",
     "check_theta",
     "evaluate",

@@ -118,5 +118,5 @@ def test_shapes_add_information():
     with pytest.raises(ValueError, match="shape_noise is 0"):
         identifiability(model, noise=0.001, dofs=dofs, shape_noise=0)
     other = CallableModel(model.frequencies, model.parameter_names, 6, vectorized=True)
-    with pytest.raises(ValueError, match="expected an AffineModel"):
+    with pytest.raises(ValueError, match="has no method 'local_modes'; expected a model with one, such as AffineModel"):
         identifiability(other, noise=0.001, dofs=dofs, shape_noise=0.01)

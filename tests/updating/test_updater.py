@@ -202,6 +202,19 @@ def test_one_sensor_pairs_by_the_nominal_modes():
     np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
 
 
+def test_where_sensors_cannot_tell_modes_apart_the_nominal_modes_decide():
+    """At the two sensors, modes 1 and 3 differ by less than the noise, which makes each look like the other."""
+    turn, half = 0.1, np.sqrt(0.5)
+    sway = np.array([[half, 0, half], [0, 1, 0], [half, 0, -half]])
+    shapes = sway @ [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    terms = {(name,): k * np.outer(phi, phi) for name, k, phi in zip("abc", (1.0, 4.0, 9.0), shapes.T, strict=True)}
+    model, truth = AffineModel(terms, np.eye(3), n_modes=3), [1.05, 0.95, 1.1]
+    seen = shapes[:2][:, [2, 1, 0]]
+    assert (np.diag(mac(shapes[:2], seen)) < mac(shapes[:2], seen).max(axis=0)).tolist() == [True, False, True]
+    updater = ModelUpdater(model).fit(model.frequencies([truth]), shapes=seen, dofs=[0, 1])
+    np.testing.assert_allclose(updater.theta_, truth, rtol=1e-6)
+
+
 def test_a_prior_holds_what_cannot_be_told():
     model = AffineModel(
         {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}, np.eye(2), n_modes=2

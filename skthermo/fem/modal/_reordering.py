@@ -27,7 +27,7 @@ def share_reordered(model: ModalModel, theta: ArrayLike) -> float:
     -------
     float
         Between 0 and 1. A sample counts if some column of ``model.modes(theta)`` is not the nominal mode of the same
-        number: another one is more like it, or none of the model's modes is (MAC below 0.5).
+        number: another column has the higher MAC with that mode, or the column's own MAC with it is below 0.5.
 
     Raises
     ------

@@ -1,31 +1,31 @@
-"""Which mode is which: pairing modes with reference modes by their MAC."""
+"""Tracking: which computed mode is which reference mode, by their MAC."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 SAME_MODE = 0.5
-"""MAC above which no other mode can be closer to the reference, since shapes are orthogonal."""
+"""MAC with a reference above which no other mode can have a higher one: shapes are orthogonal, and MACs add up to 1."""
 
 REPEATED = 1e-6
-"""Relative distance of eigenvalues below which rounding decides which shapes they have."""
+"""Relative distance of eigenvalues below which they count as repeated: rounding then decides their shapes."""
 
 
 def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Assign to every reference mode the candidate that keeps the sum of MACs highest.
+    """Assign one candidate to each reference mode, so that the sum of MACs is highest.
 
     Parameters
     ----------
     mac : ndarray of shape (n_samples, n_modes, n_candidates)
         MAC of reference modes and candidates.
     repeated : ndarray of bool of shape (n_modes, n_modes), optional
-        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis, so that a
-        candidate is compared with the space they span, and those assigned go in ascending order.
+        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis of the space they span, so
+        candidates are compared with that space, and those assigned to it are sorted by frequency.
 
     Returns
     -------
     ndarray of shape (n_samples, n_modes)
-        Candidate of each reference mode; no candidate serves twice.
+        Candidate of each reference mode; no candidate is assigned twice.
     """
     spans = np.nan_to_num(mac if repeated is None else repeated @ mac)
     best = spans.argmax(axis=2)
@@ -41,8 +41,8 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
 def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Samples in which a mode beyond the candidates could have a higher MAC with a reference than the one assigned.
 
-    The MACs of a reference with all modes, which are orthogonal, add up to 1: what the candidates leave of it is the
-    most that any other mode can have.
+    Modes are orthogonal, so the MACs of a reference with all modes add up to 1 (with repeated references, to their
+    number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum.
     """
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
@@ -51,6 +51,6 @@ def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: N
 
 
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of some ascending eigenvalues are the same but for rounding, (n_modes, n_modes)."""
+    """Which of some ascending eigenvalues equal each other up to rounding, (n_modes, n_modes)."""
     cluster = np.cumsum(np.diff(eigenvalues, prepend=0) > REPEATED * eigenvalues)
     return cluster[:, np.newaxis] == cluster
