@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, Beam, Structure, mac, share_reordered
-from skthermo.fem.modal import pair_modes
+from skthermo.fem.modal import may_be_missed, pair_modes, repeated_modes
 
 
 def crossing(**options):
@@ -67,6 +67,32 @@ def test_many_intruders_do_not_push_out_a_tracked_mode():
     model = AffineModel(terms, np.eye(13), n_modes=2, track=True)
     np.testing.assert_allclose(model.frequencies([[400.0, 1.0], [1.0, 0.001]]), [[20, 2], [1, 2 * 0.001**0.5]])
     assert np.diagonal(model.nominal_mac(model.modes([[400.0, 1.0]])[1])[0]).min() > 0.99
+
+
+def test_following_a_mode_among_few_candidates_finds_the_same_as_among_all_modes():
+    """A mode that rises through all others and mixes with each of them; five of the eight are examined first."""
+    random = np.random.default_rng(0)
+    shape = np.append(1, 0.2 * random.standard_normal(7))
+    terms = {("own",): np.outer(shape, shape), ("others",): np.diag(2 * np.arange(8.0))}
+    theta = random.uniform([0.5, 0.8], [20, 1.25], (500, 2))
+    frequencies, shapes = AffineModel(terms, np.eye(8), n_modes=8).modes(theta)
+    followed = AffineModel(terms, np.eye(8), n_modes=1, track=True)
+    closest = followed.nominal_mac(shapes)[:, 0].argmax(axis=1)
+    assert np.count_nonzero(closest >= 5) > 100
+    expected = np.take_along_axis(frequencies, closest[:, np.newaxis], axis=1)
+    np.testing.assert_allclose(followed.frequencies(theta), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("repeated", [np.eye(3, dtype=bool), repeated_modes(np.array([1.0, 4.0, 4.0]))])
+def test_a_single_mode_beyond_the_candidates_is_missed_if_it_has_a_higher_mac_than_one_assigned(repeated):
+    """Four orthogonal modes, three of them candidates: what is left of the MACs is the fourth mode's."""
+    bases = np.linalg.qr(np.random.default_rng(0).standard_normal((2000, 4, 4)))[0]
+    mac = bases[:, :3] ** 2
+    order = pair_modes(mac[:, :, :3], repeated)
+    assigned = np.take_along_axis(repeated @ mac, order[:, :, np.newaxis], axis=2)[:, :, 0]
+    missed = ((repeated @ mac)[:, :, 3] > assigned).any(axis=1)
+    assert 200 < missed.sum() < 1800
+    np.testing.assert_array_equal(may_be_missed(mac[:, :, :3], order, repeated), missed)
 
 
 def square_mast(**options):
