@@ -1,5 +1,7 @@
 """Modes that cross, and the criterion that tells them apart."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -137,6 +139,15 @@ def test_modes_are_followed_where_mass_changes():
     np.testing.assert_allclose(
         model.nominal_mac(model.modes(theta)[1]), np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12
     )
+
+
+def test_the_sum_of_the_macs_is_the_highest_that_distinct_candidates_have():
+    macs = np.random.default_rng(0).uniform(size=(200, 3, 4))
+    order = pair_modes(macs)
+    found = np.take_along_axis(macs, order[:, :, np.newaxis], axis=2).sum(axis=(1, 2))
+    choices = [macs[:, range(3), choice].sum(axis=1) for choice in permutations(range(4), 3)]
+    np.testing.assert_allclose(found, np.max(choices, axis=0), rtol=1e-12)
+    assert (np.diff(np.sort(order, axis=1), axis=1) > 0).all()
 
 
 def test_no_candidate_serves_two_modes():

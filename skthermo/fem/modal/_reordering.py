@@ -7,7 +7,10 @@ from skthermo._arrays import Array
 from skthermo.fem._protocol import ModalModel
 from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._mac import mac
-from skthermo.fem.modal._tracking import SAME_MODE, pair_modes
+from skthermo.fem.modal._tracking import pair_modes
+
+SAME_MODE = 0.5
+"""MAC above which no other mode can have a higher one with the same reference: its MACs with all modes add up to 1."""
 
 ROWS_AT_ONCE = 64
 """Samples whose shapes, at all degrees of freedom, are held at once."""

@@ -4,9 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-SAME_MODE = 0.5
-"""MAC with a reference above which no other mode can have a higher one: shapes are orthogonal, and MACs add up to 1."""
-
 REPEATED = 1e-6
 """Relative distance of eigenvalues below which they count as repeated: rounding then decides their shapes."""
 
@@ -29,9 +26,8 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
     """
     spans = np.nan_to_num(mac if repeated is None else repeated @ mac)
     best = spans.argmax(axis=2)
-    clear = np.take_along_axis(spans, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > SAME_MODE
     distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
-    for sample in np.flatnonzero(~(clear & distinct)):
+    for sample in np.flatnonzero(~distinct):
         best[sample] = linear_sum_assignment(spans[sample], maximize=True)[1]
     for cluster in () if repeated is None else np.unique(repeated, axis=0):
         best[:, cluster] = np.sort(best[:, cluster], axis=1)
