@@ -81,14 +81,14 @@ class Point:
         return 2 * (slopes * self.values) @ self.jacobian()
 
     def information(self) -> Array:
-        """Fisher information of measurements with the noise that the weights stand for, and of the prior.
+        """Fisher information of the prior, and of measurements whose noise is that for which the weights are made.
 
-        A relative noise s of shapes at n degrees of freedom gives 1 / sqrt(MAC) - 1 the standard deviation
-        s^2 / sqrt(2 (n - 1)), one over the weight, and the tangents each the variance s^2 / (n - 1).
+        A shape with the weight sqrt(2 (n - 1)) / s^2 has noise of s times its root mean square at n degrees of freedom:
+        each of its tangents, and of the unit shape's components, has the variance s^2 / n.
         """
         plain, slopes = self.blocks()
         weights = self._residuals.measured.shape_weights[self._residuals.weighted]
-        precisions = weights * np.sqrt(max(len(slopes) - 1, 0) / 2)
+        precisions = weights * len(slopes) / np.sqrt(2 * max(len(slopes) - 1, 1))
         return plain.T @ plain + np.einsum("djp,j,djq->pq", slopes, precisions, slopes)
 
     def blocks(self) -> tuple[Array, Array]:

@@ -89,6 +89,15 @@ def test_more_unknowns_than_residuals_warn():
     ModelUpdater(TRUSS, prior=0.1).fit(np.where(np.arange(6) < 2, F, np.nan))
 
 
+def test_a_shape_counts_one_residual_less_than_degrees_of_freedom():
+    only_first = np.where(np.arange(6) == 0, F, np.nan)
+    shape = np.where(np.arange(6) == 0, SHAPES[:3], np.nan)
+    with pytest.warns(UserWarning, match="4 parameters are to be found from 3 residuals"):
+        ModelUpdater(TRUSS, shape_weight=1.0).fit(only_first, shapes=shape, dofs=range(3))
+    with pytest.warns(UserWarning, match="4 parameters are to be found from 1 residuals"):
+        ModelUpdater(TRUSS).fit(only_first, shapes=shape, dofs=range(3))
+
+
 def test_a_model_without_modes_at_any_start():
     model = CallableModel(lambda row: [np.nan], ["k"], 1)
     with pytest.raises(ValueError, match="no modes at any of the 2 starts"):
