@@ -54,9 +54,9 @@ def sensitivity(
     Notes
     -----
     Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j. Where the model has
-    no frequencies on one side, the difference to theta itself takes its place. Frequencies that
-    are rounded to eps = 2.2e-16 of their value give S an error of about eps / step. A step below sqrt(eps) = 1.5e-8 is
-    refused: it loses more than half of the digits.
+    no frequencies on one side, the difference to theta itself takes its place. Rounding of frequencies to a share
+    eps = 2.2e-16 gives S an error of about eps / step, so that a step below sqrt(eps) = 1.5e-8 loses more than half of
+    the digits, and is refused.
 
     References
     ----------
@@ -84,8 +84,8 @@ def sensitivity(
     elif method == "central":
         if not isinstance(step, Real) or not SMALLEST_STEP <= step < 1:
             raise ValueError(
-                f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which differences of "
-                "frequencies are mostly rounding, to 1, such as 0.01"
+                f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which rounding takes "
+                "more than half of the digits, to 1, such as 0.01"
             )
         gradient = central_jacobian(partial(evaluate, model), row, step)
     else:

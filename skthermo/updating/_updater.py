@@ -98,7 +98,7 @@ class ModelUpdater(BaseEstimator):
     swap places and fit each other's frequencies. A warning says so.
 
     *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
-    v = sqrt(2 (n - 1)) / s^2, one over the standard deviation of their residual. With weights thousands of times
+    v = sqrt(2 (n - 1)) / s^2, about one over the standard deviation of their residual. With weights thousands of times
     smaller, the objective is a narrow curved valley, in which a search takes many evaluations. ``covariance_`` holds
     if ``frequency_std`` and ``shape_weight`` (or 0) describe the noise of the measurement. Without ``frequency_std``,
     every frequency counts as having noise of 100 %, and ``covariance_`` serves for comparison only. It takes no account

@@ -185,7 +185,7 @@ class CallableModel:
         }
 
     def quiet(self) -> "CallableModel":
-        """The same model, in which rows at which the function fails are NaN without a word.
+        """The same model, which gives NaN without warning or error where the function fails.
 
         Returns
         -------
