@@ -41,10 +41,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/affine/_core.py", "fem/test_laws.py"): [
         ("mass in the jacobian", "gradient -= eigenvalues", "gradient += eigenvalues"),
     ],
-    ("fem/affine/_core.py", "updating/test_updater.py"): [
+    ("fem/affine/_core.py", "updating/test_pairing.py"): [
         ("modes beyond those of the model", "GUARD_MODES = 4", "GUARD_MODES = 0"),
     ],
-    ("updating/_comparison.py", "updating/test_updater.py"): [
+    ("updating/_comparison.py", "updating/test_pairing.py"): [
         ("pairing where sensors are few", "NOMINAL_SHARE = 0.25", "NOMINAL_SHARE = 0.0"),
     ],
     ("updating/_information.py", "updating/test_updater.py"): [
