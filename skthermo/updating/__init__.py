@@ -1,4 +1,4 @@
-"""Calibrating FE models to measured modes: sensitivities, identifiability, model updating."""
+"""Calibration of FE models to measured modes: sensitivities, identifiability, model updating."""
 
 from skthermo.updating._identifiability import identifiability
 from skthermo.updating._information import cramer_rao
