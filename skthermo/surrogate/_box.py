@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 
-NEAR = 1.5
+NEAR = 2.0
 """Half-widths from the middle of the box up to which parameters count as near it: a surrogate bends little there."""
 
 MANY = 0.05
