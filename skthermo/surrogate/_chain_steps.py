@@ -1,5 +1,6 @@
 """The steps of `DataInformedFEM`: complete, invert, report; predict parameters, solve, go back to what is measured."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,7 @@ class ChainSteps:
         message = self.training_range_.warning(mapper_inputs(self.mapper_, X))
         if message:
             warn_user(message, "foreign weather")
-        theta = as_columns(self.mapper_.predict(X)).copy()
-        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+        theta, impossible = self._possible(self.mapper_.predict(X))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
             warn_user(
@@ -39,11 +39,19 @@ class ChainSteps:
                 f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
                 "impossible parameters",
             )
-            theta[impossible] = np.nan
         return theta
 
-    def _frequencies(self, simulator: Simulator, X: ArrayLike) -> NDArray[np.float64]:
+    def _possible(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Parameters, NaN in rows that no structure has, and which rows these are."""
+        theta = as_columns(theta).copy()
+        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+        theta[impossible] = np.nan
+        return theta, impossible
+
+    def _frequencies(self, X: ArrayLike, damage: Mapping[str, float] | None = None) -> NDArray[np.float64]:
         """Frequencies at given temperatures, in the measured domain."""
+        check_is_fitted(self)
+        simulator = self.simulator_.damaged(damage)
         frequencies = simulator.frequencies(self._predict_theta(X), self.n_jobs)
         return as_floats(self.aligner_.inverse_transform(frequencies))
 
@@ -60,7 +68,7 @@ class ChainSteps:
         trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
         self.training_range_ = TrainingRange.of(inputs, trained)
         rows = spread_rows(trained)
-        predicted = self.simulator_.frequencies(as_columns(self.mapper_.predict(T))[rows], self.n_jobs)
+        predicted = self.simulator_.frequencies(self._possible(self.mapper_.predict(T))[0][rows], self.n_jobs)
         predicted = as_floats(self.aligner_.inverse_transform(predicted))
         self.report_ = fit_report(self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted)
         warn_each(self.report_.warnings())

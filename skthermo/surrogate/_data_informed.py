@@ -101,7 +101,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
     >>> from skthermo.surrogate import DataInformedFEM, InverseSurrogate
     >>> year = make_truss_campaign(random_state=0)
     >>> model = make_truss()
-    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(bounds=0.2, noise=0.01), random_state=0)
+    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(noise=0.01), random_state=0)
     >>> fem = fem.fit(year.temperatures, year.frequencies)
     >>> later = make_truss_campaign(damage={"bottom": 0.5}, random_state=1)
     >>> damaged = fem.simulate(later.temperatures, damage={"bottom": 0.5})
@@ -227,7 +227,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         ndarray or DataFrame of shape (n_samples, n_modes)
             In Hz, in the measured domain.
         """
-        return frame_like(X, self._frequencies(self.simulator_, X), self.mode_names_)
+        return frame_like(X, self._frequencies(X), self.mode_names_)
 
     def simulate(
         self,
@@ -260,7 +260,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         ValueError
             If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
         """
-        frequencies = self._frequencies(self.simulator_.damaged(damage), X)
+        frequencies = self._frequencies(X, damage)
         return frame_like(X, add_noise(frequencies, noise, random_state=random_state), self.mode_names_)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:

@@ -31,7 +31,7 @@ CLEARLY_BETTER = 0.25
 class FitReport:
     """What `DataInformedFEM.fit` has found in the records.
 
-    Attributes
+    Parameters
     ----------
     n_rows, n_trained : int
         Rows given, and rows that trained the temperature mapper.
@@ -50,6 +50,16 @@ class FitReport:
         MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
     n_scored : int
         Rows behind ``errors``, spread evenly over those that trained.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.iloc[10:15, 0] = float("nan")
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
+    (360, {"temperature 'T1' is missing": 5})
     """
 
     n_rows: int
