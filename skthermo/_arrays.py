@@ -11,7 +11,7 @@ Matrix: TypeAlias = Array | scipy.sparse.csc_array
 RandomState: TypeAlias = int | np.random.RandomState | None
 
 
-def as_floats(values: ArrayLike) -> Array:
+def as_floats(values: Any) -> Array:
     """An array of floats; missing values of a nullable pandas column become NaN."""
     if hasattr(values, "iloc"):  # a pandas frame or series
         return values.to_numpy(dtype=float, na_value=np.nan)

@@ -78,6 +78,8 @@ class ReducedModel(AffineBase):
     True
     """
 
+    _basis: Array
+
     def __init__(
         self,
         full: "AffineModel",
