@@ -145,9 +145,7 @@ def main():
         "sorted": (False, bounds()),
         "followed, E_bot 30 %": (True, bounds(E_bot=0.3)),
     }
-    fits = {
-        name: update(bridge(track, limits), limits, options.starts) for name, (track, limits) in settings.items()
-    }
+    fits = {name: update(bridge(track, limits), limits, options.starts) for name, (track, limits) in settings.items()}
     table_a4 = pd.DataFrame({"paper": PAPER_A4}, index=list(DESIGN))
     errors = pd.DataFrame({f"paper, {when}": np.divide(f, MEASURED) - 1 for when, f in PAPER_A5.items()}, index=MODES)
     errors["here, before"] = fits["followed"][0].table_["error_before"].to_numpy() / 100

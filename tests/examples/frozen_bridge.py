@@ -1,6 +1,6 @@
 """Monitoring of a bridge that freezes by a known law, as a file for whoever has no data of Z24.
 
-    python -m tests.examples.frozen_bridge z24.csv
+python -m tests.examples.frozen_bridge z24.csv
 """
 
 import sys
