@@ -33,7 +33,7 @@ def real_array(values: Any, what: str) -> Array:
         raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
 
 
-def as_floats(values: ArrayLike) -> Array:
+def as_floats(values: Any) -> Array:
     """An array of floats; missing values of a nullable pandas column become NaN."""
     if hasattr(values, "iloc"):  # a pandas frame or series
         return values.to_numpy(dtype=float, na_value=np.nan)

@@ -1,7 +1,10 @@
 """What is doubtful about records is named, once, with counts."""
 
+import os
 import pickle
+import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,7 +17,6 @@ from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z2
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.datasets.test_z24 import SKTHERMO_DATA
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
@@ -24,6 +26,10 @@ LATER = make_truss_campaign(random_state=1).temperatures
 
 def chain(**options):
     return DataInformedFEM(TRUSS, **({"random_state": 0} | options))
+
+
+def swapped(one, other):
+    return F[[{one: other, other: one}.get(name, name) for name in F]]
 
 
 @pytest.fixture(scope="module")
@@ -60,12 +66,6 @@ class TestTheReport:
         measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
         report = chain(mapper=make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))).fit(air, measured).report_
         assert report.left_out.to_dict() == {
-            "temperature 'T2' is missing": 3,
-            "frequency 'f4' is missing": 2,
-            "frequency 'f5' is missing": 1,
-            "a lag reaches into a gap": 1,
-            "no parameters were found": 0,
-        } | {} or report.left_out.to_dict() == {
             "temperature 'T2' is missing": 3,
             "frequency 'f4' is missing": 2,
             "frequency 'f5' is missing": 1,
@@ -113,9 +113,7 @@ class TestWarningsOfFit:
         record = caught(chain(mapper=TemperatureMapper(Ridge())).fit, air, measured)
         texts = [str(warning.message) for warning in record]
         for message in messages:
-            with pytest.warns(UserWarning, match=message):
-                for text in texts:
-                    warnings.warn(text, stacklevel=1)
+            assert any(re.search(message, text) for text in texts), texts
         assert len(texts) == len(set(texts))
         assert all(warning.filename == __file__ for warning in record)
 
@@ -140,9 +138,9 @@ class TestWarningsOfFit:
         assert not caught(fem.simulate, LATER)
         assert not caught(fem.score, year.temperatures, year.frequencies)
 
-    @pytest.mark.skipif(SKTHERMO_DATA is None, reason="SKTHERMO_DATA names no folder with the Z24 data")
+    @pytest.mark.skipif("SKTHERMO_DATA" not in os.environ, reason="SKTHERMO_DATA names no folder with the Z24 data")
     def test_a_real_bridge_gives_no_warning(self):
-        z24 = load_z24(SKTHERMO_DATA / "z24" / "z24_monitoring.csv")
+        z24 = load_z24(Path(os.environ["SKTHERMO_DATA"]) / "z24" / "z24_monitoring.csv")
         healthy = (z24.state == "undamaged").to_numpy()
         model = make_z24()
         fem = DataInformedFEM(model, aligner=BiasAligner(model, method="scale"), reduce=True, random_state=0)
