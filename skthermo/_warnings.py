@@ -6,13 +6,19 @@ import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from types import FrameType
+from typing import ClassVar
 
 import joblib
 import sklearn
 
 OURS = tuple(str(Path(package).parent) + os.sep for package in (__file__, sklearn.__file__, joblib.__file__))
 
-_given: set[tuple] = set()
+
+class _Folds:
+    """The cross-validation or search that warned last, by its frame, and the kinds of warnings it has given."""
+
+    frame: FrameType | None = None
+    kinds: ClassVar[set[str]] = set()
 
 
 def warn_user(message: str, kind: str) -> None:
@@ -23,17 +29,19 @@ def warn_user(message: str, kind: str) -> None:
     message : str
         What is to be said.
     kind : str
-        Within one cross-validation or search, one warning of each kind is given, not one for each fold.
+        One cross-validation or search gives one warning of each kind, not one for each fold.
     """
-    frame, level, in_folds = sys._getframe(1), 2, False
+    frame, level, folds = sys._getframe(1), 2, None
     while frame.f_back is not None and frame.f_code.co_filename.startswith(OURS):
-        in_folds = in_folds or _runs_folds(frame)
+        if frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
+            folds = frame
         frame, level = frame.f_back, level + 1
-    if in_folds:
-        call = (kind, id(frame), frame.f_code.co_filename, frame.f_lasti)
-        if call in _given:
+    if folds is not None:
+        if folds is not _Folds.frame:
+            _Folds.frame, _Folds.kinds = folds, set()
+        if kind in _Folds.kinds:
             return
-        _given.add(call)
+        _Folds.kinds.add(kind)
     warnings.warn(message, UserWarning, stacklevel=level)
 
 
@@ -41,8 +49,3 @@ def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
     """Give warnings by kind and text."""
     for kind, message in warnings_by_kind:
         warn_user(message, kind)
-
-
-def _runs_folds(frame: FrameType) -> bool:
-    module = frame.f_globals.get("__name__", "")
-    return module.startswith("sklearn.model_selection")

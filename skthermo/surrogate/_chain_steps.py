@@ -68,7 +68,9 @@ class ChainSteps:
         trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
         self.training_range_ = TrainingRange.of(inputs, trained)
         rows = spread_rows(trained)
-        predicted = self.simulator_.frequencies(self._possible(self.mapper_.predict(T))[0][rows], self.n_jobs)
+        predicted = self.simulator_.frequencies(
+            self._possible(self.mapper_.predict(T))[0][rows], self.n_jobs, warn=False
+        )
         predicted = as_floats(self.aligner_.inverse_transform(predicted))
         self.report_ = fit_report(self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted)
         warn_each(self.report_.warnings())

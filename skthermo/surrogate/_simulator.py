@@ -51,7 +51,7 @@ class Simulator:
         reduced = None if self.reduced is None else self.reduced.damaged(damage)
         return Simulator(self.model.damaged(damage), reduced, self.box)
 
-    def frequencies(self, theta: Array, n_jobs: int | None = None) -> Array:
+    def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""
         if self.reduced is None:
             self._hint(len(theta))
@@ -61,11 +61,12 @@ class Simulator:
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
         if outside.any():
-            warn_user(
-                f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by the "
-                "full one; wider bounds of the inverse would make that box wider",
-                "outside the reduced model",
-            )
+            if warn:
+                warn_user(
+                    f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
+                    "the full one; wider bounds of the inverse would make that box wider",
+                    "outside the reduced model",
+                )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
         return frequencies
 
