@@ -272,8 +272,18 @@ def main():
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
     options = parser.parse_args()
     bridge = Bridge(find(options.data and Path(options.data)))
+    T, F, T_test, _ = bridge.split()
+    fem = chain(bridge_model(), bounds=0.3).fit(T, F)
 
     report_model()
+    print(f"The fit on the first {len(T)} healthy records:\n\n{fem.report_}\n")
+    beyond = fem.applicability(T_test).drop(columns="outside_bounds").max(axis=1)
+    print(f"Later weather: {(beyond > 0.25).mean():.0%} of the last {len(T_test)} records have a temperature that lies")
+    print(
+        f"more than a quarter of the training range outside it, the warmest {beyond.max():.0%}. Each prediction below"
+    )
+    print("would warn of that.\n")
+    warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
     print(f"MAPE in percent on the last {len(bridge.T) - bridge.n_train} of {len(bridge.T)} healthy records; ratio of")
     print("the means; error of the round trip through M1 and the FE model on the training records\n")
     print(hold_out_table(bridge).to_string(na_rep=""), end="\n\n")
@@ -285,7 +295,6 @@ def main():
     print("Alarms in percent of the records; the threshold leaves 2 % of the measured healthy ones above it\n")
     print(damage_table(indices), end="\n\n")
 
-    fem = chain(bridge_model(), bounds=0.3).fit(*bridge.split()[:2])
     figures = {
         "z24_over_time": plot_over_time(bridge, fem),
         "z24_over_temperature": plot_over_temperature(bridge, fem),

@@ -33,7 +33,7 @@ def real_array(values: Any, what: str) -> Array:
         raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
 
 
-def as_floats(values: ArrayLike) -> Array:
+def as_floats(values: Any) -> Array:
     """An array of floats; values that are masked or missing become NaN.
 
     Raises

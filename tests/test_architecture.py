@@ -22,7 +22,7 @@ MAY_IMPORT = {
     "preprocessing": set(),
     "metrics": set(),
     "detection": {"metrics"},
-    "surrogate": {"fem", "metrics"},
+    "surrogate": {"fem", "metrics", "updating"},
     "updating": {"fem", "metrics"},
     "datasets": {"fem"},
 }

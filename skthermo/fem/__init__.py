@@ -1,6 +1,7 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
 from skthermo.fem._bounds import check_bounds
+from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -37,6 +38,7 @@ __all__ = [
     "Structure",
     "add_noise",
     "check_bounds",
+    "check_dofs",
     "check_noise",
     "check_theta",
     "evaluate",

@@ -51,8 +51,8 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
         return np.tile([1 - array, 1 + array], (len(names), 1))
     if array.shape != (len(names), 2):
         raise ValueError(
-            f"bounds has shape {array.shape}; expected a half-width, ({len(names)}, 2), lowest and highest multipliers "
-            f"of {names}, or a mapping of these names"
+            f"bounds has shape {array.shape}; expected a half-width or ({len(names)}, 2), lowest and highest "
+            f"multipliers of {names}, or a mapping of these names"
         )
     for name, (lowest, highest) in zip(names, array, strict=True):
         if not 0 < lowest < highest < np.inf:

@@ -8,6 +8,8 @@ from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._frames import check_columns, check_same_rows, frame_like
 from skthermo._validation import check_array, is_model, seed_parts, seeded, validate_data
+from skthermo.fem import check_bounds
+from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 
@@ -42,7 +44,9 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
 def clone_parts(chain: Any) -> Parts:
     """Clones of the chain's parts, with its model and seeds where they have none of their own."""
     parts = Parts(
-        inverse=InverseSurrogate() if chain.inverse is None else clone(chain.inverse),
+        inverse=InverseSurrogate(reduce=chain.reduce, n_jobs=chain.n_jobs)
+        if chain.inverse is None
+        else clone(chain.inverse),
         mapper=TemperatureMapper() if chain.mapper is None else clone(chain.mapper),
         aligner=passthrough() if chain.aligner == "passthrough" else clone(chain.aligner),
         imputer=None if chain.imputer == "passthrough" else clone(chain.imputer),
@@ -62,6 +66,15 @@ def clone_parts(chain: Any) -> Parts:
         if part is not None:
             seed_parts(part, random_state)
     return parts
+
+
+def box_of(inverse: BaseEstimator) -> Box | None:
+    """Bounds of the first `InverseSurrogate` that an inverse is or holds, if it has a model."""
+    for part in (inverse, *inverse.get_params().values()):
+        if isinstance(part, InverseSurrogate) and part.model is not None:
+            names = tuple(part.model.parameter_names)
+            return Box(check_bounds(part.bounds, names), names)
+    return None
 
 
 def passthrough() -> FunctionTransformer:

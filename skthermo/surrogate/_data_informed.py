@@ -1,8 +1,8 @@
 """The whole chain: temperatures and frequencies in, a thermal FE model out."""
 
-import warnings
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from numbers import Integral, Real
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -13,23 +13,24 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._validation import (
     HasMethods,
+    Interval,
     StrOptions,
     _fit_context,
     check_is_fitted,
     clone_sharing_models,
-    validate_data,
 )
-from skthermo.fem import FEModel, add_noise, evaluate
+from skthermo._warnings import warn_each
+from skthermo.fem import FEModel, add_noise
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._chain_parts import clone_parts, read_records
-
-POSSIBLE = (1e-6, 1e6)
-"""Multipliers outside which a model's matrices lose all digits."""
+from skthermo.surrogate._applicability import mapper_inputs
+from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
+from skthermo.surrogate._chain_steps import ChainSteps
+from skthermo.surrogate._report import mode_warnings
 
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(RegressorMixin, BaseEstimator):
+class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
     """FE model whose parameters follow temperature as monitoring data say.
 
     The method of Kamali et al. (2026), Section 2: measured frequencies become parameters
@@ -51,6 +52,12 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
     imputer : transformer or "passthrough", default="passthrough"
         Completes the frequencies from temperatures and frequencies side by side, in `fit` only.
         Without it, rows with a missing mode do not train M2.
+    reduce : bool or float, default=False
+        Whether predictions and simulations go through ``model.reduced`` in and near the bounds of the inverse, which
+        large models are solved much faster by. True allows a relative error of 1e-5 in the frequencies, a number that
+        error. Rows outside are solved by the model itself, with a warning that counts them.
+    n_jobs : int, optional
+        Jobs over which rows are spread where the model is solved for many.
     random_state : int, RandomState or None, default=None
         Seeds every part that has no seed of its own.
 
@@ -62,6 +69,14 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         Fitted clone.
     parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
         Multipliers that M1 found in the training data, eq. (5).
+    report_ : FitReport
+        What `fit` has found: rows that were left out and why, offsets of modes, errors, what is doubtful.
+    training_range_ : TrainingRange
+        Lowest and highest value of each input of M2, lags included.
+    box_ : Box or None
+        Bounds of the inverse.
+    simulator_ : Simulator
+        The model and, with ``reduce``, its reduced model.
     parameter_names_, mode_names_ : list of str
         Columns of the parameters and of the frequencies.
     n_features_in_ : int
@@ -86,7 +101,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
     >>> from skthermo.surrogate import DataInformedFEM, InverseSurrogate
     >>> year = make_truss_campaign(random_state=0)
     >>> model = make_truss()
-    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(bounds=0.2, noise=0.01), random_state=0)
+    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(noise=0.01), random_state=0)
     >>> fem = fem.fit(year.temperatures, year.frequencies)
     >>> later = make_truss_campaign(damage={"bottom": 0.5}, random_state=1)
     >>> damaged = fem.simulate(later.temperatures, damage={"bottom": 0.5})
@@ -100,6 +115,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         "mapper": [HasMethods(["fit", "predict"]), None],
         "aligner": [HasMethods(["fit", "transform", "inverse_transform"]), StrOptions({"passthrough"})],
         "imputer": [HasMethods(["fit_transform"]), StrOptions({"passthrough"})],
+        "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
+        "n_jobs": [Integral, None],
         "random_state": ["random_state"],
     }
 
@@ -111,6 +128,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         mapper: BaseEstimator | None = None,
         aligner: BaseEstimator | str = "passthrough",
         imputer: BaseEstimator | str = "passthrough",
+        reduce: bool | float = False,
+        n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.model = model
@@ -118,6 +137,8 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         self.mapper = mapper
         self.aligner = aligner
         self.imputer = imputer
+        self.reduce = reduce
+        self.n_jobs = n_jobs
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
@@ -146,9 +167,13 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
+        self.box_ = box_of(self.inverse_)
+        self.simulator_ = self._simulator()
+        warn_each(mode_warnings(self.model, F))
         theta = self._fit_inverse(self._completed(T, F))
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
         self.mapper_.fit(T, self.parameters_)
+        self._report(T, F, theta)
         return self
 
     def estimate_parameters(self, F: ArrayLike) -> Table:
@@ -202,7 +227,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         ndarray or DataFrame of shape (n_samples, n_modes)
             In Hz, in the measured domain.
         """
-        return frame_like(X, self._frequencies(self.model, X), self.mode_names_)
+        return frame_like(X, self._frequencies(X), self.mode_names_)
 
     def simulate(
         self,
@@ -235,7 +260,7 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         ValueError
             If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
         """
-        frequencies = self._frequencies(self._damaged_model(damage), X)
+        frequencies = self._frequencies(X, damage)
         return frame_like(X, add_noise(frequencies, noise, random_state=random_state), self.mode_names_)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
@@ -257,49 +282,28 @@ class DataInformedFEM(RegressorMixin, BaseEstimator):
         check_same_rows(X, y, ("temperatures", "frequencies"))
         return complete_r2(y, self.predict(X))
 
-    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
+    def applicability(self, X: ArrayLike) -> pd.DataFrame:
+        """How far weather and parameters are from what was learned, row by row.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        DataFrame
+            On X's index: a column for each input of M2, lags included, with how far it is outside the rows that
+            trained M2, in units of its range there (0 inside); and ``outside_bounds``, whether a parameter is outside
+            the bounds of the inverse.
+        """
         check_is_fitted(self)
-        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        theta = as_columns(self.mapper_.predict(X)).copy()
-        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
-        if impossible.any():
-            row = np.flatnonzero(impossible)[0]
-            warnings.warn(
-                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
-                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
-                UserWarning,
-                stacklevel=4,
-            )
-            theta[impossible] = np.nan
-        return theta
-
-    def _frequencies(self, model: FEModel, X: ArrayLike) -> NDArray[np.float64]:
-        """Frequencies of a model at given temperatures, in the measured domain."""
-        frequencies = evaluate(model, self._predict_theta(X))
-        return as_floats(self.aligner_.inverse_transform(frequencies))
-
-    def _damaged_model(self, damage: Mapping[str, float] | None) -> FEModel:
-        if not damage:
-            return self.model
-        if not hasattr(self.model, "damaged"):
-            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
-        return self.model.damaged(damage)
-
-    def _completed(self, T: Any, F: Any) -> Any:
-        """Frequencies without gaps, where there is an imputer."""
-        if self.imputer_ is None:
-            return F
-        n_sensors, n_modes = T.shape[1], F.shape[1]
-        values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-        return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
-
-    def _fit_inverse(self, F: Any) -> NDArray[np.float64]:
-        """Fit aligner and M1, which gives the parameters of the training data."""
-        aligned = self.aligner_.fit(F).transform(F)
-        theta = as_floats(self.inverse_.fit(aligned).transform(aligned))
-        if theta.shape[1] != len(self.parameter_names_):
-            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
-        return theta
+        inputs = mapper_inputs(self.mapper_, X)
+        excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
+        excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
+        theta = as_columns(self.mapper_.predict(X))
+        outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
+        return excess.assign(outside_bounds=outside)
 
     def __sklearn_clone__(self) -> "DataInformedFEM":
         return clone_sharing_models(self)

@@ -1,7 +1,8 @@
-"""Calibrating FE models to measured modes: sensitivities, identifiability, model updating."""
+"""Calibration of FE models to measured modes: sensitivities, identifiability, model updating."""
 
 from skthermo.updating._identifiability import identifiability
+from skthermo.updating._information import cramer_rao
 from skthermo.updating._sensitivity import select_parameters, sensitivity
 from skthermo.updating._updater import ModelUpdater
 
-__all__ = ["ModelUpdater", "identifiability", "select_parameters", "sensitivity"]
+__all__ = ["ModelUpdater", "cramer_rao", "identifiability", "select_parameters", "sensitivity"]

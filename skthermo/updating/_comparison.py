@@ -1,4 +1,4 @@
-"""The model's modes beside the measured ones."""
+"""The model's modes paired with the measured ones."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,33 +7,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo.fem import FEModel, LocalModel, evaluate
+from skthermo._arrays import Array, as_floats
+from skthermo.fem import FEModel, LocalModel
 from skthermo.updating._measured import Measured
 from skthermo.updating._sensitivity import central_jacobian
 
-Array = NDArray[np.float64]
-
 DIFFERENCE_STEP = 1e-3
-"""Relative step of central differences where a model has no derivatives."""
+"""Relative step of central differences for a model without ``jacobian``."""
 
 NOMINAL_SHARE = 0.25
-"""What likeness to the nominal modes counts beside the MAC: it decides where sensors cannot tell shapes apart."""
+"""Weight of the MAC with the nominal modes beside the MAC with the measured shapes. It decides where sensors are so few
+that several modes look the same at them."""
 
 
 @dataclass
-class Counterparts:
-    """The model's modes at one theta that are compared with the measured ones, in their order.
+class PairedModes:
+    """The model's modes at one theta, one for each measured mode and in their order.
 
     Attributes
     ----------
     frequencies : ndarray of shape (n_measured,)
         In Hz.
     shapes : ndarray of shape (n_dofs, n_measured)
-        At the measured degrees of freedom.
+        At the measured degrees of freedom, of unit modal mass.
     ranks : ndarray of int of shape (n_measured,) or None
-        Which of the lowest modes they are, where shapes have told.
+        Which of the model's modes they are, the lowest being 0. None where modes are paired column by column.
     derivatives : callable
-        Gives those of frequencies (n_measured, n_parameters) and shapes (n_dofs, n_measured, n_parameters).
+        Returns the derivatives of frequencies (n_measured, n_parameters) and shapes (n_dofs, n_measured, n_parameters).
     """
 
     frequencies: Array
@@ -42,40 +42,43 @@ class Counterparts:
     derivatives: Callable[[], tuple[Array, Array]]
 
 
-def counterparts(model: FEModel, measured: Measured, theta: Array) -> Counterparts:
-    """Modes paired by their shapes where some were measured, else column by column."""
+def paired_modes(model: FEModel, measured: Measured, theta: Array) -> PairedModes:
+    """Pair modes by their shapes where shapes were measured, else column by column."""
     if measured.dofs.size and hasattr(model, "local_modes"):
         return _by_shape(model, measured, theta)
     return _by_column(model, measured, theta[np.newaxis])
 
 
 def macs(shapes: Array, measured: Array) -> Array:
-    """MAC of measured unit shapes with as many shapes, one by one, (n_measured,)."""
+    """MAC of each shape with the measured unit shape in the same column, (n_measured,)."""
     return np.diagonal(mac_table(shapes, measured))
 
 
 def mac_table(shapes: Array, measured: Array) -> Array:
-    """MAC of measured unit shapes and all shapes, (n_measured, n_shapes); zero for shapes that no sensor feels."""
+    """MAC of measured unit shapes and all shapes, (n_measured, n_shapes); 0 for a shape that is zero at all sensors."""
     squares = (shapes**2).sum(axis=0)
     return (measured.T @ shapes) ** 2 / np.where(squares > 0, squares, np.inf)
 
 
-def _by_column(model: FEModel, measured: Measured, row: Array) -> Counterparts:
+def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
+    def frequencies_at(rows: Array) -> Array:
+        return as_floats(model.frequencies(rows))  # not `evaluate`, which warns of every theta without modes
+
     def derivatives() -> tuple[Array, Array]:
         jacobian = getattr(model, "jacobian", None)
-        gradient = jacobian(row)[0] if jacobian else central_jacobian(model, row, DIFFERENCE_STEP)
+        gradient = jacobian(row)[0] if jacobian else central_jacobian(frequencies_at, row, DIFFERENCE_STEP)
         return gradient[measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
-    frequencies = evaluate(model, row)[0, measured.columns]
-    return Counterparts(frequencies, np.empty((0, len(frequencies))), None, derivatives)
+    frequencies = frequencies_at(row)[0, measured.columns]
+    return PairedModes(frequencies, np.empty((0, len(frequencies))), None, derivatives)
 
 
-def _by_shape(model: LocalModel, measured: Measured, theta: Array) -> Counterparts:
+def _by_shape(model: LocalModel, measured: Measured, theta: Array) -> PairedModes:
     modes = model.local_modes(theta)
     shapes = modes.shapes(measured.dofs)
-    alike = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
+    mac_sums = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
     with_shape = measured.has_shape
-    alike[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
-    ranks = linear_sum_assignment(np.nan_to_num(alike), maximize=True)[1]
-    felt = measured.dofs if measured.shape_weights.any() else measured.dofs[:0]
-    return Counterparts(modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, felt))
+    mac_sums[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
+    ranks = linear_sum_assignment(np.nan_to_num(mac_sums), maximize=True)[1]
+    wanted_dofs = measured.dofs if measured.shape_weights.any() else measured.dofs[:0]
+    return PairedModes(modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, wanted_dofs))

@@ -1,4 +1,4 @@
-"""Which parameters measured modes can tell, and how well."""
+"""Which parameters measured modes can identify, and how accurately."""
 
 import numpy as np
 import pandas as pd
@@ -8,15 +8,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
+from skthermo._arrays import Array
 from skthermo.fem import FEModel, check_noise, shape_jacobian
 from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
-from skthermo.updating._measured import check_dofs
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 
-Array = NDArray[np.float64]
-
 COLLINEAR = 0.99
-"""Cosine of two parameters' effects from which on they count as one."""
+"""Cosine between two parameters' effects at and above which they cannot be told apart."""
 
 WELL_KNOWN = 0.1
 """Largest relative standard deviation of the estimates of a recommended subset."""
@@ -30,19 +28,20 @@ def identifiability(
     dofs: ArrayLike | None = None,
     shape_noise: float | None = None,
 ) -> Bunch:
-    """Which parameters measured modes can tell apart, and to what accuracy.
+    """Which parameters measured modes can identify, and how accurately.
 
     Parameters
     ----------
     model : FE model
-        Without a ``jacobian`` its derivatives are central differences.
+        If it has no ``jacobian``, its derivatives are central differences.
     theta : array-like of shape (n_parameters,), optional
-        Where; at the nominal parameters by default.
+        Multipliers at which to differentiate; 1 by default.
     noise : float or array-like of shape (n_modes,)
-        Relative standard deviation of the measured frequencies: of a mean of n records, that of a record over
+        Relative standard deviation of the measured frequencies. For a mean of n records, divide that of one record by
         sqrt(n).
     dofs : array-like of int of shape (n_dofs,), optional
-        Degrees of freedom, the first being 0, where mode shapes are measured too (of an `AffineModel`).
+        Degrees of freedom, the first being 0, where mode shapes are measured too. The model needs a method
+        ``local_modes``, as `AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 
@@ -52,23 +51,24 @@ def identifiability(
         With the attributes
 
         - ``sensitivity``: d ln f / d ln theta, a frame of shape (n_modes, n_parameters);
-        - ``singular_values``, ``condition_number``: of the sensitivities, each row weighted by the root mean square
-          noise over its own, and rows of shapes beneath where these are measured. The condition number is
+        - ``singular_values``, ``condition_number``: of the sensitivities, each row multiplied by the root mean square
+          noise over its own noise, with rows of shapes below where these are measured. The condition number is
           infinite if there are more parameters than rows;
         - ``deviations``: smallest possible relative standard deviation of each parameter's estimate when all
-          are estimated (Cramer-Rao), a series; infinite where it cannot be told from others;
-        - ``collinear``: lists of parameters whose effects are the same but for a factor (cosine of 0.99 or more);
+          are estimated (Cramer-Rao), a series; infinite where it cannot be told apart from others;
+        - ``collinear``: lists of parameters whose effects differ only by a factor (cosine of 0.99 or more);
         - ``recommended``: parameters that can be estimated together, the others held, with deviations of
           at most 0.1, most informative first.
 
     Raises
     ------
     ValueError
-        If noise is negative or zero for some modes only, or just one of ``dofs`` and ``shape_noise`` is given.
+        If noise is negative or zero for some modes only, just one of ``dofs`` and ``shape_noise`` is given, dofs are
+        not different degrees of freedom of the model, or it has no method ``local_modes``.
 
     See Also
     --------
-    ModelUpdater : Whose ``covariance_`` is the same at the optimum.
+    ModelUpdater : Its ``covariance_`` is the same bound, at the optimum.
 
     Notes
     -----
@@ -111,28 +111,25 @@ def identifiability(
 
     values = np.linalg.svd(rows, compute_uv=False)
     smallest = values[-1] if len(values) == len(names) else 0.0
-    order = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
+    ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
     return Bunch(
         sensitivity=S,
         singular_values=values,
         condition_number=float(values[0] / smallest) if smallest else np.inf,
         deviations=pd.Series(_deviations(rows, level), names),
         collinear=[[names[i] for i in group] for group in collinear_groups(rows)],
-        recommended=[names[i] for i in _recommended(rows, order, level)],
+        recommended=[names[i] for i in _recommended(rows, ranking, level)],
     )
 
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
-    """Derivatives of unit shapes by ln theta over their noise."""
-    if not hasattr(model, "local_modes"):
-        raise ValueError(f"shapes of {model!r} cannot be differentiated; expected an AffineModel")
+    """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
     if shape_noise is None or not 0 < shape_noise < np.inf:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
-    places = check_dofs(dofs, model.n_dof)
     row = theta_or_nominal(model, theta)
-    shapes, d_shapes = shape_jacobian(model, row, places)
+    shapes, d_shapes = shape_jacobian(model, row, dofs)
     slopes = tangent_derivatives(shapes, d_shapes, shape_directions(shapes)) * row[0]
-    return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(places)) / shape_noise
+    return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(shapes)) / shape_noise
 
 
 def _deviations(rows: Array, level: float) -> Array:
@@ -142,19 +139,19 @@ def _deviations(rows: Array, level: float) -> Array:
     return deviations
 
 
-def _recommended(rows: Array, order: NDArray[np.intp], level: float) -> NDArray[np.intp]:
-    """The longest beginning of an order of parameters that can be estimated well together."""
-    for size in range(len(order), 0, -1):
-        if (_deviations(rows[:, order[:size]], level) <= WELL_KNOWN).all():
-            return order[:size]
-    return order[:0]
+def _recommended(rows: Array, ranking: NDArray[np.intp], level: float) -> NDArray[np.intp]:
+    """Longest prefix of the ranking whose parameters can be estimated well together."""
+    for size in range(len(ranking), 0, -1):
+        if (_deviations(rows[:, ranking[:size]], level) <= WELL_KNOWN).all():
+            return ranking[:size]
+    return ranking[:0]
 
 
 def collinear_groups(rows: Array) -> list[NDArray[np.intp]]:
-    """Columns that are multiples of each other but for a small angle, in groups of two or more."""
+    """Groups of two or more columns that point almost the same way, or the opposite way."""
     lengths = np.linalg.norm(rows, axis=0)
-    felt = np.flatnonzero(lengths > 0)
-    directions = rows[:, felt] / lengths[felt]
+    nonzero = np.flatnonzero(lengths > 0)
+    directions = rows[:, nonzero] / lengths[nonzero]
     labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR), directed=False)[1]
-    groups = (felt[labels == label] for label in np.unique(labels))
+    groups = (nonzero[labels == label] for label in np.unique(labels))
     return [group for group in groups if len(group) > 1]

@@ -1,27 +1,36 @@
-"""What measurements can tell about parameters."""
+"""How much measurements tell about parameters, and derivatives of mode shapes for it."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from skthermo._arrays import Array
 
 NO_INFORMATION = 1e-12
-"""Share of the largest (scaled) eigenvalue below which an information matrix tells nothing."""
+"""Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
 
 
-def cramer_rao(information: Array) -> Array:
+def cramer_rao(information: ArrayLike) -> Array:
     """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix.
 
     Parameters
     ----------
-    information : ndarray of shape (n_parameters, n_parameters)
+    information : array-like of shape (n_parameters, n_parameters)
         Symmetric, perhaps singular.
 
     Returns
     -------
     ndarray of shape (n_parameters, n_parameters)
-        Infinite variances and NaN covariances of parameters that cannot be told; all NaN where information is.
+        Parameters that are not determined have infinite variances and NaN covariances. All NaN if the
+        information has NaN.
+
+    Examples
+    --------
+    >>> from skthermo.updating import cramer_rao
+    >>> cramer_rao([[4.0, 0.0], [0.0, 0.0]])
+    array([[0.25,  nan],
+           [ nan,  inf]])
     """
+    information = np.asarray(information, dtype=float)
     if not np.isfinite(information).all():
         return np.full_like(information, np.nan)
     scale = np.sqrt(np.diagonal(information))
@@ -41,16 +50,16 @@ def shape_directions(shapes: Array) -> Array:
 
 
 def tangents(shapes: Array, measured: Array) -> Array:
-    """How far shapes lie from measured unit shapes, tan of their angle, as vectors (n_dofs, n_modes).
+    """Differences e = phi / (u' phi) - u between shapes phi and measured unit shapes u, (n_dofs, n_modes).
 
-    e = phi / (u' phi) - u is orthogonal to the unit shape u, and its squared length is 1 / MAC - 1, whatever
-    the scale and sign of phi.
+    Whatever the scale and sign of phi, e is orthogonal to u, and its length is the tangent of the angle between them:
+    its square is 1 / MAC - 1.
     """
     return shapes / np.einsum("dm,dm->m", measured, shapes) - measured
 
 
 def tangent_derivatives(shapes: Array, d_shapes: Array, measured: Array) -> Array:
-    """Derivatives of `tangents` where those of the shapes are (n_dofs, n_modes, n_parameters)."""
+    """Derivatives of `tangents`, from derivatives of the shapes (n_dofs, n_modes, n_parameters)."""
     along = np.einsum("dm,dm->m", measured, shapes)[:, np.newaxis]
     d_along = np.einsum("dm,dmp->mp", measured, d_shapes)
     return d_shapes / along - shapes[:, :, np.newaxis] * (d_along / along**2)

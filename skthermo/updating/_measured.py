@@ -1,4 +1,4 @@
-"""Reading what was measured."""
+"""Checks of measured frequencies and shapes."""
 
 import warnings
 from dataclasses import dataclass
@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import as_floats
-
-Array = NDArray[np.float64]
+from skthermo._arrays import Array, as_floats
+from skthermo.fem import check_dofs
 
 
 @dataclass
@@ -20,13 +19,14 @@ class Measured:
     names : list of str
         Of these modes.
     columns : ndarray of int of shape (n_measured,)
-        Which modes of the records they are.
+        Their columns in F.
     frequencies, deviations : ndarray of shape (n_measured,)
-        Mean over records in Hz, NaN where only the shape was measured; and what residuals are divided by.
+        Mean over records in Hz, NaN where only the shape was measured; and the standard deviations, in Hz, by which
+        residuals are divided.
     shapes : ndarray of shape (n_dofs, n_measured)
         Of unit length, NaN where only the frequency was measured.
     dofs : ndarray of int of shape (n_dofs,)
-        Where the shapes were measured; none where no shapes were.
+        Where the shapes were measured; empty if none were.
     shape_weights : ndarray of shape (n_measured,)
         Zero where no shape was measured.
     """
@@ -51,7 +51,7 @@ class Measured:
 
     @property
     def n_residuals(self) -> int:
-        """Independent numbers that the fit is made to: a shape has one less than degrees of freedom."""
+        """Number of independent residuals: a shape has one less than degrees of freedom, since its scale is free."""
         weighted = self.has_shape & (self.shape_weights > 0)
         return int(self.has_frequency.sum() + weighted.sum() * max(len(self.dofs) - 1, 0))
 
@@ -98,29 +98,15 @@ def read_measured(
     )
 
 
-def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
-    """Different degrees of freedom of a model, the first being 0."""
-    array = np.asarray(dofs)
-    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
-    outside = array[(array < 0) | (array >= n_dof)]
-    if outside.size:
-        raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
-    values, counts = np.unique(array, return_counts=True)
-    if (counts > 1).any():
-        raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
-    return array.astype(np.intp)
-
-
 def real_shapes(shapes: NDArray) -> Array:
-    """Real parts of complex shapes, each turned by the phase that makes its real part largest."""
+    """Real parts of complex shapes, each rotated by the phase that makes its real part largest."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
     lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
     warnings.warn(
-        f"shapes are complex: each is turned to its largest real part and the rest, up to {lost.max():.1%} of a "
-        "shape's length, is left out",
+        f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
+        "shape's length, is dropped",
         UserWarning,
         stacklevel=7,  # past scikit-learn's wrapper of fit
     )
@@ -128,7 +114,7 @@ def real_shapes(shapes: NDArray) -> Array:
 
 
 def _given(shapes: Array) -> NDArray[np.bool_]:
-    """Which columns were measured: all NaN, or no rows at all, were not."""
+    """Which columns hold a measured shape: not those that are NaN throughout, and none if there are no rows."""
     return np.asarray(np.isfinite(shapes).any(axis=0))
 
 

@@ -3,40 +3,39 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, OptimizeResult, least_squares, minimize
 
+from skthermo._arrays import Array
 from skthermo._threads import single_blas_thread
 from skthermo.updating._residuals import Point, Residuals
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
 """Relative change of the objective and of theta below which a start has converged."""
 
 
 class Outcome(NamedTuple):
-    """Where one start has ended."""
+    """The result of one start; ``n_failed`` of its evaluations met theta without modes."""
 
     start: Array
     objective: float
     success: bool
     n_evaluations: int
+    n_failed: int
     theta: Array
 
 
-class Path:
-    """The points that one optimisation has visited: the last, the best, and whether some had no modes."""
+class SearchHistory:
+    """What one optimisation has seen: its last point, its best one, and how many theta had no modes."""
 
     def __init__(self, residuals: Residuals, start: Array):
         self._residuals = residuals
         self._theta = self.theta = start
         self._point = self.best = residuals.at(start)
-        self.met_gaps = False
         self.n_evaluations = 1
+        self.n_failed = 0 if np.isfinite(self.best.objective) else 1
 
     def at(self, theta: Array) -> Point:
-        """Residuals at theta, found once while theta stays."""
+        """Residuals at theta. Those at the last and at the best theta are remembered."""
         if np.array_equal(theta, self.theta):
             return self.best
         if not np.array_equal(theta, self._theta):
@@ -44,47 +43,49 @@ class Path:
             self._theta = theta.copy()
             self._point = self._residuals.at(self._theta)
             if not np.isfinite(self._point.objective):
-                self.met_gaps = True
+                self.n_failed += 1
             elif self._point.objective < self.best.objective:
                 self.theta, self.best = self._theta, self._point
         return self._point
 
 
 class NoDerivatives(Exception):
-    """Derivatives are not finite."""
+    """The model has no finite derivatives at some theta."""
 
 
 def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
     """Minimise the residuals' loss within bounds.
 
-    Steps cut short where the model has no modes look like convergence. A search that met such points therefore goes on
-    from its best one, and has converged when it meets none.
+    Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
+    therefore started again from its best point, and has converged when it meets none.
     """
     search = {"lbfgs": _lbfgs, "least_squares": _least_squares}[method]
     success = False
     with single_blas_thread():
-        path = Path(residuals, start)
-        first, before = path.best.objective, np.inf
-        while max_iter > 0 and path.best.objective < (1 - TOLERANCE) * before:
-            before, path.met_gaps = path.best.objective, False
+        history = SearchHistory(residuals, start)
+        first, before = history.best.objective, np.inf
+        while max_iter > 0 and history.best.objective < (1 - TOLERANCE) * before:
+            before, n_failed = history.best.objective, history.n_failed
             try:
-                result = search(path, residuals, bounds, max_iter, first)
+                result = search(history, residuals, bounds, max_iter, first)
             except NoDerivatives:
                 break
             max_iter -= result.get("nit", result.nfev)
-            success = bool(result.success) and not path.met_gaps
-            if not path.met_gaps:
+            success = bool(result.success) and history.n_failed == n_failed
+            if history.n_failed == n_failed:
                 break
-    return Outcome(start, path.best.objective, success, path.n_evaluations, path.theta)
+    return Outcome(start, history.best.objective, success, history.n_evaluations, history.n_failed, history.theta)
 
 
-def _least_squares(path: Path, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _least_squares(
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float
+) -> OptimizeResult:
     def jacobian(theta: Array) -> Array:
-        return _finite(path.at(theta).jacobian())
+        return _finite(history.at(theta).jacobian())
 
     return least_squares(
-        lambda theta: path.at(theta).values.copy(),  # SciPy scales it in place
-        path.theta,
+        lambda theta: history.at(theta).values.copy(),  # SciPy scales it in place
+        history.theta,
         jacobian,
         bounds=(bounds[:, 0], bounds[:, 1]),
         loss=residuals.loss,
@@ -95,27 +96,27 @@ def _least_squares(path: Path, residuals: Residuals, bounds: Array, max_iter: in
     )
 
 
-def _lbfgs(path: Path, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
-    Where there are no modes, it sees a parabola that rises from the best point's slope and makes it turn back.
+    Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
     """
 
     def share(theta: Array) -> tuple[float, Array]:
-        point = path.at(theta)
+        point = history.at(theta)
         if np.isfinite(point.objective):
             gradient = _finite(point.gradient()) / scale
-            if point is path.best:
+            if point is history.best:
                 uphill[:] = gradient
             return point.objective / scale, gradient
-        step = theta - path.theta
+        step = theta - history.theta
         slope = abs(uphill @ step)
-        return path.best.objective / scale + slope / 2, 2 * slope * step / (step @ step)
+        return history.best.objective / scale + slope / 2, 2 * slope * step / (step @ step)
 
     scale = first or 1.0
-    uphill = np.empty_like(path.theta)
+    uphill = np.empty_like(history.theta)
     options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOLERANCE, "gtol": TOLERANCE, "maxcor": 20}
-    return minimize(share, path.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
+    return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
 
 
 def _finite(derivatives: Array) -> Array:

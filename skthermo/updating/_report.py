@@ -1,4 +1,4 @@
-"""What model updating has found."""
+"""Tables and warnings about the result of model updating."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -8,30 +8,29 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from skthermo._arrays import Array
 from skthermo.fem import CallableModel, FEModel, ModalModel, share_reordered
-from skthermo.updating._comparison import counterparts, macs
+from skthermo.updating._comparison import macs, paired_modes
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome
 from skthermo.updating._residuals import Residuals
 
-Array = NDArray[np.float64]
-
 UNLIKE = 0.5
-"""MAC with every mode below which a measured shape is like none of them."""
+"""MAC below which a measured shape is not that of the mode it is paired with."""
 
 SAME_OPTIMUM = 1e-3
-"""Largest difference of multipliers at which two starts have ended at the same optimum."""
+"""Two starts whose multipliers differ by less have ended at the same optimum."""
 
 GOOD_WEIGHT = 100
-"""Weight of shapes below which the objective may be a narrow curved valley."""
+"""Weight of shapes below which the objective may be a narrow curved valley, slow to search."""
 
 
 def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
-    """Measured modes beside the model's at the nominal parameters and at theta: Hz, percent and MAC."""
+    """Measured modes and the model's at the nominal parameters and at theta: Hz, errors in percent, MAC."""
     table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
     states = {
-        "before": counterparts(model, measured, np.ones_like(theta)),
-        "after": counterparts(model, measured, theta),
+        "before": paired_modes(model, measured, np.ones_like(theta)),
+        "after": paired_modes(model, measured, theta),
     }
     for name, modes in states.items():
         table[name] = modes.frequencies
@@ -44,7 +43,7 @@ def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFram
 
 
 def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
-    """One row for each start, with the number of its optimum: 0 is the best, equal theta share a number."""
+    """One row for each start, with the number of its optimum: 0 is the best, starts that ended together share one."""
     table = pd.DataFrame(outcomes)
     optima: list[Array] = []
     numbers = np.empty(len(outcomes), dtype=int)
@@ -59,7 +58,7 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
 
 
 def rescaled(model: FEModel, theta: Array) -> FEModel:
-    """The model whose nominal state is the given one at theta."""
+    """A model whose nominal state is the given model at theta."""
     if hasattr(model, "rescaled"):
         return model.rescaled(theta)
     function = partial(_frequencies_from, model, theta)
@@ -71,17 +70,19 @@ def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
 
 
 def unfinished(outcome: Outcome, residuals: Residuals) -> str:
-    """What is to be said of a best start that has not converged."""
-    weights = residuals.measured.shape_weights[residuals.felt]
+    """The warning about a best start that has not converged."""
+    failed = f", {outcome.n_failed} of them without modes" if outcome.n_failed else ""
+    weights = residuals.measured.shape_weights[residuals.weighted]
     heavier = f", shape weights of {GOOD_WEIGHT} or more" if (weights < GOOD_WEIGHT).any() else ""
     return (
-        f"the best start has not converged in {outcome.n_evaluations} evaluations, and theta_ may not be the optimum: "
+        f"the best start has not converged in {outcome.n_evaluations} evaluations{failed}, and theta_ may not be the "
+        "optimum: "
         f"expected a higher max_iter{heavier}, or bounds within which the model has modes"
     )
 
 
 def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
-    """What is to be said of measured modes that are other modes than the updated model's columns."""
+    """Warnings about measured modes that are not the modes in the updated model's columns of the same number."""
     names = np.array(measured.names)
     if not (measured.dofs.size and hasattr(model, "local_modes")):
         swapped = names[_swapped(model, theta)[measured.columns]]
@@ -91,10 +92,10 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
                 "fits another mode's frequency: expected a model with track=True, or shapes"
             )
         return
-    modes = counterparts(model, measured, theta)
+    modes = paired_modes(model, measured, theta)
     unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < UNLIKE)]
     if unlike.size:
-        yield f"no mode of the optimum is like the measured shapes of {unlike.tolist()} (MAC below {UNLIKE})"
+        yield f"no mode of the optimum has the measured shapes of {unlike.tolist()} (MAC below {UNLIKE})"
     columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
     other = names[modes.ranks != columns[measured.columns]]
     if other.size:
@@ -106,8 +107,9 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
 
 def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
     """Columns that hold another mode at theta than at the nominal parameters."""
-    if getattr(model, "track", True) or not hasattr(model, "modes"):
+    if getattr(model, "track", True):
         return np.zeros(model.n_modes, bool)
     if hasattr(model, "local_modes"):
         return np.asarray(model.local_modes(theta, follow=True).ranks != np.arange(model.n_modes))
-    return np.full(model.n_modes, share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)
+    has_shapes = hasattr(model, "modes")
+    return np.full(model.n_modes, has_shapes and share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)

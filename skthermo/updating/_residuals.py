@@ -1,45 +1,43 @@
-"""What model updating makes small."""
+"""The residuals that model updating minimises."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skthermo._arrays import Array
 from skthermo.fem import FEModel
-from skthermo.updating._comparison import Counterparts, counterparts
+from skthermo.updating._comparison import PairedModes, paired_modes
 from skthermo.updating._information import tangent_derivatives, tangents
 from skthermo.updating._measured import Measured
 
-Array = NDArray[np.float64]
-
-
-def without_warnings(model: FEModel) -> FEModel:
-    """The model to search with: it says nothing of single theta, which an optimisation leaves again."""
-    return model.quiet() if hasattr(model, "quiet") else model
-
 
 class Residuals:
-    """Residuals of frequencies, of the prior, and tangents of shapes, in one vector with one loss.
+    """Residuals of frequencies, of the prior and of shapes, in one vector with one loss.
 
-    The tangents e_j of a shape have the squared length E = 1 / MAC - 1, and
-    ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2 is their common loss. Its slope weights them in the
-    Gauss-Newton matrix, for which the residual of the MAC alone, quadratic in e, would be a poor basis.
+    A shape's residuals are its `tangents` e, of squared length E = 1 / MAC - 1. Together they have the loss
+    ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2, whose slope weights them in the Gauss-Newton matrix.
+    (1 - sqrt(MAC)) / sqrt(MAC) itself is quadratic in e: its derivative vanishes at the optimum.
+
+    Attributes
+    ----------
+    weighted : ndarray of int
+        Those of the measured modes whose shapes have a weight.
     """
 
     def __init__(self, model: FEModel, measured: Measured, prior: Array | None):
         self.model = model
         self.measured = measured
         self.prior = prior
-        self.felt = np.flatnonzero(measured.shape_weights > 0)
+        self.weighted = np.flatnonzero(measured.shape_weights > 0)
         self._n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
     def at(self, theta: Array) -> "Point":
         """Residuals at one theta."""
-        return Point(self, theta, counterparts(self.model, self.measured, theta))
+        return Point(self, theta, paired_modes(self.model, self.measured, theta))
 
     def loss(self, squares: Array) -> Array:
         """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
         rho = np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
-        weights = self.measured.shape_weights[self.felt] ** 2
-        groups = squares[self._n_plain :].reshape(len(self.felt), len(self.measured.dofs))
+        weights = self.measured.shape_weights[self.weighted] ** 2
+        groups = squares[self._n_plain :].reshape(len(self.weighted), len(self.measured.dofs))
         E = groups.sum(axis=1)
         secant = np.sqrt(1 + E)
         values = weights * (E / (1 + secant)) ** 2
@@ -51,19 +49,19 @@ class Residuals:
 
 
 class Point:
-    """Residuals at one theta, and on demand their derivatives."""
+    """Residuals at one theta, and their derivatives when asked for."""
 
-    def __init__(self, residuals: Residuals, theta: Array, modes: Counterparts):
+    def __init__(self, residuals: Residuals, theta: Array, modes: PairedModes):
         self._residuals = residuals
         self._theta = theta
         self._modes = modes
-        measured, prior, felt = residuals.measured, residuals.prior, residuals.felt
-        self._with = measured.has_frequency
-        parts = [((modes.frequencies - measured.frequencies) / measured.deviations)[self._with]]
+        measured, prior, weighted = residuals.measured, residuals.prior, residuals.weighted
+        self._has_frequency = measured.has_frequency
+        parts = [((modes.frequencies - measured.frequencies) / measured.deviations)[self._has_frequency]]
         if prior is not None:
             parts.append((theta - 1) / prior)
-        if len(felt):
-            parts.append(tangents(modes.shapes[:, felt], measured.shapes[:, felt]).T.ravel())
+        if len(weighted):
+            parts.append(tangents(modes.shapes[:, weighted], measured.shapes[:, weighted]).T.ravel())
         self.values = np.concatenate(parts)
 
     @property
@@ -83,23 +81,25 @@ class Point:
         return 2 * (slopes * self.values) @ self.jacobian()
 
     def information(self) -> Array:
-        """Fisher information of measurements with the noise that the weights stand for, and of the prior.
+        """Fisher information of the prior, and of measurements whose noise is that for which the weights are made.
 
-        A relative noise s of shapes at n degrees of freedom gives 1 / sqrt(MAC) - 1 the standard deviation
-        s^2 / sqrt(2 (n - 1)), one over the weight, and the tangents each the variance s^2 / (n - 1).
+        A shape with the weight sqrt(2 (n - 1)) / s^2 has noise of s times its root mean square at n degrees of freedom:
+        each of its tangents, and of the unit shape's components, has the variance s^2 / n.
         """
         plain, slopes = self.blocks()
-        weights = self._residuals.measured.shape_weights[self._residuals.felt]
-        precisions = weights * np.sqrt(max(len(slopes) - 1, 0) / 2)
+        weights = self._residuals.measured.shape_weights[self._residuals.weighted]
+        precisions = weights * len(slopes) / np.sqrt(2 * max(len(slopes) - 1, 1))
         return plain.T @ plain + np.einsum("djp,j,djq->pq", slopes, precisions, slopes)
 
     def blocks(self) -> tuple[Array, Array]:
-        """Derivatives of the plain residuals, and of the tangents (n_dofs, n_shapes, n_parameters)."""
-        measured, prior, felt = self._residuals.measured, self._residuals.prior, self._residuals.felt
+        """Derivatives of the residuals of frequencies and prior, and of tangents (n_dofs, n_shapes, n_parameters)."""
+        measured, prior, weighted = self._residuals.measured, self._residuals.prior, self._residuals.weighted
         d_frequencies, d_shapes = self._modes.derivatives()
-        plain = (d_frequencies / measured.deviations[:, np.newaxis])[self._with]
+        plain = (d_frequencies / measured.deviations[:, np.newaxis])[self._has_frequency]
         if prior is not None:
             plain = np.vstack([plain, np.diag(1 / prior)])
-        if not len(felt):
+        if not len(weighted):
             return plain, np.empty((0, 0, len(self._theta)))
-        return plain, tangent_derivatives(self._modes.shapes[:, felt], d_shapes[:, felt], measured.shapes[:, felt])
+        return plain, tangent_derivatives(
+            self._modes.shapes[:, weighted], d_shapes[:, weighted], measured.shapes[:, weighted]
+        )

@@ -1,15 +1,19 @@
-"""How strongly parameters move frequencies."""
+"""How strongly parameters change frequencies."""
 
+from collections.abc import Callable
+from functools import partial
 from numbers import Real
 from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from skthermo._arrays import Array
 from skthermo.fem import FEModel, check_theta, evaluate
 
-Array = NDArray[np.float64]
+SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
+"""Relative step of central differences at which rounding takes half of the digits of a frequency."""
 
 
 def sensitivity(
@@ -26,11 +30,11 @@ def sensitivity(
     model : FE model
         With ``method="exact"`` it needs a ``jacobian``.
     theta : array-like of shape (n_parameters,), optional
-        Where; at the nominal parameters by default.
+        Multipliers at which to differentiate; 1 by default.
     method : {"exact", "central"}, default="exact"
         Exact derivatives, or central differences, eq. (A.2), of any model.
     step : float, default=0.01
-        Relative step of central differences.
+        Relative step of central differences, at least 1.5e-8.
 
     Returns
     -------
@@ -40,18 +44,19 @@ def sensitivity(
     Raises
     ------
     ValueError
-        If the model has no ``jacobian``, has no frequencies at theta, or method, theta or step is not
-        one of those expected.
+        If the model has no ``jacobian``, has no frequencies at theta, or method, theta or step is not valid.
 
     See Also
     --------
-    select_parameters : Those that move some mode.
-    identifiability : Those that frequencies can tell.
+    select_parameters : Parameters that change some mode enough.
+    identifiability : Parameters that measured modes can identify.
 
     Notes
     -----
     Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j. Where the model has
-    no frequencies on one side, the difference to theta itself takes its place.
+    no frequencies on one side, the difference to theta itself takes its place. Rounding of frequencies to a share
+    eps = 2.2e-16 gives S an error of about eps / step, so that a step below sqrt(eps) = 1.5e-8 loses more than half of
+    the digits, and is refused.
 
     References
     ----------
@@ -77,7 +82,12 @@ def sensitivity(
             raise ValueError(f"{model!r} has no method 'jacobian'; expected one that has, or method='central'")
         gradient = model.jacobian(row)[0]
     elif method == "central":
-        gradient = central_jacobian(model, row, step)
+        if not isinstance(step, Real) or not SMALLEST_STEP <= step < 1:
+            raise ValueError(
+                f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which rounding takes "
+                "more than half of the digits, to 1, such as 0.01"
+            )
+        gradient = central_jacobian(partial(evaluate, model), row, step)
     else:
         raise ValueError(f"method is {method!r}; expected 'exact' or 'central'")
     names = [f"f{i + 1}" for i in range(model.n_modes)]
@@ -85,14 +95,14 @@ def sensitivity(
 
 
 def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
-    """Parameters that move at least one mode enough.
+    """Parameters that change at least one frequency enough.
 
     Parameters
     ----------
     S : DataFrame of shape (n_modes, n_parameters)
         Normalised sensitivities.
     threshold : float, default=0.1
-        What \\|S\\| must reach for some mode.
+        Smallest \\|S\\| that must be reached in some mode.
 
     Returns
     -------
@@ -117,19 +127,17 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
 
 
 def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
-    """One checked row of multipliers, all of them 1 by default."""
+    """One checked row of multipliers, all 1 by default."""
     names = model.parameter_names
     return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
 
 
-def central_jacobian(model: FEModel, row: Array, step: float) -> Array:
+def central_jacobian(frequencies: Callable[[Array], Array], row: Array, step: float) -> Array:
     """d f / d theta by central differences of a relative step, (n_modes, n_parameters); one-sided beside NaN."""
-    if not isinstance(step, Real) or not 0 < step < 1:
-        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.01")
     steps = np.diag(step * row[0])
-    sides = np.array(np.split(evaluate(model, np.vstack([row + steps, row - steps])), 2))
+    sides = np.array(np.split(frequencies(np.vstack([row + steps, row - steps])), 2))
     known = ~np.isnan(sides)
     if not known.all():
-        sides = np.where(known, sides, evaluate(model, row))
+        sides = np.where(known, sides, frequencies(row))
     widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * step * row[0][:, np.newaxis]
     return ((sides[0] - sides[1]) / widths).T

@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import Bounds, as_floats
+from skthermo._arrays import Array, Bounds, as_floats
 from skthermo._frames import column_names
 from skthermo._validation import (
     HasMethods,
@@ -27,15 +27,13 @@ from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
 from skthermo.updating._report import false_matches, modes_table, rescaled, starts_table, unfinished
-from skthermo.updating._residuals import Residuals, without_warnings
-
-Array = NDArray[np.float64]
+from skthermo.updating._residuals import Residuals
 
 
 class ModelUpdater(BaseEstimator):
-    """Parameters of an FE model from measured frequencies and, where there are any, mode shapes.
+    """Estimate the parameters of an FE model from measured frequencies and, if there are any, mode shapes.
 
-    Minimises, within bounds on the multipliers theta of the nominal parameters,
+    Within bounds on the multipliers theta of the nominal parameters, it minimises
 
     .. math:: z(\\theta) = \\sum_j \\Bigl(\\frac{f_j(\\theta) - \\tilde f_j}{\\tilde f_j} w_j\\Bigr)^2
               + \\sum_j \\Bigl(\\frac{1 - \\sqrt{\\mathrm{MAC}_j}}{\\sqrt{\\mathrm{MAC}_j}} v_j\\Bigr)^2
@@ -47,10 +45,11 @@ class ModelUpdater(BaseEstimator):
     Parameters
     ----------
     model : FE model
-        Column j of the frequencies is its mode j. Shapes need an `AffineModel`.
+        Measured mode j is column j of its frequencies. To use shapes, it must have ``local_modes``, ``n_dof`` and
+        ``track``, as `AffineModel` has.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-        Box of multipliers that holds 1: a half-width, lowest and highest of each parameter, or a mapping that gives
-        one or the other for every parameter.
+        Box of multipliers that contains 1: a half-width, lowest and highest of each parameter, or a mapping that
+        gives one or the other for every parameter.
     shape_weight : float or array-like of shape (n_modes,), default=0.0
         Weights v. With 0, measured shapes only tell which mode is which.
     n_starts : int, default=1
@@ -76,11 +75,12 @@ class ModelUpdater(BaseEstimator):
         One row for each measured mode: ``measured``, ``before`` (theta = 1) and ``after`` in Hz, ``error_before`` and
         ``error_after`` in percent and, with shapes, ``mac_before`` and ``mac_after``.
     starts_ : DataFrame
-        One row for each start: ``start`` (where), ``objective``, ``success``, ``n_evaluations``, ``theta``, and
-        ``optimum``, a number for each different optimum from 0, the best.
+        One row for each start: ``start`` (its theta), ``objective``, ``success``, ``n_evaluations``, ``n_failed`` (how
+        many of these met theta without modes), ``theta`` (where it ended), and ``optimum``, a number for each different
+        optimum from 0, the best.
     covariance_ : ndarray of shape (n_parameters, n_parameters)
-        Of ``theta_`` about the optimum, if the weights stand for the noise (see Notes): the inverse of
-        the Gauss-Newton matrix J' J. Infinite variances, and NaN covariances, where nothing tells a parameter.
+        Covariance of ``theta_``, if the weights describe the noise (see Notes): the inverse of the Gauss-Newton matrix
+        J' J. A parameter that the measurements do not determine has an infinite variance and NaN covariances.
     n_features_in_ : int
         Number of modes.
     feature_names_in_ : ndarray of str
@@ -92,23 +92,24 @@ class ModelUpdater(BaseEstimator):
 
     Notes
     -----
-    *Pairing.* With shapes, a measured mode is compared with that of the model's modes whose shape is most like its
-    own, among more modes than ``model.n_modes``; likeness to the nominal mode of the same number decides where the
-    sensors cannot. Without shapes, modes are the model's columns: followed by their shapes with ``track=True``.
-    Sorted columns allow a false match, where modes swap and fit each other's frequencies; a warning says so.
+    *Pairing.* With shapes, each measured mode is paired with the mode of the model that has the highest MAC with it,
+    among more modes than ``model.n_modes``; no mode is paired twice. Where several look the same at the sensors, the
+    MAC with the nominal mode of the same number decides. Without shapes, measured mode j is column j of the model,
+    which follows its mode by shape if ``track=True``. Columns that are sorted by frequency allow a false match: modes
+    swap places and fit each other's frequencies. A warning says so.
 
     *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
-    v = sqrt(2 (n - 1)) / s^2, one over the standard deviation of their residual. Weights thousands of times
-    smaller leave a narrow curved valley, in which many evaluations are needed. ``covariance_`` takes weights at
-    their word: it is a statement about theta if ``frequency_std`` and ``shape_weight`` (or 0) are the measurement's,
-    and else only for comparison (without ``frequency_std``, the noise on every frequency counts as 1, or 100 %).
-    It knows neither bounds nor errors of the model itself.
+    v = sqrt(2 (n - 1)) / s^2, about one over the standard deviation of their residual. With weights thousands of times
+    smaller, the objective is a narrow curved valley, in which a search takes many evaluations. ``covariance_`` holds
+    if ``frequency_std`` and ``shape_weight`` (or 0) describe the noise of the measurement. Without ``frequency_std``,
+    every frequency counts as having noise of 100 %, and ``covariance_`` serves for comparison only. It takes no account
+    of bounds or of errors of the model itself.
 
-    *Method.* A residual of the MAC is quadratic in the error of the shape. The Gauss-Newton matrix is therefore
-    that of the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared
-    length is 1/MAC - 1, weighted with the slope of the objective. All derivatives are exact, those of shapes
-    included; a model without ``jacobian`` gets central differences. Both methods step back from theta where the
-    model has no modes; a start that ends beside such theta has not converged.
+    *Method.* The residual of a MAC is quadratic in the error of the shape. Gauss-Newton steps are therefore taken on
+    the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared length is
+    1 / MAC - 1, weighted by the slope of the objective. Derivatives are exact, of shapes too; a model without
+    ``jacobian`` gets central differences. Both methods step back from theta at which the model has no modes; a
+    start that ends beside such theta has not converged.
 
     References
     ----------
@@ -177,20 +178,20 @@ class ModelUpdater(BaseEstimator):
         dofs: ArrayLike | None = None,
         frequency_std: ArrayLike | None = None,
     ) -> "ModelUpdater":
-        """Find the multipliers that bring the model nearest to what was measured.
+        """Find the multipliers with which the model comes closest to the measurements.
 
         Parameters
         ----------
         F : array-like or DataFrame of shape (n_records, n_modes) or (n_modes,)
-            Measured frequencies in Hz, of which the mean over records counts. NaN is allowed; modes that no
-            record has are left out. With shapes, there may be fewer columns than the model has modes.
+            Measured frequencies in Hz; their mean over records is fitted. NaN is allowed, and a mode that is NaN in
+            all records is left out. With shapes, there may be fewer columns than the model has modes.
         y : None
             Ignored.
         shapes : array-like of shape (n_dofs, n_modes), optional
-            Measured mode shapes, scaled in any way; a column of NaN was not measured. Complex shapes
+            Measured mode shapes of any scale and sign; NaN throughout a column means not measured. Complex shapes
             are made real.
         dofs : array-like of int of shape (n_dofs,), optional
-            The model's degrees of freedom that their rows are, the first being 0.
+            The model's degree of freedom of each row, the first being 0.
         frequency_std : float or array-like of shape (n_modes,), optional
             Standard deviations of the mean frequencies in Hz.
 
@@ -202,15 +203,15 @@ class ModelUpdater(BaseEstimator):
         Raises
         ------
         ValueError
-            If the number of modes is not the model's; a shape, degree of freedom or standard deviation is not one of
-            those expected; nothing was measured; bounds are infeasible or do not hold 1; shapes are given for a
-            model that cannot differentiate its own; or no start has modes.
+            If the number of modes is not the model's; a shape, degree of freedom or standard deviation is not valid;
+            nothing was measured; bounds are infeasible or exclude 1; shapes are given for a model without
+            ``local_modes``, ``n_dof`` or ``track``; or the model has no modes at any start.
 
         Warns
         -----
         UserWarning
             If there are more parameters than residuals and no prior, shapes are complex, the best start has not
-            converged, a mode of the optimum is not the one it was matched with, or the optimum is outside the
+            converged, a mode of the optimum is not the one it was paired with, or the optimum is outside the
             bounds for which the model was reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
@@ -223,11 +224,12 @@ class ModelUpdater(BaseEstimator):
                 UserWarning,
                 stacklevel=3,
             )
-        model = without_warnings(self.model)
+        model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
         residuals = Residuals(model, measured, prior)
         outcomes = self._run(residuals, bounds)
         best = min(outcomes, key=lambda outcome: outcome.objective)
         if not np.isfinite(best.objective):
+            self.model.frequencies(np.ones((1, n_parameters)))  # warns of the reason, if the model knows it
             raise ValueError(
                 f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds"
             )
@@ -241,8 +243,8 @@ class ModelUpdater(BaseEstimator):
             warnings.warn(unfinished(best, residuals), UserWarning, stacklevel=3)
         for message in false_matches(model, measured, best.theta):
             warnings.warn(message, UserWarning, stacklevel=3)
-        if hasattr(self.model, "warn_of"):
-            self.model.warn_of(best.theta[np.newaxis], self.table_[["after"]].to_numpy().T)
+        if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
+            self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
         return self
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
@@ -256,9 +258,11 @@ class ModelUpdater(BaseEstimator):
                 f"F has {values.shape[1]} columns; expected the {n_modes} modes of {self.model!r}, "
                 "NaN where one was not measured"
             )
-        if shapes is not None and not hasattr(self.model, "local_modes"):
+        missing = [name for name in ("local_modes", "n_dof", "track") if not hasattr(self.model, name)]
+        if shapes is not None and missing:
             raise ValueError(
-                f"shapes were given, but {self.model!r} cannot differentiate its own; expected an AffineModel"
+                f"shapes were given, but {self.model!r} has no {' and no '.join(map(repr, missing))}; expected a model "
+                "with local_modes, n_dof and track, such as AffineModel"
             )
         n_dof = getattr(self.model, "n_dof", 0)
         names = column_names(table, "f")
@@ -269,9 +273,7 @@ class ModelUpdater(BaseEstimator):
         bounds = check_bounds(self.bounds, names)
         for name, (lowest, highest) in zip(names, bounds, strict=True):
             if not lowest <= 1 <= highest:
-                raise ValueError(
-                    f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected them to hold the first start, 1"
-                )
+                raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected them to contain 1")
         return bounds
 
     def _read_prior(self) -> Array | None:

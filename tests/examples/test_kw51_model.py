@@ -1,4 +1,4 @@
-"""The pictures of KW51."""
+"""What the pictures of KW51 show."""
 
 import importlib.util
 from pathlib import Path
@@ -14,11 +14,8 @@ EXAMPLE = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(EXAMPLE)
 
 
-def test_figures_are_drawn(tmp_path):
-    structure, model = EXAMPLE.kw51_structure(), EXAMPLE.make_kw51()
-    paths = EXAMPLE.draw(structure, model, tmp_path / "figures")
-    assert [path.name for path in paths] == ["kw51_structure.png", "kw51_modes.png"]
-    assert all(path.stat().st_size > 50_000 for path in paths)
+def test_every_member_is_drawn():
+    structure = EXAMPLE.kw51_structure()
     drawn = set().union(*(structure.groups[group] for group in [*EXAMPLE.COLOURS, "plate", "ballast"]))
     assert drawn == set(structure.members)
 

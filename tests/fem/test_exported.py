@@ -305,13 +305,20 @@ def outcome(path, n_modes=4):
 FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
+@pytest.fixture
+def intact(tmp_path, form):
+    """A model's path, the file that holds its total, and what is in that."""
+    path = WRITERS[form](tmp_path, MATRICES)
+    file = path if path.is_file() else next(path.glob("K0.*"))
+    return path, file, file.read_bytes()
+
+
 @FUZZ
 @given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())
 @pytest.mark.parametrize("form", ["npz", "mtx", "mtx sparse", "folder of npz"])
-def test_damaged_files_are_named_or_their_damage_is_harmless(tmp_path, form, position, bit, cut):
-    path = WRITERS[form](tmp_path, MATRICES)
-    file = path if path.is_file() else next(path.glob("K0.*"))
-    content = bytearray(file.read_bytes())
+def test_damaged_files_are_named_or_their_damage_is_harmless(intact, form, position, bit, cut):
+    path, file, content = intact
+    content = bytearray(content)
     if cut:
         content = content[: position % len(content)]
     else:
@@ -319,7 +326,7 @@ def test_damaged_files_are_named_or_their_damage_is_harmless(tmp_path, form, pos
     file.write_bytes(content)
     result = outcome(path)
     if isinstance(result, str):
-        assert file.name in result or tmp_path.name in result
+        assert file.name in result or path.name in result
     elif "npz" in form:  # whose checksums leave no number wrong
         assert_same(result, EXPECTED)
 

@@ -23,6 +23,14 @@ def building_frame(n_modes=5):
     return AffineModel({(name,): data[name] for name in names}, data["M0"], n_modes=n_modes)
 
 
+def chain_with_few_masses():
+    """Twelve springs in a row, in four groups, with a mass in the middle of each group."""
+    springs = np.diff(np.eye(13), axis=0)[:, 1:]
+    groups = np.split(springs, 4)
+    terms = {(name,): group.T @ group for name, group in zip("abcd", groups, strict=True)}
+    return AffineModel(terms, np.diag(np.arange(12) % 3 == 1).astype(float), n_modes=2)
+
+
 def central_differences(model, row, shapes, step):
     """Of shapes, each with the sign of those given."""
     differences = []
@@ -36,6 +44,7 @@ def central_differences(model, row, shapes, step):
 MODELS = {
     "truss": make_truss,
     "truss, all but two modes": lambda: make_truss(n_modes=21),
+    "chain with massless degrees of freedom": chain_with_few_masses,
     "dense frame": lambda: portal(3, track=True),
     "sparse frame": portal,
     "sparse tracked frame": lambda: portal(track=True),
@@ -115,6 +124,23 @@ def test_columns_of_a_rescaled_model_stay_the_nominal_modes_where_modes_swap():
     nominal = np.ones((1, 3))
     np.testing.assert_allclose((2 * np.pi * twin.frequencies(nominal)) ** 2, [[4.0, 3.0]])
     np.testing.assert_allclose(np.diagonal(twin.nominal_mac(twin.modes(nominal)[1])[0]), 1)
+
+
+@pytest.mark.parametrize(
+    ("dofs", "message"),
+    [
+        ([0, 23], "dofs holds 23; expected 0 to 22"),
+        ([-1], "dofs holds -1; expected 0 to 22"),
+        ([4, 5, 4], "dofs holds 4 more than once"),
+        ([0.0, 1.0], "type float64; expected integers in one row"),
+        ([[0, 1]], r"shape \(1, 2\) and type int64; expected integers in one row"),
+        ([], "expected integers in one row"),
+        ([True, False], "type bool; expected integers in one row"),
+    ],
+)
+def test_degrees_of_freedom_that_the_model_does_not_have_are_refused(dofs, message):
+    with pytest.raises(ValueError, match=message):
+        shape_jacobian(make_truss(), np.ones(4), dofs)
 
 
 def test_rescaling_takes_one_theta():

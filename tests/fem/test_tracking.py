@@ -1,12 +1,14 @@
 """Modes that cross, and the criterion that tells them apart."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, Beam, Structure, mac, share_reordered
-from skthermo.fem.modal import pair_modes
+from skthermo.fem.modal import may_be_missed, pair_modes, repeated_modes
 
 
 def crossing(**options):
@@ -69,6 +71,32 @@ def test_many_intruders_do_not_push_out_a_tracked_mode():
     assert np.diagonal(model.nominal_mac(model.modes([[400.0, 1.0]])[1])[0]).min() > 0.99
 
 
+def test_following_a_mode_among_few_candidates_finds_the_same_as_among_all_modes():
+    """A mode that rises through all others and mixes with each of them; five of the eight are examined first."""
+    random = np.random.default_rng(0)
+    shape = np.append(1, 0.2 * random.standard_normal(7))
+    terms = {("own",): np.outer(shape, shape), ("others",): np.diag(2 * np.arange(8.0))}
+    theta = random.uniform([0.5, 0.8], [20, 1.25], (500, 2))
+    frequencies, shapes = AffineModel(terms, np.eye(8), n_modes=8).modes(theta)
+    followed = AffineModel(terms, np.eye(8), n_modes=1, track=True)
+    closest = followed.nominal_mac(shapes)[:, 0].argmax(axis=1)
+    assert np.count_nonzero(closest >= 5) > 100
+    expected = np.take_along_axis(frequencies, closest[:, np.newaxis], axis=1)
+    np.testing.assert_allclose(followed.frequencies(theta), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("repeated", [np.eye(3, dtype=bool), repeated_modes(np.array([1.0, 4.0, 4.0]))])
+def test_a_single_mode_beyond_the_candidates_is_missed_if_it_has_a_higher_mac_than_one_assigned(repeated):
+    """Four orthogonal modes, three of them candidates: what is left of the MACs is the fourth mode's."""
+    bases = np.linalg.qr(np.random.default_rng(0).standard_normal((2000, 4, 4)))[0]
+    mac = bases[:, :3] ** 2
+    order = pair_modes(mac[:, :, :3], repeated)
+    assigned = np.take_along_axis(repeated @ mac, order[:, :, np.newaxis], axis=2)[:, :, 0]
+    missed = ((repeated @ mac)[:, :, 3] > assigned).any(axis=1)
+    assert 200 < missed.sum() < 1800
+    np.testing.assert_array_equal(may_be_missed(mac[:, :, :3], order, repeated), missed)
+
+
 def square_mast(**options):
     """A cantilever as stiff one way as the other: its modes come in pairs."""
     section = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 1e-5, "I_zz": 1e-5, "J": 2e-5, "density": 7850.0}
@@ -111,6 +139,15 @@ def test_modes_are_followed_where_mass_changes():
     np.testing.assert_allclose(
         model.nominal_mac(model.modes(theta)[1]), np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12
     )
+
+
+def test_the_sum_of_the_macs_is_the_highest_that_distinct_candidates_have():
+    macs = np.random.default_rng(0).uniform(size=(200, 3, 4))
+    order = pair_modes(macs)
+    found = np.take_along_axis(macs, order[:, :, np.newaxis], axis=2).sum(axis=(1, 2))
+    choices = [macs[:, range(3), choice].sum(axis=1) for choice in permutations(range(4), 3)]
+    np.testing.assert_allclose(found, np.max(choices, axis=0), rtol=1e-12)
+    assert (np.diff(np.sort(order, axis=1), axis=1) > 0).all()
 
 
 def test_no_candidate_serves_two_modes():

@@ -1,6 +1,7 @@
 """The whole chain and its laws."""
 
 import pickle
+import warnings
 
 import joblib
 import numpy as np
@@ -18,11 +19,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.datasets._truss import truss_structure
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+# A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
@@ -44,7 +47,9 @@ def chain(**options):
     return DataInformedFEM(TRUSS, **(defaults | options))
 
 
-FITTED = chain().fit(T, F)
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    FITTED = chain().fit(T, F)
 
 
 def test_predicts_unseen_temperatures_to_a_fraction_of_the_noise():
@@ -250,7 +255,7 @@ def test_large_models_are_recognised_in_worker_processes(tmp_path):
     n = 380
     chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
     model = AffineModel({("k",): chain_of_springs}, np.eye(n), n_modes=1)
-    air = np.linspace(0, 30, 12)[:, np.newaxis]
+    air = np.linspace(0, 30, 24)[:, np.newaxis]
     measured = model.frequencies(1 - 0.005 * air)
     simulated = InverseSurrogate(model, LinearRegression(), n_samples=20, memory=str(tmp_path))
     estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
@@ -282,7 +287,7 @@ def test_a_broken_sensor_costs_its_rows_and_no_others():
 
 
 def test_an_inverse_of_another_models_parameters_is_refused():
-    other = truss_structure().assemble(TRUSS.parameter_names[::-1])
+    other = CallableModel(TRUSS.frequencies, TRUSS.parameter_names[::-1], 6)
     with pytest.raises(ValueError, match=r"the inverse's model has the parameters \['vertical', "):
         chain(inverse=inverse().set_params(model=other)).fit(T, F)
 

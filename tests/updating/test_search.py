@@ -93,14 +93,64 @@ def test_too_few_iterations_warn_and_small_weights_of_shapes_are_named(method):
         updater.fit(frequencies, shapes=shapes[0], dofs=range(TRUSS.n_dof))
 
 
+@pytest.mark.parametrize("missing", [[], [1, 4]], ids=["all modes", "some modes"])
 @pytest.mark.parametrize("with_shapes", [False, True], ids=["frequencies", "and shapes"])
-def test_a_reduced_model_warns_once_of_an_optimum_outside_its_box(with_shapes):
+def test_a_reduced_model_warns_once_of_an_optimum_outside_its_box(with_shapes, missing):
     reduced = TRUSS.reduced(0.05, random_state=0)
     for truth, n_warnings in ((OUTSIDE, 1), (np.array([0.97, 1.04, 0.98, 1.02]), 0)):
         frequencies, shapes = TRUSS.modes([truth])
+        frequencies[:, missing] = np.nan
         measured = {"shapes": shapes[0], "dofs": range(TRUSS.n_dof)} if with_shapes else {}
         updater = ModelUpdater(reduced, shape_weight=100.0 * with_shapes, n_starts=3, random_state=0)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             updater.fit(frequencies, **measured)
         assert ["outside the bounds" in str(warning.message) for warning in caught] == [True] * n_warnings
+        assert [warning.filename for warning in caught] == [__file__] * n_warnings
+
+
+class BareModel:
+    """A third party's model, which has no frequencies where its first multiplier is low, and knows no `quiet`."""
+
+    parameter_names, n_modes = TRUSS.parameter_names, 6
+
+    def frequencies(self, theta):
+        return half_truss().frequencies(theta)
+
+
+def failing_program(theta):
+    if np.atleast_2d(theta)[:, 0].min() <= 0.95:
+        raise ZeroDivisionError("the mesh has a hole")
+    return TRUSS.frequencies(np.atleast_2d(theta))
+
+
+FAILING = {
+    "row by row": CallableModel(failing_program, TRUSS.parameter_names, 6),
+    "many rows": CallableModel(failing_program, TRUSS.parameter_names, 6, vectorized=True),
+    "no quiet": BareModel(),
+}
+
+
+@pytest.mark.parametrize("model", FAILING.values(), ids=FAILING)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_program_that_fails_at_many_theta_is_counted_in_one_warning(method, model):
+    updater = ModelUpdater(model, method=method, n_starts=3, random_state=0).fit(TRUSS.frequencies([INSIDE]))
+    np.testing.assert_allclose(updater.theta_, INSIDE, atol=1e-4)
+    with pytest.warns(UserWarning, match="best start has not converged") as caught:
+        updater.fit(TRUSS.frequencies([OUTSIDE]))
+    starts = updater.starts_
+    best = starts.loc[starts["objective"].idxmin()]
+    assert len(caught) == 1
+    assert f"{best['n_evaluations']} evaluations, {best['n_failed']} of them without modes" in str(caught[0].message)
+    assert 0 < best["n_failed"] < best["n_evaluations"]
+    assert starts["n_failed"][starts["objective"] == np.inf].eq(1).all()
+
+
+def test_a_program_that_always_fails_is_quoted():
+    model = CallableModel(lambda row: 1 / 0, ["k"], 1)
+    with (
+        pytest.warns(UserWarning, match="ZeroDivisionError: division by zero") as caught,
+        pytest.raises(ValueError, match="no modes at any of the 2 starts"),
+    ):
+        ModelUpdater(model, n_starts=2, random_state=0).fit([[1.0]])
+    assert len(caught) == 1

@@ -7,6 +7,7 @@ import pytest
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.updating import identifiability, select_parameters, sensitivity
+from skthermo.updating._information import cramer_rao
 from tests.fem.frames import FRAME
 from tests.fem.test_local_modes import building_frame
 
@@ -51,14 +52,21 @@ def test_a_power_law_has_its_exponents_as_sensitivities():
     assert known.condition_number == pytest.approx(values[0] / values[1], rel=1e-4)
 
 
+def test_at_the_smallest_step_rounding_takes_half_of_the_digits():
+    model = CallableModel(lambda row: row**0.5, ["k", "m"], 2)
+    S = sensitivity(model, [0.7, 1.3], method="central", step=1.5e-8)
+    np.testing.assert_allclose(S, np.diag([0.5, 0.5]), atol=5e-8)
+
+
 def test_errors_of_sensitivities():
     model = CallableModel(lambda row: row[:1], ["k", "m"], 1)
     with pytest.raises(ValueError, match="no method 'jacobian'; expected one that has, or method='central'"):
         sensitivity(model)
     with pytest.raises(ValueError, match="expected 'exact' or 'central'"):
         sensitivity(make_truss(), method="forward")
-    with pytest.raises(ValueError, match="step is 0"):
-        sensitivity(model, method="central", step=0)
+    for step in (0, 1e-17, 1e-8, 1.0, "0.01"):
+        with pytest.raises(ValueError, match=r"step is .* expected a relative step from 1\.5e-08, below which"):
+            sensitivity(model, method="central", step=step)
     with pytest.raises(ValueError, match="2 rows"):
         sensitivity(model, np.ones((2, 2)), method="central")
     with pytest.warns(UserWarning, match="NaN"), pytest.raises(ValueError, match="expected numbers"):
@@ -95,6 +103,24 @@ def test_what_only_some_parameters_share_leaves_the_others_known():
     assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_bound_is_the_inverse_up_to_rounding_and_infinite_beyond(seed):
+    """Of four parameters, two act almost alike: a difference of 1e-4 is information, one of 1e-9 is rounding."""
+    random = np.random.default_rng(seed)
+    rows, units = random.standard_normal((8, 4)), 10.0 ** random.integers(-6, 6, 4)
+    difference = rows[:, 3].copy()
+    for share in (1e-4, 1e-9):
+        rows[:, 3] = rows[:, 2] + share * difference
+        scaled = rows * units
+        covariance = cramer_rao(scaled.T @ scaled)
+        if share == 1e-4:
+            inverse = np.linalg.pinv(rows)
+            np.testing.assert_allclose(covariance * np.outer(units, units), inverse @ inverse.T, rtol=1e-4, atol=1e-4)
+        else:
+            assert np.isinf(np.diag(covariance)).tolist() == [False, False, True, True]
+            assert np.isnan(covariance[2, [0, 1, 3]]).all()
+
+
 def test_noise_that_varies_weights_the_modes():
     model, noise = make_truss(), np.array([1, 2, 3, 1, 2, 3]) / 1000
     known = identifiability(model, noise=noise)
@@ -106,6 +132,15 @@ def test_noise_that_varies_weights_the_modes():
         identifiability(model, noise=[0.0, *noise[1:]])
 
 
+def shape_rows(model, dofs):
+    """Derivatives of shapes scaled to a root mean square of 1 and held in direction, by central differences."""
+    step, nominal = 1e-4, model.modes(np.ones((1, 4)))[1][0][dofs]
+    ends = [[model.modes([1 + way * step * unit])[1][0][dofs] for way in (1, -1)] for unit in np.eye(4)]
+    raised, lowered = (np.stack([end[i] / (end[i] * nominal).sum(axis=0) for end in ends]) for i in (0, 1))
+    slopes = (raised - lowered) / (2 * step) * np.sqrt((nominal**2).sum(axis=0) * len(dofs))
+    return slopes.reshape(4, -1).T
+
+
 def test_shapes_add_information():
     model, dofs = make_truss(), np.arange(0, 20, 3)
     without = identifiability(model, noise=0.001).deviations
@@ -113,10 +148,13 @@ def test_shapes_add_information():
     assert (known.deviations < without).all()
     nothing = identifiability(model, noise=0.001, dofs=dofs, shape_noise=1e6)
     np.testing.assert_allclose(nothing.deviations, without, rtol=1e-6)
+    finer = identifiability(model, noise=0.001, dofs=dofs, shape_noise=1e-6)
+    rows = shape_rows(model, dofs) / 1e-6
+    np.testing.assert_allclose(finer.deviations, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))), rtol=1e-4)
     with pytest.raises(ValueError, match="both dofs and shape_noise"):
         identifiability(model, noise=0.001, dofs=dofs)
     with pytest.raises(ValueError, match="shape_noise is 0"):
         identifiability(model, noise=0.001, dofs=dofs, shape_noise=0)
     other = CallableModel(model.frequencies, model.parameter_names, 6, vectorized=True)
-    with pytest.raises(ValueError, match="expected an AffineModel"):
+    with pytest.raises(ValueError, match="has no method 'local_modes'; expected a model with one, such as AffineModel"):
         identifiability(other, noise=0.001, dofs=dofs, shape_noise=0.01)

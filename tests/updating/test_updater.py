@@ -87,88 +87,15 @@ def test_gradients_of_the_objective_equal_central_differences(model):
     np.testing.assert_allclose(point.gradient(), gradient, rtol=1e-4)
 
 
-@pytest.mark.parametrize("dofs", [None, [0, 3, 7, 9, 14, 17, 21]], ids=["frequencies", "and shapes"])
-def test_covariance_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound(dofs):
-    """Standard deviations of 200 fits are known to 5 %; three of these are 15 %."""
-    noise, shape_noise, n_fits = 0.002, 0.01, 200
-    random, truth = np.random.default_rng(0), np.array([0.95, 1.05, 1.0, 0.98])
-    frequencies, shapes = measured(TRUSS, truth, dofs)
-    options, weight = {}, 0.0
-    if dofs:
-        options = {"dofs": dofs, "shape_noise": shape_noise}
-        weight = np.sqrt(2 * (len(dofs) - 1)) / shape_noise**2
-    updater = ModelUpdater(TRUSS, bounds=[[0.2, 3.0]] * 4, shape_weight=weight)
-    found, deviations = [], []
-    for _ in range(n_fits):
-        F = frequencies * (1 + noise * random.standard_normal(6))
-        with_shapes = {}
-        if dofs:
-            level = shape_noise * np.sqrt(np.mean(shapes**2, axis=0))
-            with_shapes = {"dofs": dofs, "shapes": shapes + level * random.standard_normal(shapes.shape)}
-        updater.fit(F, frequency_std=noise * frequencies, **with_shapes)
-        found.append(updater.theta_)
-        deviations.append(np.sqrt(np.diag(updater.covariance_)))
-    bound = identifiability(TRUSS, truth, noise=noise, **options).deviations.to_numpy() * truth
-    scatter = np.std(found, axis=0, ddof=1)
-    identifiable = bound < 0.1  # where the model is linear over the scatter
-    assert identifiable.sum() >= 3
-    np.testing.assert_allclose(scatter[identifiable], bound[identifiable], rtol=0.15)
-    np.testing.assert_allclose(np.median(deviations, axis=0)[identifiable], bound[identifiable], rtol=0.1)
-    errors = (np.mean(found, axis=0) - truth) / (bound / np.sqrt(n_fits))
-    assert np.abs(errors[identifiable]).max() < 4
-
-
-def oscillators(track, n_modes=3):
-    """Three masses on springs of their own: frequencies in the ratio of roots of stiffness, shapes are axes."""
-    stiffness = {
-        (name,): np.diag(np.eye(3)[i] * k) for i, (name, k) in enumerate(zip("abc", (1.0, 1.4, 9.0), strict=True))
-    }
-    return AffineModel(stiffness, np.eye(3), n_modes=n_modes, track=track)
-
-
-def test_a_false_match_of_swapped_modes_is_refused():
-    """In truth the first spring is the stiffer one; only shapes, or following them, can tell."""
-    truth = np.array([1.5, 0.9, 1.0])
-    tracked, sorted_ = oscillators(True), oscillators(False)
-    frequencies = tracked.frequencies([truth])
-    assert frequencies[0, 0] > frequencies[0, 1]
-    np.testing.assert_allclose(ModelUpdater(tracked, bounds=0.6).fit(frequencies).theta_, truth, rtol=1e-6)
-
-    bounds, F = [[0.9, 1.6], [0.6, 1.01], [0.5, 1.5]], np.sqrt([[1.3, 1.5, 9.0]]) / (2 * np.pi)
-    honest = ModelUpdater(tracked, bounds=bounds, n_starts=8, random_state=0).fit(F)
-    np.testing.assert_allclose(honest.theta_, [1.3, 1.01, 1.0], atol=1e-4)
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] swap places .* expected a model with track=True"):
-        false = ModelUpdater(sorted_, bounds=bounds, n_starts=8, random_state=0).fit(F)
-    assert false.starts_["objective"].min() < 1e-9 < honest.starts_["objective"].min()
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] are by their shapes other modes"):
-        updater = ModelUpdater(sorted_, bounds=0.6).fit(frequencies, shapes=np.eye(3), dofs=[0, 1, 2])
-    np.testing.assert_allclose(updater.theta_, truth, rtol=1e-6)
-    np.testing.assert_allclose(updater.table_["mac_after"], 1)
-
-
-def test_shapes_that_the_model_does_not_have_are_named():
-    with pytest.warns(UserWarning, match=r"no mode .* shapes of \['f3'\] \(MAC below 0.5\)"):
-        ModelUpdater(oscillators(True)).fit(
-            oscillators(True).frequencies([np.ones(3)]), shapes=[[1, 0, 1], [0, 1, 1], [0, 0, 0.3]], dofs=[0, 1, 2]
-        )
-
-
-def test_measured_modes_in_another_order_are_found_by_their_shapes():
-    dofs, order = np.arange(0, 23, 3), [1, 0, 2, 4, 3, 5]
+@pytest.mark.parametrize("n_dofs", [2, 9])
+def test_covariance_from_shapes_is_what_identifiability_promises(n_dofs):
+    """With frequencies so noisy that almost all is known from the shapes."""
+    noise, shape_noise, dofs = 10.0, 1e-3, np.arange(3, 3 + n_dofs)
     frequencies, shapes = measured(TRUSS, TRUTH, dofs)
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2', 'f4', 'f5'\] are by their shapes other modes"):
-        updater = ModelUpdater(TRUSS).fit(frequencies[order], shapes=shapes[:, order], dofs=dofs)
-    np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
-
-
-def test_a_mode_pushed_up_is_found_among_more_modes_than_measured():
-    truth = np.array([1.0, 1.0, 0.15])
-    model = oscillators(False, n_modes=2)
-    shapes = np.eye(3)[:, :2]
-    frequencies = oscillators(True).frequencies([truth])[:, :2]
-    updater = ModelUpdater(model, bounds=[[0.5, 2], [0.5, 2], [0.01, 2]], prior=1.0)
-    updater.fit(frequencies, shapes=shapes, dofs=[0, 1, 2])
-    np.testing.assert_allclose(updater.table_["after"], frequencies[0], rtol=1e-3)
+    updater = ModelUpdater(TRUSS, shape_weight=np.sqrt(2 * (n_dofs - 1)) / shape_noise**2)
+    updater.fit(frequencies, shapes=shapes, dofs=dofs, frequency_std=noise * frequencies)
+    bound = identifiability(TRUSS, updater.theta_, noise=noise, dofs=dofs, shape_noise=shape_noise).deviations
+    np.testing.assert_allclose(np.sqrt(np.diag(updater.covariance_)) / updater.theta_, bound, rtol=1e-6)
 
 
 def test_records_are_averaged_and_missing_modes_left_out():
@@ -193,13 +120,6 @@ def test_complex_shapes_of_random_phase_are_made_real():
         from_complex = clone(updater).fit(frequencies, shapes=turned, dofs=dofs)
     from_real = updater.fit(frequencies, shapes=shapes, dofs=dofs)
     np.testing.assert_allclose(from_complex.theta_, from_real.theta_, atol=1e-6)
-
-
-def test_one_sensor_pairs_by_the_nominal_modes():
-    """A single component is like any other; a MAC of 1 tells nothing."""
-    frequencies, shapes = measured(TRUSS, TRUTH, [5])
-    updater = ModelUpdater(TRUSS, shape_weight=10.0).fit(frequencies, shapes=shapes, dofs=[5])
-    np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
 
 
 def test_a_prior_holds_what_cannot_be_told():
@@ -291,6 +211,38 @@ def test_the_updated_model_composes_with_the_chain():
     updater = ModelUpdater(TRUSS).fit(year.frequencies)
     np.testing.assert_allclose(updater.model_.frequencies([np.ones(4)])[0], year.frequencies.mean(), rtol=5e-3)
     fem = DataInformedFEM(updater.model_, inverse=InverseSurrogate(bounds=0.2, n_samples=200), random_state=0)
-    assert fem.fit(year.temperatures, year.frequencies).score(year.temperatures, year.frequencies) > 0
-    assert sensitivity(updater.model_).shape == (6, 4)
-    assert updater.model_.damaged({"bottom": 0.5}).frequencies([np.ones(4)])[0, 0] < updater.table_["after"].iloc[0]
+    assert fem.fit(year.temperatures, year.frequencies).score(year.temperatures, year.frequencies) > 0.8
+    np.testing.assert_allclose(sensitivity(updater.model_), sensitivity(TRUSS, updater.theta_), atol=1e-9)
+    damaged = TRUSS.damaged({"bottom": 0.5}).frequencies([updater.theta_])
+    np.testing.assert_allclose(updater.model_.damaged({"bottom": 0.5}).frequencies([np.ones(4)]), damaged, rtol=1e-9)
+
+
+@pytest.mark.parametrize("dofs", [None, [0, 3, 7, 9, 14, 17, 21]], ids=["frequencies", "and shapes"])
+def test_covariance_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound(dofs):
+    """Standard deviations of 200 fits are known to 5 %; three of these are 15 %."""
+    noise, shape_noise, n_fits = 0.002, 0.01, 200
+    random, truth = np.random.default_rng(0), np.array([0.95, 1.05, 1.0, 0.98])
+    frequencies, shapes = measured(TRUSS, truth, dofs)
+    options, weight = {}, 0.0
+    if dofs:
+        options = {"dofs": dofs, "shape_noise": shape_noise}
+        weight = np.sqrt(2 * (len(dofs) - 1)) / shape_noise**2
+    updater = ModelUpdater(TRUSS, bounds=[[0.2, 3.0]] * 4, shape_weight=weight)
+    found, deviations = [], []
+    for _ in range(n_fits):
+        F = frequencies * (1 + noise * random.standard_normal(6))
+        with_shapes = {}
+        if dofs:
+            level = shape_noise * np.sqrt(np.mean(shapes**2, axis=0))
+            with_shapes = {"dofs": dofs, "shapes": shapes + level * random.standard_normal(shapes.shape)}
+        updater.fit(F, frequency_std=noise * frequencies, **with_shapes)
+        found.append(updater.theta_)
+        deviations.append(np.sqrt(np.diag(updater.covariance_)))
+    bound = identifiability(TRUSS, truth, noise=noise, **options).deviations.to_numpy() * truth
+    scatter = np.std(found, axis=0, ddof=1)
+    identifiable = bound < 0.1  # where the model is linear over the scatter
+    assert identifiable.sum() >= 3
+    np.testing.assert_allclose(scatter[identifiable], bound[identifiable], rtol=0.15)
+    np.testing.assert_allclose(np.median(deviations, axis=0)[identifiable], bound[identifiable], rtol=0.1)
+    errors = (np.mean(found, axis=0) - truth) / (bound / np.sqrt(n_fits))
+    assert np.abs(errors[identifiable]).max() < 4

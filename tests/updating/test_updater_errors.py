@@ -50,7 +50,7 @@ def test_measurements_that_cannot_be(F, options, message):
         ),
         (
             {"bounds": [[0.5, 1.5]] * 3 + [[1.2, 1.8]]},
-            "bounds of parameter 'vertical' .* expected them to hold the first",
+            "bounds of parameter 'vertical' .* expected them to contain 1",
         ),
         ({"shape_weight": 1.0}, "shape_weight is 1.0 but no shapes were given"),
         ({"shape_weight": -1.0}, "shape_weight"),
@@ -65,9 +65,12 @@ def test_settings_that_cannot_be(parameters, message):
         ModelUpdater(TRUSS, **parameters).fit(F)
 
 
-def test_shapes_need_a_model_that_can_differentiate_them():
+def test_shapes_need_a_model_with_local_modes():
     model = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
-    with pytest.raises(ValueError, match="cannot differentiate its own; expected an AffineModel"):
+    with pytest.raises(
+        ValueError,
+        match=r"has no 'local_modes' and no 'n_dof' and no 'track'; .* such as AffineModel",
+    ):
         ModelUpdater(model).fit(F, shapes=SHAPES, dofs=range(5))
 
 
@@ -84,6 +87,15 @@ def test_more_unknowns_than_residuals_warn():
     with pytest.warns(UserWarning, match="4 parameters are to be found from 2 residuals"):
         ModelUpdater(TRUSS).fit(np.where(np.arange(6) < 2, F, np.nan))
     ModelUpdater(TRUSS, prior=0.1).fit(np.where(np.arange(6) < 2, F, np.nan))
+
+
+def test_a_shape_counts_one_residual_less_than_degrees_of_freedom():
+    only_first = np.where(np.arange(6) == 0, F, np.nan)
+    shape = np.where(np.arange(6) == 0, SHAPES[:3], np.nan)
+    with pytest.warns(UserWarning, match="4 parameters are to be found from 3 residuals"):
+        ModelUpdater(TRUSS, shape_weight=1.0).fit(only_first, shapes=shape, dofs=range(3))
+    with pytest.warns(UserWarning, match="4 parameters are to be found from 1 residuals"):
+        ModelUpdater(TRUSS).fit(only_first, shapes=shape, dofs=range(3))
 
 
 def test_a_model_without_modes_at_any_start():

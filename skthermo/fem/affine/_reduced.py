@@ -75,6 +75,8 @@ class ReducedModel(AffineBase):
     True
     """
 
+    _basis: Array
+
     def __init__(
         self,
         full: AffineBase,

@@ -153,7 +153,7 @@ class CallableModel:
             solved |= {batch[row]: frequencies[row] for row in good}
         if failures:
             first = next(iter(failures.values()))
-            if len(failures) == len(missing) > 1:
+            if len(failures) == len(missing) > 1 and not self._is_quiet:
                 raise first
             if not self._is_quiet:
                 warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {first}", UserWarning, stacklevel=2)
@@ -185,7 +185,7 @@ class CallableModel:
         }
 
     def quiet(self) -> "CallableModel":
-        """The same model without warnings of rows at which the function fails.
+        """The same model, which gives NaN without warning or error where the function fails.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Eigenproblems, which mode is which, and modes at one theta."""
+"""Eigenproblems, tracking of modes by their shapes, and derivatives of modes."""
 
 from skthermo.fem.modal._dense import EigenSolver, dense_solver, hertz
 from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian

@@ -1,4 +1,4 @@
-"""Derivatives of mode shapes beside the modes at hand, by iteration."""
+"""The part of a mode shape's derivative that the computed modes do not span, by conjugate gradients."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import numpy as np
 from skthermo._arrays import Array, Matrix
 
 CONVERGED = 1e-5
-"""Residual, as a share of the derivative, at which the iteration stops; its error is smaller."""
+"""Residual, as a share of the derivative, at which the iteration stops. The error of the result is smaller."""
 
 MAX_ITERATIONS = 200
 
@@ -15,12 +15,29 @@ MAX_ITERATIONS = 200
 def solve_beside_modes(
     solve: Callable[[Array], Array], mass: Matrix, shapes: Array, forces: Array, shifts: Array, known: Array
 ) -> Array:
-    """x of (K - shift M) x = force, M-orthogonal to the lowest modes, for many columns at once.
+    """Solve (K - shift M) x = force for x M-orthogonal to the lowest modes, for many columns at once.
 
-    K^-1 turns it into (I - shift K^-1 M) x = K^-1 force, which is positive definite beside all modes up to the shift:
-    conjugate gradients in the inner product of M, whose rate the ratio of the shift to the next eigenvalue sets.
-    The last residual is added, which makes it a step of x = K^-1 (force + shift M x) and reaches massless degrees of
-    freedom too.
+    Multiplied by K^-1 it reads (I - shift K^-1 M) x = K^-1 force, which is positive definite on the complement of all
+    modes up to the shift. It is solved by conjugate gradients in the inner product of M; the lower the ratio of the
+    shift to the next eigenvalue, the fewer iterations. The last residual is added to x, which is one step of
+    x = K^-1 (force + shift M x): it corrects the massless degrees of freedom, which the inner product of M cannot see.
+
+    Parameters
+    ----------
+    solve : callable
+        Solves K x = b for columns b.
+    mass : matrix of shape (n, n)
+    shapes : ndarray of shape (n, n_candidates)
+        The lowest modes, of unit modal mass.
+    forces : ndarray of shape (n, n_columns)
+    shifts : ndarray of shape (n_columns,)
+        Eigenvalues below that of the first mode that is missing in ``shapes``.
+    known : ndarray of shape (n_columns,)
+        Squared length of the derivative's part along ``shapes``, to measure the residual by.
+
+    Returns
+    -------
+    ndarray of shape (n, n_columns)
     """
     weighted = mass @ shapes
 

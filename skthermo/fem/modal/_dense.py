@@ -1,7 +1,7 @@
 """Dense generalised eigenproblems K phi = lambda M phi of many theta in one batch.
 
-Two forms of the same problem. Both scale mode shapes to unit modal mass, and give NaN where the stiffness is
-not positive definite.
+There are two forms of it. Both scale mode shapes to unit modal mass, and return NaN where the stiffness is not
+positive definite.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from skthermo._arrays import Array
 from skthermo.fem.modal._matrices import ParametrisedMatrix
 
 WIDEST_SPECTRUM = 1e6
-"""Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9."""
+"""Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9 of its value."""
 
 
 class EigenSolver(Protocol):
@@ -70,8 +70,8 @@ class StandardSolver:
 class FlexibilitySolver:
     """B y = y / lambda with B = L^-1 M L^-T and phi = L^-T y sqrt(lambda), for K = L L'.
 
-    Serves a mass that varies with theta or leaves degrees of freedom massless, and keeps the
-    digits of the lowest modes where the spectrum of stiffness is wide.
+    The mass may vary with theta or be zero at some degrees of freedom. The lowest modes stay accurate where the
+    eigenvalues span many orders of magnitude.
     """
 
     def __init__(self, stiffness: ParametrisedMatrix, mass: ParametrisedMatrix):
@@ -106,7 +106,7 @@ class FlexibilitySolver:
 def dense_solver(
     stiffness: ParametrisedMatrix, mass: ParametrisedMatrix, nominal: Array, widest: float = WIDEST_SPECTRUM
 ) -> EigenSolver:
-    """The standard form where the spectrum is narrow enough for it (the fastest), else the flexibility form."""
+    """The standard form, which is the fastest, where it is accurate enough; else the flexibility form."""
     if mass.is_constant:
         matrix = mass.assemble(nominal)[0]
         lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]]

@@ -1,4 +1,4 @@
-"""Modes at one theta, and their derivatives."""
+"""Modes at one theta and their derivatives."""
 
 from collections.abc import Callable
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
+from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import LocalModel
 from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._beside_modes import solve_beside_modes
@@ -17,7 +18,7 @@ from skthermo.fem.modal._tracking import REPEATED
 class LocalModes:
     """The lowest modes of a model at one theta, in ascending order, with their derivatives.
 
-    Models make it: `AffineModel.local_modes`.
+    The method ``local_modes`` of a model returns it, such as `AffineModel.local_modes`.
 
     Parameters
     ----------
@@ -28,20 +29,21 @@ class LocalModes:
     nominal_mac : ndarray of shape (n_modes, n_candidates)
         Mass-weighted MAC of the nominal modes with these.
     ranks : ndarray of int of shape (n_modes,)
-        Which of these modes each nominal mode has become.
+        Position, among these modes, of each nominal mode.
     stiffness, mass : parametrised matrix
         In the same coordinates.
     theta : ndarray of shape (1, n_parameters)
-        Where.
+        Multipliers of the nominal parameters.
     solve : callable
         Solves K x = b at theta for columns b.
     basis : ndarray of shape (n_dof, n), optional
-        From these coordinates to degrees of freedom. By default they are the same.
+        Its columns are these coordinates' shapes at the degrees of freedom, where a model is solved on a basis of
+        shapes.
 
     Attributes
     ----------
     frequencies : ndarray of shape (n_candidates,)
-        In Hz; more than the model has, to choose its modes from.
+        In Hz. There are more than the model's ``n_modes``, so that its modes are among them.
 
     Examples
     --------
@@ -95,27 +97,28 @@ class LocalModes:
         return self._at_dofs(np.asarray(dofs, dtype=np.intp), self._shapes)
 
     def derivatives(self, columns: ArrayLike, dofs: ArrayLike) -> tuple[Array, Array]:
-        """Derivatives of some modes by the parameters.
+        """Derivatives of some modes with respect to the parameters.
 
         Parameters
         ----------
         columns : array-like of int of shape (n_columns,)
             Which of the modes, the lowest being 0.
         dofs : array-like of int of shape (n_dofs,)
-            Degrees of freedom at which shapes are wanted; none are much cheaper.
+            Degrees of freedom at which derivatives of shapes are wanted. An empty list saves most of the time.
 
         Returns
         -------
         d_frequencies : ndarray of shape (n_columns, n_parameters)
             In Hz.
         d_shapes : ndarray of shape (n_dofs, n_columns, n_parameters)
-            Of the shapes with unit modal mass.
+            Derivatives of the shapes with unit modal mass.
 
         Notes
         -----
-        With b = -(dK - lambda_j dM) phi_j, the derivative of phi_j is x of (K - lambda_j M) x = b in M-orthogonal
-        parts: (phi_k' b) / (lambda_k - lambda_j) along every other mode at hand, -1/2 phi_j' dM phi_j along phi_j
-        itself, and a remainder that is found by iteration.
+        With b = -(dK - lambda_j dM) phi_j, the derivative of phi_j is a sum of M-orthogonal parts:
+        (phi_k' b) / (lambda_k - lambda_j) along every other computed mode k, -1/2 phi_j' dM phi_j along phi_j itself,
+        and a remainder, the solution of (K - lambda_j M) x = b beside these modes, found by iteration. Where
+        eigenvalues repeat, the parts along each other's modes are left out.
         """
         columns, dofs = np.asarray(columns, dtype=np.intp), np.asarray(dofs, dtype=np.intp)
         stiffness, mass = self._stiffness, self._mass
@@ -141,7 +144,7 @@ class LocalModes:
         return d_frequencies, self._at_dofs(dofs, d_shapes)
 
     def _remainder(self, forces: Array, eigenvalues: Array, known: Array) -> Array:
-        """The part of x that is M-orthogonal to the modes at hand, along which its squared length is known."""
+        """The part of the derivatives beside the computed modes; ``known`` is the squared length along these."""
         mass = self._mass.assemble(self._theta)[0]
         columns = forces.reshape(len(forces), -1)
         shifts = np.repeat(eigenvalues, forces.shape[2])
@@ -157,8 +160,8 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     Parameters
     ----------
     model : FE model
-        With a method ``local_modes``, such as `AffineModel`. Its columns are the nominal modes with ``track=True``,
-        else the lowest modes.
+        With a method ``local_modes``, such as `AffineModel`. Columns of the result are the nominal modes if it has
+        ``track=True``, else the lowest modes.
     theta : array-like of shape (n_parameters,) or (1, n_parameters)
         Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of single shapes do not
         exist and the part within the repeated space is left out.
@@ -175,12 +178,13 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     Raises
     ------
     ValueError
-        If the model has no method ``local_modes``, or theta is not one row of positive multipliers.
+        If the model has no method ``local_modes``, theta is not one row of positive multipliers, or ``dofs`` are not
+        different degrees of freedom of the model.
 
     Notes
     -----
     The derivative solves (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi with phi' M d phi =
-    -1/2 phi' dM phi: by superposition of the modes at hand, and conjugate gradients for what is beside them.
+    -1/2 phi' dM phi: by superposition of the computed modes, and by conjugate gradients for what these do not span.
 
     References
     ----------
@@ -199,5 +203,5 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     row = check_theta(theta, model.parameter_names, one_row=True)
     modes = model.local_modes(row, follow=True)
     columns = modes.ranks if model.track else np.arange(model.n_modes)
-    places = np.arange(model.n_dof) if dofs is None else np.asarray(dofs)
+    places = np.arange(model.n_dof) if dofs is None else check_dofs(dofs, model.n_dof)
     return modes.shapes(places)[:, columns], modes.derivatives(columns, places)[1]

@@ -1,4 +1,4 @@
-"""What eigensolvers ask of a matrix that depends on theta."""
+"""Protocol of matrices that depend on theta, as eigensolvers use them."""
 
 from collections.abc import Iterator
 from typing import Any, Protocol

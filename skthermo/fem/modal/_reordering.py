@@ -7,7 +7,10 @@ from skthermo._arrays import Array
 from skthermo.fem._protocol import ModalModel
 from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._mac import mac
-from skthermo.fem.modal._tracking import SAME_MODE, pair_modes
+from skthermo.fem.modal._tracking import pair_modes
+
+SAME_MODE = 0.5
+"""MAC above which no other mode can have a higher one with the same reference: its MACs with all modes add up to 1."""
 
 ROWS_AT_ONCE = 64
 """Samples whose shapes, at all degrees of freedom, are held at once."""
@@ -27,7 +30,7 @@ def share_reordered(model: ModalModel, theta: ArrayLike) -> float:
     -------
     float
         Between 0 and 1. A sample counts if some column of ``model.modes(theta)`` is not the nominal mode of the same
-        number: another one is more like it, or none of the model's modes is (MAC below 0.5).
+        number: another column has the higher MAC with that mode, or the column's own MAC with it is below 0.5.
 
     Raises
     ------

@@ -13,14 +13,14 @@ GUARD_VECTORS = 2
 """Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
 
 FEW_MASSES = 20
-"""Degrees of freedom with mass, beyond three for each eigenpair, from which on a Lanczos iteration has room."""
+"""Fewest degrees of freedom with mass, beyond three for each eigenpair, for a Lanczos iteration to converge."""
 
 
 class ShiftInvertSolver:
     """Lanczos iteration on K^-1 M in the inner product of M, which may be singular.
 
-    The start vector is random with a fixed seed: the same theta gives the same bits, and no
-    symmetry of a structure is orthogonal to it.
+    The start vector is random with a fixed seed: the same theta gives the same bits, and no mode of a symmetric
+    structure is orthogonal to it.
     """
 
     def __init__(self, stiffness: ParametrisedMatrix, mass: ParametrisedMatrix):
@@ -77,7 +77,7 @@ def lowest_modes(
         except scipy.sparse.linalg.ArpackError:
             return nothing
         vectors = vectors[:, np.argsort(values)[:n_modes]]
-    # One more application of K^-1 M takes out what massless degrees of freedom gather of rounding.
+    # One more application of K^-1 M removes the rounding errors at massless degrees of freedom.
     shapes = factors.solve(mass @ vectors)
     shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
     return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
@@ -88,7 +88,7 @@ def modes_of_few_masses(
 ) -> Array:
     """Lowest shapes, up to their scale, from the dense flexibility R' K^-1 R of the mass M = R R'.
 
-    The Krylov space of K^-1 M is no larger than there are masses, too small for an iteration.
+    With few masses the Krylov space of K^-1 M is too small for a Lanczos iteration.
     """
     root = np.zeros((mass.shape[0], len(massive)))
     weights, directions = np.linalg.eigh(mass[massive][:, massive].toarray())
@@ -109,5 +109,5 @@ def factorise(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU | N
 
 
 def seeded_start(n_dof: int) -> Array:
-    """A vector that is neither symmetric nor different from call to call."""
+    """A random start vector, the same in every call."""
     return np.random.default_rng(0).standard_normal(n_dof)

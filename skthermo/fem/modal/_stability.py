@@ -12,11 +12,11 @@ FEW_DOFS = 500
 """Degrees of freedom up to which a mass matrix is examined as a dense one."""
 
 SMALL_SHIFT = 1e-10
-"""Makes a semidefinite matrix of unit diagonal definite."""
+"""Multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite."""
 
 
 def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
-    """Refuse a stiffness matrix that leaves a motion free.
+    """Refuse a stiffness matrix with a motion that nothing resists.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
     Raises
     ------
     ValueError
-        If the matrix is not positive definite; the error names the free motion's largest parts.
+        If the matrix is not positive definite; the error names where the motion is largest.
     """
     diagonal = stiffness.diagonal()
     if (diagonal <= 0).any():
@@ -50,7 +50,7 @@ def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
 def count_modes(mass: Matrix, *, at_least: int) -> int:
     """How many modes of finite frequency a mass matrix allows.
 
-    Of a sparse matrix with many masses, as many as it has degrees of freedom with mass.
+    For a sparse matrix with many masses this is the number of degrees of freedom with mass.
 
     Raises
     ------
@@ -81,13 +81,13 @@ def count_modes(mass: Matrix, *, at_least: int) -> int:
 
 
 def _scaled(matrix: scipy.sparse.csc_array, scale: Array) -> scipy.sparse.csc_array:
-    """Rows and columns multiplied."""
+    """The matrix with its rows and columns multiplied by ``scale``."""
     diagonal = scipy.sparse.diags_array(scale, format="csc")
     return diagonal @ matrix @ diagonal
 
 
 def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
-    """Lowest eigenvalue and its vector, by a shift that lies below it."""
+    """Lowest eigenvalue and its eigenvector, by shift-invert with a shift below it."""
     identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
     shift = SMALL_SHIFT
     while (factors := factorise(matrix + shift * identity)) is None:

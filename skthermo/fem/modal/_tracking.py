@@ -1,37 +1,33 @@
-"""Which mode is which: pairing modes with reference modes by their MAC."""
+"""Tracking: which computed mode is which reference mode, by their MAC."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-SAME_MODE = 0.5
-"""MAC above which no other mode can be closer to the reference, since shapes are orthogonal."""
-
 REPEATED = 1e-6
-"""Relative distance of eigenvalues below which rounding decides which shapes they have."""
+"""Relative distance of eigenvalues below which they count as repeated: rounding then decides their shapes."""
 
 
 def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Assign to every reference mode the candidate that keeps the sum of MACs highest.
+    """Assign one candidate to each reference mode, so that the sum of MACs is highest.
 
     Parameters
     ----------
     mac : ndarray of shape (n_samples, n_modes, n_candidates)
         MAC of reference modes and candidates.
     repeated : ndarray of bool of shape (n_modes, n_modes), optional
-        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis, so that a
-        candidate is compared with the space they span, and those assigned go in ascending order.
+        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis of the space they span, so
+        candidates are compared with that space, and those assigned to it are sorted by frequency.
 
     Returns
     -------
     ndarray of shape (n_samples, n_modes)
-        Candidate of each reference mode; no candidate serves twice.
+        Candidate of each reference mode; no candidate is assigned twice.
     """
     spans = np.nan_to_num(mac if repeated is None else repeated @ mac)
     best = spans.argmax(axis=2)
-    clear = np.take_along_axis(spans, best[:, :, np.newaxis], axis=2).min(axis=(1, 2)) > SAME_MODE
     distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
-    for sample in np.flatnonzero(~(clear & distinct)):
+    for sample in np.flatnonzero(~distinct):
         best[sample] = linear_sum_assignment(spans[sample], maximize=True)[1]
     for cluster in () if repeated is None else np.unique(repeated, axis=0):
         best[:, cluster] = np.sort(best[:, cluster], axis=1)
@@ -41,8 +37,8 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
 def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Samples in which a mode beyond the candidates could have a higher MAC with a reference than the one assigned.
 
-    The MACs of a reference with all modes, which are orthogonal, add up to 1: what the candidates leave of it is the
-    most that any other mode can have.
+    Modes are orthogonal, so the MACs of a reference with all modes add up to 1 (with repeated references, to their
+    number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum.
     """
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
@@ -51,6 +47,6 @@ def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: N
 
 
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of some ascending eigenvalues are the same but for rounding, (n_modes, n_modes)."""
+    """Which of some ascending eigenvalues equal each other up to rounding, (n_modes, n_modes)."""
     cluster = np.cumsum(np.diff(eigenvalues, prepend=0) > REPEATED * eigenvalues)
     return cluster[:, np.newaxis] == cluster

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator
 from contextlib import closing
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads, single_blas_thread
-from skthermo.fem._protocol import FEModel
+from skthermo.fem._protocol import BatchModel, FEModel
 from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta, warn_of_failures
 from skthermo.fem.sampling._progress import with_progress
 
@@ -75,7 +75,7 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
 def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
     """Frequencies of the rows at each of the places, in order; closing the generator ends the work."""
     thread_safe = getattr(model, "thread_safe", False)
-    frequencies = model.quiet().frequencies if thread_safe else model.frequencies
+    frequencies = cast(BatchModel, model).quiet().frequencies if thread_safe else model.frequencies
     if thread_safe and effective_n_jobs(n_jobs) == 1:
         yield from map_on_blas_threads(lambda place: frequencies(rows[place]), places)
     else:

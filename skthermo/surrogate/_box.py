@@ -1,0 +1,59 @@
+"""The box of parameters that an inverse was trained in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+
+NEAR = 2.0
+"""Half-widths from the middle of the box up to which parameters count as near it: a surrogate bends little there."""
+
+MANY = 0.05
+"""Share of rows far outside the box that gives a warning."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """Lowest and highest multiplier of each parameter, (n_parameters, 2)."""
+
+    bounds: Array
+    names: tuple[str, ...]
+
+    @property
+    def near(self) -> Array:
+        """Bounds of what is in the box or near it; all positive."""
+        middle, half = self.bounds.mean(axis=1), np.diff(self.bounds, axis=1)[:, 0] / 2
+        lowest = np.maximum(middle - NEAR * half, self.bounds[:, 0] / 2)
+        return np.column_stack([lowest, middle + NEAR * half])
+
+    def outside(self, theta: Array) -> NDArray[np.bool_]:
+        """Which parameters of each row are outside the box; NaN is not."""
+        return _beyond(theta, self.bounds)
+
+    def far_outside(self, theta: Array) -> NDArray[np.bool_]:
+        """Which parameters of each row are not even near the box; NaN is not."""
+        return _beyond(theta, self.near)
+
+    def warning(self, theta: Array) -> str:
+        """What is to be said if many rows are far outside the box, else nothing."""
+        known = ~np.isnan(theta).any(axis=1)
+        far = self.far_outside(theta)[known]
+        rows = far.any(axis=1)
+        if not rows.size or rows.mean() <= MANY:
+            return ""
+        worst = int(far.sum(axis=0).argmax())
+        values = theta[known][far[:, worst], worst]
+        lowest, highest = self.bounds[worst]
+        return (
+            f"{rows.sum()} of {rows.size} rows give parameters far outside the bounds that the inverse was trained in: "
+            f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, trained in "
+            f"{lowest:.3g} to {highest:.3g}; expected frequencies in Hz in the order of the model's modes, or wider "
+            "bounds"
+        )
+
+
+def _beyond(theta: Array, bounds: Array) -> NDArray[np.bool_]:
+    lowest, highest = bounds.T
+    return (theta < lowest) | (theta > highest)

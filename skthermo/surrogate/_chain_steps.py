@@ -1,0 +1,92 @@
+"""The steps of `DataInformedFEM`: complete, invert, report; predict parameters, solve, go back to what is measured."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import as_columns, as_floats
+from skthermo._frames import frame_like
+from skthermo._validation import check_is_fitted, validate_data
+from skthermo._warnings import warn_each, warn_user
+from skthermo.fem import check_bounds
+from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
+from skthermo.surrogate._report import fit_report, spread_rows
+from skthermo.surrogate._simulator import Simulator
+
+DEFAULT_TOLERANCE = 1e-5
+DEFAULT_BOUNDS = 0.3
+
+POSSIBLE = (1e-6, 1e6)
+"""Multipliers outside which a model's matrices lose all digits."""
+
+
+class ChainSteps:
+    """What the public methods of the chain are made of."""
+
+    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
+        check_is_fitted(self)
+        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
+        message = self.training_range_.warning(mapper_inputs(self.mapper_, X))
+        if message:
+            warn_user(message, "foreign weather")
+        theta, impossible = self._possible(self.mapper_.predict(X))
+        if impossible.any():
+            row = np.flatnonzero(impossible)[0]
+            warn_user(
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                "impossible parameters",
+            )
+        return theta
+
+    def _possible(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Parameters, NaN in rows that no structure has, and which rows these are."""
+        theta = as_columns(theta).copy()
+        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+        theta[impossible] = np.nan
+        return theta, impossible
+
+    def _frequencies(self, X: ArrayLike, damage: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+        """Frequencies at given temperatures, in the measured domain."""
+        check_is_fitted(self)
+        simulator = self.simulator_.damaged(damage)
+        frequencies = simulator.frequencies(self._predict_theta(X), self.n_jobs)
+        return as_floats(self.aligner_.inverse_transform(frequencies))
+
+    def _simulator(self) -> Simulator:
+        if not self.reduce:
+            return Simulator(self.model)
+        tol = DEFAULT_TOLERANCE if isinstance(self.reduce, (bool, np.bool_)) else self.reduce
+        box = check_bounds(DEFAULT_BOUNDS, self.parameter_names_) if self.box_ is None else self.box_.near
+        return Simulator.within(self.model, box, tol, random_state=0)
+
+    def _report(self, T: Any, F: Any, theta: NDArray[np.float64]) -> None:
+        """Keep what the fit has found, and warn of what is doubtful."""
+        inputs = mapper_inputs(self.mapper_, T)
+        trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
+        self.training_range_ = TrainingRange.of(inputs, trained)
+        rows = spread_rows(trained)
+        predicted = self.simulator_.frequencies(
+            self._possible(self.mapper_.predict(T))[0][rows], self.n_jobs, warn=False
+        )
+        predicted = as_floats(self.aligner_.inverse_transform(predicted))
+        self.report_ = fit_report(self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted)
+        warn_each(self.report_.warnings())
+
+    def _completed(self, T: Any, F: Any) -> Any:
+        """Frequencies without gaps, where there is an imputer."""
+        if self.imputer_ is None:
+            return F
+        n_sensors, n_modes = T.shape[1], F.shape[1]
+        values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
+        return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
+
+    def _fit_inverse(self, F: Any) -> NDArray[np.float64]:
+        """Fit aligner and M1, which gives the parameters of the training data."""
+        aligned = self.aligner_.fit(F).transform(F)
+        theta = as_floats(self.inverse_.fit(aligned).transform(aligned))
+        if theta.shape[1] != len(self.parameter_names_):
+            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
+        return theta

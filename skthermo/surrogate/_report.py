@@ -1,0 +1,208 @@
+"""What a fit has found, and what is doubtful about it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import column_names
+from skthermo.fem import FEModel, linearise, match_modes
+from skthermo.metrics import mape
+from skthermo.surrogate._box import Box
+from skthermo.updating import cramer_rao
+
+SCORED_ROWS = 365
+TINY = 1e-12
+
+ROWS_PER_PARAMETER = 10
+LARGE_OFFSET = 15.0
+"""Percent by which a measured mode differs from the model's that asks for an explanation."""
+
+CLEARLY_BETTER = 0.25
+"""Share of the squared offsets that another order of modes leaves, if modes are taken to be swapped."""
+
+
+@dataclass(frozen=True, repr=False)
+class FitReport:
+    """What `DataInformedFEM.fit` has found in the records.
+
+    Parameters
+    ----------
+    n_rows, n_trained : int
+        Rows given, and rows that trained the temperature mapper.
+    left_out : Series
+        Rows that did not train it, by reason; a row may have several reasons.
+    offsets : Series
+        Mean measured frequency against the model's nominal one, by mode, in percent.
+    n_outside : int or None
+        Rows with parameters outside the bounds of the inverse; None where it has no bounds.
+    outside : Series
+        Share of rows outside, by parameter.
+    deviations : Series
+        Smallest possible relative standard deviation of each parameter from one record, by the scatter that the chain
+        leaves and the model's derivatives (Cramer-Rao); infinite where the modes cannot tell a parameter.
+    errors : DataFrame
+        MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
+    n_scored : int
+        Rows behind ``errors``, spread evenly over those that trained.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.iloc[10:15, 0] = float("nan")
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
+    (360, {"temperature 'T1' is missing": 5})
+    """
+
+    n_rows: int
+    n_trained: int
+    left_out: pd.Series
+    offsets: pd.Series
+    n_outside: int | None
+    outside: pd.Series
+    deviations: pd.Series
+    errors: pd.DataFrame
+    n_scored: int
+
+    def __repr__(self) -> str:
+        tables = self._modes().to_string(), self._parameters().to_string()
+        return "\n".join([*self._sentences(), "", *tables])
+
+    def _repr_html_(self) -> str:
+        text = "".join(f"<p>{escape(line)}</p>" for line in self._sentences())
+        return text + self._modes().to_html() + self._parameters().to_html()
+
+    def _sentences(self) -> list[str]:
+        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
+        lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        if self.n_outside is not None:
+            lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
+        return [*lines, f"Errors are in-sample, of {self.n_scored} rows."]
+
+    def _modes(self) -> pd.DataFrame:
+        table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
+        return table.join(self.errors.round(3).add_suffix(" (%)"))
+
+    def _parameters(self) -> pd.DataFrame:
+        percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
+        if self.n_outside is not None:
+            percent["rows outside (%)"] = (100 * self.outside).round(1)
+        return percent
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Kind and text of what is doubtful about the rows."""
+        n_parameters = len(self.deviations)
+        if 2 * self.n_trained < self.n_rows:
+            reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
+            yield (
+                "half of the rows",
+                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); fill gaps "
+                "first: temperatures by KNNGapImputer().fit_transform(T), frequencies by "
+                "DataInformedFEM(..., imputer=KNNGapImputer())",
+            )
+        if self.n_trained < ROWS_PER_PARAMETER * n_parameters:
+            yield (
+                "few rows",
+                f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
+                f"{ROWS_PER_PARAMETER} rows for each",
+            )
+
+
+def fit_report(
+    model: FEModel,
+    T: Any,
+    F: Any,
+    theta: Array,
+    inputs: Array,
+    trained: NDArray[np.bool_],
+    box: Box | None,
+    rows: NDArray[np.intp],
+    predicted: Array,
+) -> FitReport:
+    """The report of a fit, from its records, estimates and the frequencies predicted for some rows."""
+    names = list(model.parameter_names)
+    measured = as_floats(F)[rows]
+    means = np.broadcast_to(np.nanmean(as_floats(F), axis=0), measured.shape)
+    errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
+    outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
+    known = ~np.isnan(theta).any(axis=1)
+    scatter = np.nanstd(measured / predicted, axis=0)
+    return FitReport(
+        n_rows=len(theta),
+        n_trained=int(trained.sum()),
+        left_out=left_out(T, F, theta, inputs),
+        offsets=mode_offsets(model, F),
+        n_outside=None if box is None else int(outside.any(axis=1).sum()),
+        outside=pd.Series(outside[known].mean(axis=0), index=names),
+        deviations=pd.Series(smallest_deviations(model, theta[known], scatter), index=names),
+        errors=pd.DataFrame(errors, index=column_names(F, "f")),
+        n_scored=len(rows),
+    )
+
+
+def spread_rows(trained: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Positions of at most a few hundred rows, spread evenly over those that trained."""
+    rows = np.flatnonzero(trained)
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), SCORED_ROWS)).astype(int))]
+
+
+def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
+    """Cramer-Rao deviations of ln theta from one record at the median parameters, given the scatter of each mode."""
+    middle = np.median(theta, axis=0)[np.newaxis]
+    frequencies, jacobian = linearise(model, middle)
+    sensitivity = jacobian[0] * middle / frequencies[0][:, np.newaxis]
+    return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, TINY) ** 2) @ sensitivity)))
+
+
+def left_out(T: Any, F: Any, theta: Array, inputs: Array) -> pd.Series:
+    """Rows that do not train the mapper, by reason."""
+    reasons = {}
+    for what, table, default in (("temperature", T, "T"), ("frequency", F, "f")):
+        missing = np.isnan(as_floats(table)).sum(axis=0)
+        for name, count in zip(column_names(table, default), missing, strict=True):
+            reasons[f"{what} {name!r} is missing"] = int(count)
+    complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
+    reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
+    reasons["no parameters were found"] = int((complete_F & np.isnan(theta).any(axis=1)).sum())
+    counts = pd.Series(reasons, dtype=int)
+    return counts[counts > 0]
+
+
+def mode_offsets(model: FEModel, F: Any) -> pd.Series:
+    """Mean measured frequency against the model's nominal one, by mode, in percent."""
+    nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
+    return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
+
+
+def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
+    """Kind and text of what is doubtful about the order and the units of the modes."""
+    offsets = mode_offsets(model, F)
+    ratios = 1 + offsets.to_numpy() / 100
+    far = offsets[offsets.abs() > LARGE_OFFSET]
+    if (ratios > 0).all() and len(ratios) > 1:
+        table = match_modes(model, as_floats(F))
+        order, best = table["mode"].to_numpy(), table["offset"].to_numpy()
+        moved = order != np.arange(len(order))
+        if moved.any() and (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET:
+            yield (
+                "order of modes",
+                f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
+                f"order of its modes, or model.with_modes({order.tolist()})",
+            )
+            return
+    if len(far):
+        units = " (rad/s instead of Hz?)" if (np.abs(ratios / (2 * np.pi) - 1) < LARGE_OFFSET / 100).all() else ""
+        listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
+        yield (
+            "offset of modes",
+            f"measured modes differ from the model's nominal frequencies: {listed}{units}; expected Hz, the modes of "
+            "the model in their order, and a model updated to the structure",
+        )

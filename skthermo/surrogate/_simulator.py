@@ -1,0 +1,79 @@
+"""Frequencies of many rows of parameters, by a reduced model where it is certified and the full one elsewhere."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skthermo._arrays import Array
+from skthermo._warnings import warn_user
+from skthermo.fem import FEModel, evaluate
+
+MANY_ROWS = 2000
+"""Rows from which on a full sparse model takes minutes."""
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """An FE model and, where there is one, its reduced model for a box.
+
+    Attributes
+    ----------
+    model : FE model
+        The full one.
+    reduced : FE model or None
+        Gives the same frequencies within the box.
+    box : ndarray of shape (n_parameters, 2) or None
+        Bounds of that box.
+    """
+
+    model: FEModel
+    reduced: Any = None
+    box: Array | None = None
+
+    @classmethod
+    def within(cls, model: FEModel, box: Array, tol: float, random_state: int) -> "Simulator":
+        """The simulator with a reduced model for a box."""
+        if not hasattr(model, "reduced"):
+            raise ValueError(
+                f"reduce was asked for, but {model!r} has no method 'reduced'; expected a model with one, such as "
+                "AffineModel, or reduce=False"
+            )
+        return cls(model, model.reduced(box, tol=tol, random_state=random_state), box)
+
+    def damaged(self, damage: Mapping[str, float] | None) -> "Simulator":
+        """The simulator of the damaged structure; itself without damage."""
+        if not damage:
+            return self
+        if not hasattr(self.model, "damaged"):
+            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
+        reduced = None if self.reduced is None else self.reduced.damaged(damage)
+        return Simulator(self.model.damaged(damage), reduced, self.box)
+
+    def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
+        """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""
+        if self.reduced is None:
+            self._hint(len(theta))
+            return evaluate(self.model, theta, n_jobs=n_jobs)
+        lowest, highest = self.box.T
+        outside = ((theta < lowest) | (theta > highest)).any(axis=1)
+        frequencies = np.full((len(theta), self.model.n_modes), np.nan)
+        frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
+        if outside.any():
+            if warn:
+                warn_user(
+                    f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
+                    "the full one; wider bounds of the inverse would make that box wider",
+                    "outside the reduced model",
+                )
+            frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
+        return frequencies
+
+    def _hint(self, n_rows: int) -> None:
+        if n_rows >= MANY_ROWS and hasattr(self.model, "reduced") and getattr(self.model, "prefer", "") == "processes":
+            warn_user(
+                f"{n_rows} rows are solved by the full model {self.model!r}, which takes long; "
+                "DataInformedFEM(..., reduce=True) gives the same frequencies to 1e-5 in a small part of the time",
+                "full model",
+            )

@@ -1,0 +1,250 @@
+"""What is doubtful about records is named, once, with counts."""
+
+import os
+import pickle
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import KFold, cross_val_score
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z24
+from skthermo.metrics import mape
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+LATER = make_truss_campaign(random_state=1).temperatures
+
+
+def chain(**options):
+    return DataInformedFEM(TRUSS, **({"random_state": 0} | options))
+
+
+def swapped(one, other):
+    return F[[{one: other, other: one}.get(name, name) for name in F]]
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return chain().fit(T, F)
+
+
+def caught(function, *arguments):
+    with warnings.catch_warnings(record=True) as record:
+        warnings.simplefilter("always")
+        function(*arguments)
+    return record
+
+
+class TestTheReport:
+    def test_clean_records_leave_nothing_to_say(self, fitted):
+        report = fitted.report_
+        assert (report.n_rows, report.n_trained, len(report.left_out)) == (365, 365, 0)
+        nominal = TRUSS.frequencies(np.ones(4))[0]
+        np.testing.assert_allclose(report.offsets, 100 * (F.mean() / nominal - 1), rtol=1e-9)
+        np.testing.assert_allclose(report.errors["MAPE"], mape(F, fitted.predict(T)), rtol=1e-9)
+        np.testing.assert_allclose(report.errors["MAPE of the mean"], mape(F, F * 0 + F.mean()), rtol=1e-9)
+        outside = (fitted.parameters_ < 0.7) | (fitted.parameters_ > 1.3)
+        np.testing.assert_allclose(report.outside, outside.mean())
+        assert report.n_outside == outside.any(axis=1).sum()
+
+    def test_deviations_say_what_the_modes_cannot_tell(self, fitted):
+        assert fitted.report_.deviations.idxmax() == "vertical"
+        assert fitted.report_.deviations["vertical"] > 5 * fitted.report_.deviations["bottom"]
+
+    def test_reasons_for_rows_left_out_are_counted(self):
+        air, measured = T.copy(), F.copy()
+        air.iloc[5:8, 1] = np.nan
+        measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
+        report = chain(mapper=make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))).fit(air, measured).report_
+        assert report.left_out.to_dict() == {
+            "temperature 'T2' is missing": 3,
+            "frequency 'f4' is missing": 2,
+            "frequency 'f5' is missing": 1,
+            "a lag reaches into a gap": 1,
+        }
+        assert report.n_trained == 365 - 3 - 2 - 1
+
+    def test_it_reads_as_text_and_as_html(self, fitted):
+        text, html = repr(fitted.report_), fitted.report_._repr_html_()
+        assert text.startswith("365 of 365 rows trained the temperature mapper.")
+        for name in (*F.columns, *TRUSS.parameter_names):
+            assert name in text
+            assert f"<th>{name}</th>" in html
+        assert repr(pickle.loads(pickle.dumps(fitted)).report_) == text
+
+    def test_names_from_data_are_text_in_html(self):
+        hot = T.rename(columns={"T1": "<script>"})
+        hot.iloc[0, 0] = np.nan
+        html = chain(mapper=TemperatureMapper(Ridge())).fit(hot, F).report_._repr_html_()
+        assert "<script>" not in html
+        assert "&lt;script&gt;" in html
+
+
+class TestWarningsOfFit:
+    @pytest.mark.parametrize(
+        ("air", "measured", "messages"),
+        [
+            (T, F * 2 * np.pi, ["'f1' by .*rad/s instead of Hz", "far outside the bounds"]),
+            (T, F * 1.5, ["'f1' by [+]5. %", "far outside the bounds"]),
+            (
+                T,
+                F[["f1", "f2", "f3", "f5", "f4", "f6"]],
+                [r"\['f5', 'f4'\] look like other modes.*\[0, 1, 2, 4, 3, 5\]"],
+            ),
+            (
+                T,
+                F[["f1", "f2", "f4", "f3", "f5", "f6"]],
+                [r"\['f4', 'f3'\] look like other modes.*\[0, 1, 3, 2, 4, 5\]"],
+            ),
+            (T[:30], F[:30], ["30 complete rows train 4 parameters; expected at least 10"]),
+        ],
+        ids=["rad/s", "factor", "close modes swapped", "modes swapped", "few rows"],
+    )
+    def test_wrong_units_and_wrong_modes_are_named(self, air, measured, messages):
+        record = caught(chain(mapper=TemperatureMapper(Ridge())).fit, air, measured)
+        texts = [str(warning.message) for warning in record]
+        for message in messages:
+            assert any(re.search(message, text) for text in texts), texts
+        assert len(texts) == len(set(texts))
+        assert all(warning.filename == __file__ for warning in record)
+
+    def test_gaps_that_lags_multiply_are_counted_with_the_recipe_against_them(self):
+        gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
+        lagged = chain(mapper=make_pipeline(LagFeatures(24), TemperatureMapper(Ridge())))
+        texts = [str(warning.message) for warning in caught(lagged.fit, gappy, F)]
+        message = r"only \d+ of 365 rows trained .*a lag reaches into a gap.*KNNGapImputer"
+        assert any(re.match(message, text) for text in texts)
+        complete = KNNGapImputer().set_output(transform="pandas").fit_transform(gappy)
+        assert not caught(lagged.fit, complete, F)
+
+    def test_a_narrow_box_is_named(self):
+        narrow = InverseSurrogate(bounds=0.05, noise=0.01)
+        with pytest.warns(UserWarning, match=r"of 365 rows give parameters far outside .* trained in 0.95 to 1.05"):
+            chain(inverse=narrow).fit(T, F)
+
+    @pytest.mark.parametrize("noise", [0.0, 0.01])
+    def test_clean_campaigns_give_no_warning(self, noise):
+        year = make_truss_campaign(noise=noise, random_state=3)
+        fem = chain()
+        assert not caught(fem.fit, year.temperatures, year.frequencies)
+        assert not caught(fem.simulate, LATER)
+        assert not caught(fem.score, year.temperatures, year.frequencies)
+
+    @pytest.mark.skipif("SKTHERMO_DATA" not in os.environ, reason="SKTHERMO_DATA names no folder with the Z24 data")
+    def test_a_real_bridge_gives_no_warning(self):
+        z24 = load_z24(Path(os.environ["SKTHERMO_DATA"]) / "z24" / "z24_monitoring.csv")
+        healthy = (z24.state == "undamaged").to_numpy()
+        model = make_z24()
+        fem = DataInformedFEM(model, aligner=BiasAligner(model, method="scale"), reduce=True, random_state=0)
+        assert not caught(fem.fit, z24.temperatures[healthy], z24.frequencies[healthy])
+        assert fem.report_.n_trained > 2500
+
+    def test_one_warning_for_all_folds(self):
+        estimator = chain(mapper=TemperatureMapper(Ridge()), inverse=InverseSurrogate(TRUSS, noise=0.01, n_samples=200))
+        record = caught(lambda: cross_val_score(estimator, T, F * 1.5, cv=KFold(3)))
+        kinds = [str(warning.message).split(":")[0] for warning in record]
+        assert sum(kind.startswith("measured modes differ") for kind in kinds) == 1
+        again = caught(lambda: cross_val_score(estimator, T, F * 1.5, cv=KFold(3)))
+        assert len(again) == len(record)
+        assert {warning.filename for warning in record} == {__file__}
+
+
+class TestForeignWeather:
+    @pytest.mark.parametrize(
+        ("weather", "value"),
+        [(LATER * 1.8 + 32, "Fahrenheit"), (LATER + 273.15, "kelvin"), (LATER + 40, "hotter")],
+        ids=["Fahrenheit", "kelvin", "hotter"],
+    )
+    def test_is_counted_once_by_predict_and_simulate(self, fitted, weather, value):
+        for method in (fitted.predict, fitted.simulate, fitted.predict_parameters):
+            record = caught(method, weather)
+            foreign = [str(w.message) for w in record if "temperatures far outside" in str(w.message)]
+            assert len(foreign) == 1
+            assert "expected degrees Celsius" in foreign[0]
+
+    def test_applicability_is_in_units_of_the_training_range(self, fitted):
+        width = T.max() - T.min()
+        weather = pd.DataFrame([T.max() + 0.5 * width, T.min(), T.mean(), T.min() - 2 * width], columns=T.columns)
+        table = fitted.applicability(weather)
+        np.testing.assert_allclose(table[T.columns], np.outer([0.5, 0, 0, 2], np.ones(3)), atol=1e-9)
+        inside = fitted.predict_parameters(weather.iloc[1:3])
+        expected = ((inside < 0.7) | (inside > 1.3)).any(axis=1)
+        assert table["outside_bounds"].iloc[1:3].tolist() == expected.tolist()
+
+    def test_applicability_sees_lags_and_gaps(self):
+        lagged = chain(mapper=make_pipeline(LagFeatures([0, 2]), TemperatureMapper(Ridge()))).fit(T, F)
+        weather = LATER.copy()
+        weather.index = weather.index + pd.Timedelta(days=365)
+        weather.iloc[5, 0] = T["T1"].max() + (T["T1"].max() - T["T1"].min())
+        weather.iloc[9, 1] = np.nan
+        table = lagged.applicability(weather)
+        assert list(table.columns) == [f"T{i}_lag{k}" for i in (1, 2, 3) for k in (0, 2)] + ["outside_bounds"]
+        np.testing.assert_allclose([table["T1_lag0"].iloc[5], table["T1_lag2"].iloc[7]], 1)
+        assert table["T2_lag0"].isna().tolist() == [row == 9 for row in range(365)]
+        assert table.index.equals(weather.index)
+
+    @pytest.mark.parametrize("extreme", [-60.0, 90.0])
+    def test_the_default_mapper_stays_sane_fifty_degrees_beyond(self, fitted, extreme):
+        """Its network is piecewise linear in the temperatures and learns ln theta, so theta stays positive."""
+        theta = fitted.applicability(LATER)  # fitted
+        with pytest.warns(UserWarning, match="temperatures far outside"):
+            theta = fitted.predict_parameters(pd.DataFrame(np.full((1, 3), extreme), columns=T.columns))
+        assert theta.to_numpy().min() > 0.3
+        assert theta.to_numpy().max() < 3
+
+
+def test_the_inverse_names_frequencies_outside_its_box():
+    inverse = InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, random_state=0).fit()
+    with pytest.warns(UserWarning, match=r"365 of 365 rows give parameters far outside .* trained in 0.8 to 1.2"):
+        inverse.transform(F * 2 * np.pi)
+
+
+class TestReduced:
+    def test_predictions_are_the_full_models_to_the_tolerance(self):
+        z24 = make_z24()
+        air = pd.DataFrame({"T": np.linspace(-5, 25, 80)})
+        measured = pd.DataFrame(z24.frequencies(np.exp(-0.004 * (air.to_numpy() - 10)) * np.ones(4)))
+        measured.columns = ["f1", "f2", "f3", "f4"]
+        parts = {"inverse": InverseSurrogate(noise=0.001, n_samples=200), "mapper": TemperatureMapper(Ridge())}
+        reduced = DataInformedFEM(z24, **parts, reduce=True, random_state=0).fit(air, measured)
+        theta = reduced.predict_parameters(air)
+        for damage, model in ((None, z24), ({"soil": 0.2}, z24.damaged({"soil": 0.2}))):
+            simulated = reduced.simulate(air, damage=damage)
+            np.testing.assert_allclose(simulated, model.frequencies(theta), rtol=1e-5)
+        assert reduced.simulator_.reduced.basis_size_ < 100
+
+    def test_rows_outside_the_box_go_to_the_full_model_and_are_counted(self):
+        class Hot(TemperatureMapper):
+            def predict(self, X):
+                return np.ones((len(X), 4)) * np.where(np.arange(len(X)) < 3, 2.5, 1.0)[:, np.newaxis]
+
+        fem = chain(mapper=Hot(Ridge()), reduce=True).fit(T, F)
+        with pytest.warns(UserWarning, match="3 of 365 rows are outside the box of the reduced model"):
+            predicted = fem.predict(T)
+        np.testing.assert_allclose(predicted.iloc[0], TRUSS.frequencies(np.full(4, 2.5))[0], rtol=1e-12)
+
+    def test_a_model_that_cannot_be_reduced_is_named(self):
+        from skthermo.fem import CallableModel
+
+        program = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
+        with pytest.raises(ValueError, match="has no method 'reduced'; expected a model with one"):
+            DataInformedFEM(program, reduce=True).fit(T, F)
+
+    def test_many_rows_of_a_large_model_come_with_a_hint(self):
+        z24 = make_z24(2)
+        air = np.linspace(-5, 25, 60)[:, np.newaxis]
+        measured = z24.frequencies(np.exp(-0.004 * (air - 10)) * np.ones(4))
+        parts = {"inverse": InverseSurrogate(regressor=Ridge(), n_samples=50, noise=0.01)}
+        with pytest.warns(UserWarning, match="4 parameters and 2 modes"):
+            fem = DataInformedFEM(z24, **parts, mapper=TemperatureMapper(Ridge()), random_state=0).fit(air, measured)
+        with pytest.warns(UserWarning, match=r"2001 rows are solved by the full model .*reduce=True"):
+            fem.simulator_._hint(2001)

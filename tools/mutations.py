@@ -1,0 +1,120 @@
+"""Whether the tests notice mistakes in the numerics of modal analysis, tracking and model updating.
+
+    OMP_NUM_THREADS=1 python tools/mutations.py [WORD ...]
+
+Each mutation is a mistake that somebody could make: a sign, a factor, a dropped term, another constant. It is written
+into a temporary copy of the package, where the tests named beside it must fail. Prints "killed" or "SURVIVED" for
+each. The exit code is 1 if one survived: a test is then missing.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+COPIED = ("skthermo", "tests", "pyproject.toml")
+
+MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("fem/modal/_tracking.py", "fem/test_tracking.py"): [
+        ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
+        ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
+        ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
+        ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
+    ],
+    ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
+        ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
+    ],
+    ("fem/modal/_beside_modes.py", "fem/test_local_modes.py"): [
+        ("convergence of shape derivatives", "CONVERGED = 1e-5", "CONVERGED = 1e-1"),
+        ("massless degrees of freedom", "(x + residuals)[:, ~going]", "x[:, ~going]"),
+    ],
+    ("fem/modal/_local_modes.py", "fem/test_local_modes.py"): [
+        ("shape derivative along the mode itself", "-d_masses / 2", "-d_masses"),
+        ("shape derivative along other modes", "along / np.where", "-along / np.where"),
+        ("shape derivative of tracked modes", "model.local_modes(row, follow=True)", "model.local_modes(row)"),
+    ],
+    ("fem/affine/_core.py", "fem/test_laws.py"): [
+        ("mass in the jacobian", "gradient -= eigenvalues", "gradient += eigenvalues"),
+    ],
+    ("fem/affine/_core.py", "updating/test_pairing.py"): [
+        ("modes beyond those of the model", "GUARD_MODES = 4", "GUARD_MODES = 0"),
+    ],
+    ("updating/_comparison.py", "updating/test_pairing.py"): [
+        ("pairing where sensors are few", "NOMINAL_SHARE = 0.25", "NOMINAL_SHARE = 0.0"),
+    ],
+    ("updating/_information.py", "updating/test_updater.py"): [
+        ("derivative of tangents", "d_along / along**2", "d_along / along"),
+    ],
+    ("updating/_information.py", "updating/test_sensitivity.py"): [
+        ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
+        ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
+    ],
+    ("updating/_residuals.py", "updating/test_updater.py"): [
+        ("slope of the loss", "weights * E / (secant * (1 + secant))", "weights * E / (1 + secant)"),
+        ("prior", "(theta - 1) / prior", "theta / prior"),
+        ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
+        ("information of shapes", "np.sqrt(2 * max(len(slopes) - 1, 1))", "np.sqrt(max(len(slopes) - 1, 1))"),
+    ],
+    ("updating/_sensitivity.py", "updating/test_search.py"): [
+        ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
+    ],
+    ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
+        ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
+    ],
+    ("updating/_measured.py", "updating/test_updater_errors.py"): [
+        ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
+    ],
+    ("updating/_optimise.py", "updating/test_search.py"): [
+        ("convergence beside failures", "success = bool(result.success) and", "success = bool(result.success) or"),
+    ],
+    ("updating/_report.py", "updating/test_updater.py"): [
+        ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
+    ],
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("words", nargs="*", metavar="WORD", help="only mutations with one of these in what they break")
+    words = parser.parse_args().words
+    chosen = [
+        (*where, *mutation)
+        for where, mutations in MUTATIONS.items()
+        for mutation in mutations
+        if not words or any(word in mutation[0] for word in words)
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        for name in COPIED:
+            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+            copy(ROOT / name, Path(folder) / name)
+        survived = sum([survives(Path(folder), *mutation) for mutation in chosen])
+    print(f"{len(chosen) - survived} of {len(chosen)} killed")
+    return 1 if survived or not chosen else 0
+
+
+def survives(folder, file, tests, breaks, original, mutated):
+    """Whether the tests pass in spite of a mutation."""
+    path = folder / "skthermo" / file
+    source = path.read_text()
+    if source.count(original) != 1:
+        raise SystemExit(f"{file} has {original!r} {source.count(original)} times; expected it once")
+    path.write_text(source.replace(original, mutated))
+    start = time.perf_counter()
+    command = [sys.executable, "-B", "-m", "pytest", "-q", "-x", f"tests/{tests}"]
+    paths = os.environ | {"PYTHONPATH": str(folder)}
+    run = subprocess.run(command, cwd=folder, env=paths, capture_output=True, text=True)
+    path.write_text(source)
+    if run.returncode not in (0, 1):
+        raise SystemExit(f"{tests} did not run:\n{run.stdout}{run.stderr}")
+    verdict = "killed" if run.returncode else "SURVIVED"
+    print(f"{verdict:9} {time.perf_counter() - start:4.0f} s  {breaks}", flush=True)
+    return not run.returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
