@@ -1,7 +1,5 @@
 """The one import point for scikit-learn's private helpers; FE models and seeds inside estimators."""
 
-import sys
-import warnings
 from typing import Any
 
 import numpy as np
@@ -36,7 +34,6 @@ __all__ = [
     "seed_parts",
     "seeded",
     "validate_data",
-    "warn_user",
     "with_nan",
 ]
 
@@ -49,14 +46,6 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 def check_array(values: Any, **options: Any) -> Any:
     """scikit-learn's `check_array`; what is masked or missing is NaN."""
     return sklearn.utils.check_array(with_nan(values), **options)
-
-
-def warn_user(message: str) -> None:
-    """Warn at the line of the user's own code."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in ("skthermo", "sklearn", "joblib"):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, UserWarning, stacklevel=level)
 
 
 def with_nan(X: Any) -> Any:

@@ -17,8 +17,8 @@ from skthermo._validation import (
     _fit_context,
     check_is_fitted,
     validate_data,
-    warn_user,
 )
+from skthermo._warnings import warn_user
 from skthermo.detection._complete_rows import CompleteRowsRegressor
 
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
@@ -251,7 +251,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         try:
             check_temperatures(pd.DataFrame(values[:, others], columns=columns[others]))
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error))
+            warn_user(str(error), "temperatures")
         return temperatures, frequencies
 
     def _folds(self, X: Any) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
