@@ -278,11 +278,9 @@ def main():
     report_model()
     print(f"The fit on the first {len(T)} healthy records:\n\n{fem.report_}\n")
     beyond = fem.applicability(T_test).drop(columns="outside_bounds").max(axis=1)
-    print(f"Later weather: {(beyond > 0.25).mean():.0%} of the last {len(T_test)} records have a temperature that lies")
-    print(
-        f"more than a quarter of the training range outside it, the warmest {beyond.max():.0%}. Each prediction below"
-    )
-    print("would warn of that.\n")
+    share = (beyond > 0.25).mean()
+    print(f"Later weather: {share:.0%} of the last {len(T_test)} records have a temperature more than a quarter of the")
+    print(f"training range outside it, the warmest {beyond.max():.0%}. Each prediction below would warn of that.\n")
     warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
     print(f"MAPE in percent on the last {len(bridge.T) - bridge.n_train} of {len(bridge.T)} healthy records; ratio of")
     print("the means; error of the round trip through M1 and the FE model on the training records\n")

@@ -10,13 +10,14 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import frame_like
 from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
-from skthermo.fem import check_bounds
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
 from skthermo.surrogate._report import fit_report, spread_rows
 from skthermo.surrogate._simulator import Simulator
 
 DEFAULT_TOLERANCE = 1e-5
-DEFAULT_BOUNDS = 0.3
+
+MARGIN, LEAST_MARGIN = 0.25, 0.05
+"""What a reduced model's box leaves around the learned parameters: of their range, and of their values."""
 
 POSSIBLE = (1e-6, 1e6)
 """Multipliers outside which a model's matrices lose all digits."""
@@ -55,11 +56,14 @@ class ChainSteps:
         frequencies = simulator.frequencies(self._predict_theta(X), self.n_jobs)
         return as_floats(self.aligner_.inverse_transform(frequencies))
 
-    def _simulator(self) -> Simulator:
+    def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
+        """The model and, with ``reduce``, its reduced model about the parameters learned for the training weather."""
         if not self.reduce:
             return Simulator(self.model)
         tol = DEFAULT_TOLERANCE if isinstance(self.reduce, (bool, np.bool_)) else self.reduce
-        box = check_bounds(DEFAULT_BOUNDS, self.parameter_names_) if self.box_ is None else self.box_.near
+        lowest, highest = np.nanmin(learned, axis=0), np.nanmax(learned, axis=0)
+        margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
+        box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
         return Simulator.within(self.model, box, tol, random_state=0)
 
     def _report(self, T: Any, F: Any, theta: NDArray[np.float64]) -> None:
@@ -68,9 +72,9 @@ class ChainSteps:
         trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
         self.training_range_ = TrainingRange.of(inputs, trained)
         rows = spread_rows(trained)
-        predicted = self.simulator_.frequencies(
-            self._possible(self.mapper_.predict(T))[0][rows], self.n_jobs, warn=False
-        )
+        learned = self._possible(self.mapper_.predict(T))[0]
+        self.simulator_ = self._simulator(learned)
+        predicted = self.simulator_.frequencies(learned[rows], self.n_jobs, warn=False)
         predicted = as_floats(self.aligner_.inverse_transform(predicted))
         self.report_ = fit_report(self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted)
         warn_each(self.report_.warnings())

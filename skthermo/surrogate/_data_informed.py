@@ -53,9 +53,10 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Completes the frequencies from temperatures and frequencies side by side, in `fit` only.
         Without it, rows with a missing mode do not train M2.
     reduce : bool or float, default=False
-        Whether predictions and simulations go through ``model.reduced`` in and near the bounds of the inverse, which
-        large models are solved much faster by. True allows a relative error of 1e-5 in the frequencies, a number that
-        error. Rows outside are solved by the model itself, with a warning that counts them.
+        Whether predictions and simulations go through ``model.reduced``, by which large models are solved much faster.
+        Its box holds the parameters that M2 gives for the training weather, and a quarter of their range on either
+        side. True allows a relative error of 1e-5 in the frequencies, a number that error. Rows outside the box are
+        solved by the model itself, with a warning that counts them.
     n_jobs : int, optional
         Jobs over which rows are spread where the model is solved for many.
     random_state : int, RandomState or None, default=None
@@ -168,7 +169,6 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
         self.box_ = box_of(self.inverse_)
-        self.simulator_ = self._simulator()
         warn_each(mode_warnings(self.model, F))
         theta = self._fit_inverse(self._completed(T, F))
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
