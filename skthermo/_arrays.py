@@ -1,6 +1,6 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,6 +11,16 @@ Array: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
 Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
 RandomState: TypeAlias = int | np.random.RandomState | None
+
+
+def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
+    """Values of a mapping in the order of the parameters; each parameter must be there, and no other."""
+    unknown = [name for name in values if name not in parameter_names]
+    missing = [name for name in parameter_names if name not in values]
+    if unknown or missing:
+        problem = f"names {unknown}" if unknown else f"leaves out {missing}"
+        raise ValueError(f"{what} {problem}; expected each of the parameters {list(parameter_names)}")
+    return [values[name] for name in parameter_names]
 
 
 def real_array(values: Any, what: str) -> Array:

@@ -71,8 +71,8 @@ def seeded(random_state: Any) -> np.random.RandomState | None:
 def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | None) -> None:
     """Seed every ``random_state`` of an estimator and its parts that is None; None seeds nothing.
 
-    What stands inside a part with a seed of its own is that part's to seed. A seed is drawn for every part, so
-    that seeding one leaves the rest as they were.
+    Parts inside a part with a seed of its own, and FE models, are left alone. A seed is drawn for every other part,
+    so that seeding one leaves the rest as they were.
     """
     if random_state is None:
         return
@@ -80,8 +80,10 @@ def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | N
     seeds = {}
     for name in sorted(parameters):
         if name == "random_state" or name.endswith("__random_state"):
-            seed = random_state.randint(np.iinfo(np.int32).max)
             *parts, _ = name.split("__")
+            if any(is_model(parameters.get("__".join(parts[: depth + 1]))) for depth in range(len(parts))):
+                continue
+            seed = random_state.randint(np.iinfo(np.int32).max)
             owners = ("__".join([*parts[:depth], "random_state"]) for depth in range(len(parts) + 1))
             if all(parameters.get(owner) is None for owner in owners):
                 seeds[name] = seed

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import Array, Bounds, real_array
+from skthermo._arrays import Array, Bounds, by_parameter, real_array
 
 
 def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
@@ -58,16 +58,6 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
         if not 0 < lowest < highest < np.inf:
             raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
     return array
-
-
-def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
-    """Values of a mapping in the order of the parameters; each parameter must be there, and no other."""
-    unknown = [name for name in values if name not in parameter_names]
-    missing = [name for name in parameter_names if name not in values]
-    if unknown or missing:
-        problem = f"names {unknown}" if unknown else f"leaves out {missing}"
-        raise ValueError(f"{what} {problem}; expected each of the parameters {list(parameter_names)}")
-    return [values[name] for name in parameter_names]
 
 
 def _pair(width: Any, name: str) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 from sklearn.base import BaseEstimator, clone
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._frames import check_columns, check_same_rows, frame_like
+from skthermo._frames import check_columns, check_same_rows, check_temperatures, frame_like
 from skthermo._validation import check_array, is_model, seed_parts, seeded, validate_data
 from skthermo.fem import check_bounds
 from skthermo.surrogate._box import Box
@@ -31,11 +31,11 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
     if y is None:
         raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
     values = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
-    T = frame_like(X, values, getattr(X, "columns", ()))
-    F = frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"), getattr(y, "columns", ()))
+    T, F = frame_like(X, values), frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"))
     check_same_rows(X, y, ("temperatures", "frequencies"))
     if F.shape[1] != model.n_modes:
         raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
+    check_temperatures(T)
     check_columns(T, "temperature", varying=True)
     check_columns(F, "frequency")
     return T, F

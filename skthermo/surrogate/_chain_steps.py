@@ -28,11 +28,11 @@ class ChainSteps:
 
     def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
-        validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        message = self.training_range_.warning(mapper_inputs(self.mapper_, X))
+        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+        message = self.training_range_.warning(mapper_inputs(self.mapper_, T))
         if message:
             warn_user(message, "foreign weather")
-        theta, impossible = self._possible(self.mapper_.predict(X))
+        theta, impossible = self._possible(self.mapper_.predict(T))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
             warn_user(

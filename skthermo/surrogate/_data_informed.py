@@ -16,10 +16,12 @@ from skthermo._validation import (
     Interval,
     StrOptions,
     _fit_context,
+    check_array,
     check_is_fitted,
     clone_sharing_models,
+    validate_data,
 )
-from skthermo._warnings import warn_each
+from skthermo._warnings import warn_each, warn_user
 from skthermo.fem import FEModel, add_noise
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._applicability import mapper_inputs
@@ -195,7 +197,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             If the number or the names of the modes differ from `fit`, or a frequency is not positive.
         """
         check_is_fitted(self)
-        theta = as_floats(self.inverse_.transform(self.aligner_.transform(F)))
+        measured = frame_like(F, check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+        theta = as_floats(self.inverse_.transform(self.aligner_.transform(measured)))
         return frame_like(F, theta, self.parameter_names_)
 
     def predict_parameters(self, X: ArrayLike) -> Table:
@@ -276,11 +279,15 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Returns
         -------
         float
-            NaN if fewer than two rows are complete; `skthermo.metrics.frequency_scorer`
-            also reports the share of rows scored.
+            NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
+            `skthermo.metrics.frequency_scorer` always reports their share.
         """
         check_same_rows(X, y, ("temperatures", "frequencies"))
-        return complete_r2(y, self.predict(X))
+        predicted = self.predict(X)
+        scored = int((~np.isnan(as_floats(y) + as_floats(predicted)).any(axis=1)).sum())
+        if 2 * scored < len(predicted):
+            warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
+        return complete_r2(y, predicted)
 
     def applicability(self, X: ArrayLike) -> pd.DataFrame:
         """How far weather and parameters are from what was learned, row by row.
@@ -298,10 +305,11 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             the bounds of the inverse.
         """
         check_is_fitted(self)
-        inputs = mapper_inputs(self.mapper_, X)
+        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+        inputs = mapper_inputs(self.mapper_, T)
         excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(X))
+        theta = as_columns(self.mapper_.predict(T))
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 

@@ -54,8 +54,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         `inverse_transform` stays with the model itself.
     memory : str or joblib.Memory, optional
         Where simulations are kept, so that a search over other settings does not repeat them.
-        Processes that want the same simulations wait for the first one. Clear it when the program behind
-        a model of your own changes.
+        Processes that want the same simulations wait for the first one. With ``random_state=None`` they are always
+        the same. Clear it when the program behind a model of your own changes.
     n_jobs : int, optional
         Jobs over which simulations are spread.
     random_state : int, RandomState or None, default=None
@@ -178,6 +178,24 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
         return self
 
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
+        """Learn the inverse and give the parameters of the same records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz.
+        y : array-like of shape (n_samples, ...), optional
+            Without a model, the multipliers that belong to X. With a model it is ignored: in a pipeline it is what a
+            later step learns, and the inverse learns from simulations.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            As from `transform`.
+        """
+        return self.fit(X, y if self.model is None else None).transform(X)
+
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Multipliers of the nominal parameters, as `predict` gives them.
 
@@ -254,7 +272,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 "few modes",
             )
         self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
-        seed = random.randint(np.iinfo(np.int32).max)
+        is_remembered = self.memory is not None and self.random_state is None
+        seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
         tol = self._tolerance()
         drawn, share_reordered = remembered_simulations(
             self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._frames import check_columns, frame_like
+from skthermo._frames import check_columns, check_temperatures, frame_like
 from skthermo._validation import HasMethods, _fit_context, seeded
 from skthermo.surrogate._regression import MultiplierRegressor
 
@@ -91,10 +91,12 @@ class TemperatureMapper(MultiplierRegressor):
         Raises
         ------
         ValueError
-            If lengths or indices differ, a temperature is constant or missing throughout, or fewer
-            than two rows are complete.
+            If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
+            that stands for a missing value, such as -999, or fewer than two rows are complete.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        check_columns(frame_like(X, T, getattr(X, "columns", ())), "temperature", varying=True)
+        named = frame_like(X, T)
+        check_temperatures(named)
+        check_columns(named, "temperature", varying=True)
         self._learn(T, theta, seeded(self.random_state), log_inputs=False)
         return self

@@ -1,6 +1,6 @@
 """Tables and warnings about the result of model updating."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import cast
 
@@ -17,6 +17,15 @@ from skthermo.updating._residuals import Residuals
 
 UNLIKE = 0.5
 """MAC below which a measured shape is not that of the mode it is paired with."""
+
+AT_BOUND = 1e-4
+"""Distance from a bound, as a share of the box, at which a parameter counts as being there."""
+
+LARGE_ERROR = 15.0
+"""Percent by which an updated model misses a frequency that asks for an explanation."""
+
+BEYOND_NOISE = 10.0
+"""Standard deviations by which it misses a frequency that noise does not explain."""
 
 SAME_OPTIMUM = 1e-3
 """Two starts whose multipliers differ by less have ended at the same optimum."""
@@ -103,6 +112,31 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
             f"modes {other.tolist()} are by their shapes other modes of the optimum than the columns of model_ with "
             "their numbers: expected measured modes in the model's order, or track=True where modes swap"
         )
+
+
+def doubtful_fits(
+    measured: Measured, table: pd.DataFrame, theta: Array, bounds: Array, parameter_names: Sequence[str]
+) -> Iterator[str]:
+    """Warnings about parameters at their bounds and frequencies that noise cannot explain."""
+    at_bound = np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < AT_BOUND * np.diff(bounds, axis=1)[:, 0]
+    if at_bound.any():
+        listed = ", ".join(f"{name!r} ({theta[i]:.3g})" for i, name in enumerate(parameter_names) if at_bound[i])
+        yield f"the optimum lies at the bounds of {listed}: expected wider bounds, or another model"
+    far = table["error_after"].abs() > LARGE_ERROR
+    if far.any():
+        ratios = table["measured"] / table["after"]
+        units = " (rad/s instead of Hz?)" if (ratios / (2 * np.pi) - 1).abs().max() < LARGE_ERROR / 100 else ""
+        yield (
+            f"the updated model misses {table.index[far].tolist()} by more than {LARGE_ERROR:g} %{units}: expected "
+            "frequencies in Hz, in the order of the model's modes"
+        )
+    elif not np.array_equal(measured.deviations, measured.frequencies, equal_nan=True):
+        residuals = np.abs(table["after"].to_numpy() - measured.frequencies) / measured.deviations
+        if (beyond := residuals > BEYOND_NOISE).any():
+            yield (
+                f"the updated model misses {table.index[beyond].tolist()} by up to {np.nanmax(residuals):.0f} standard "
+                "deviations of frequency_std: noise does not explain that, and covariance_ is too small"
+            )
 
 
 def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:

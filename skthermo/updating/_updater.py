@@ -1,6 +1,7 @@
 """FE model updating."""
 
 import warnings
+from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Literal
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import Array, Bounds, as_floats
+from skthermo._arrays import Array, Bounds, as_floats, by_parameter
 from skthermo._frames import column_names
 from skthermo._validation import (
     HasMethods,
@@ -26,7 +27,7 @@ from skthermo.fem import FEModel, check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._report import false_matches, modes_table, rescaled, starts_table, unfinished
+from skthermo.updating._report import doubtful_fits, false_matches, modes_table, rescaled, starts_table, unfinished
 from skthermo.updating._residuals import Residuals
 
 
@@ -56,7 +57,7 @@ class ModelUpdater(BaseEstimator):
         Number of optimisations. The first starts at theta = 1, the others at random points of the box.
     method : {"least_squares", "lbfgs"}, default="least_squares"
         Trust-region Gauss-Newton steps (``scipy.optimize.least_squares``), or L-BFGS-B.
-    prior : float or array-like of shape (n_parameters,), optional
+    prior : float, array-like of shape (n_parameters,) or mapping of str to float, optional
         Relative standard deviations of a Gaussian prior on theta about 1. By default there is none.
     max_iter : int, default=200
         Most evaluations (least_squares) or iterations (lbfgs) of one start.
@@ -139,7 +140,7 @@ class ModelUpdater(BaseEstimator):
         "shape_weight": [Interval(Real, 0, None, closed="left"), "array-like"],
         "n_starts": [Interval(Integral, 1, None, closed="left")],
         "method": [StrOptions({"least_squares", "lbfgs"})],
-        "prior": [Interval(Real, 0, None, closed="neither"), "array-like", None],
+        "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
         "max_iter": [Interval(Integral, 1, None, closed="left")],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
@@ -153,7 +154,7 @@ class ModelUpdater(BaseEstimator):
         shape_weight: ArrayLike = 0.0,
         n_starts: int = 1,
         method: Literal["least_squares", "lbfgs"] = "least_squares",
-        prior: ArrayLike | None = None,
+        prior: ArrayLike | Mapping[str, float] | None = None,
         max_iter: int = 200,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -211,7 +212,8 @@ class ModelUpdater(BaseEstimator):
         -----
         UserWarning
             If there are more parameters than residuals and no prior, shapes are complex, the best start has not
-            converged, a mode of the optimum is not the one it was paired with, or the optimum is outside the
+            converged or lies at a bound, frequencies are missed by 15 % or far beyond their noise, a mode of the optimum
+            is not the one it was paired with, or the optimum is outside the
             bounds for which the model was reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
@@ -239,9 +241,12 @@ class ModelUpdater(BaseEstimator):
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
         self.table_ = modes_table(model, measured, best.theta)
-        if not best.success:
-            warnings.warn(unfinished(best, residuals), UserWarning, stacklevel=3)
-        for message in false_matches(model, measured, best.theta):
+        doubts = [*false_matches(model, measured, best.theta)]
+        if best.success:
+            doubts += doubtful_fits(measured, self.table_, best.theta, bounds, self.model.parameter_names)
+        else:
+            doubts.append(unfinished(best, residuals))
+        for message in doubts:
             warnings.warn(message, UserWarning, stacklevel=3)
         if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
             self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
@@ -279,8 +284,8 @@ class ModelUpdater(BaseEstimator):
     def _read_prior(self) -> Array | None:
         if self.prior is None:
             return None
-        names = self.model.parameter_names
-        prior = as_floats(self.prior)
+        names = list(self.model.parameter_names)
+        prior = as_floats(by_parameter(self.prior, names, "prior") if isinstance(self.prior, dict) else self.prior)
         if prior.shape not in ((), (len(names),)) or not ((prior > 0) & np.isfinite(prior)).all():
             raise ValueError(
                 f"prior is {prior}; expected relative standard deviations above 0, a number or one for each of {names}"

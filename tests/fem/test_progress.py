@@ -167,3 +167,12 @@ def test_an_error_in_a_worker_comes_through():
 
 def _broken(row):
     raise RuntimeError(f"the program failed at {row[0]:.0f}")
+
+
+@pytest.mark.parametrize(("setting", "shown"), [("1", True), ("0", False)])
+def test_one_setting_shows_or_hides_every_bar(setting, shown, monkeypatch, capsys):
+    monkeypatch.setenv("SKTHERMO_PROGRESS", setting)
+    evaluate(TRUSS, np.ones((600, 4)))
+    assert ("600 of 600 samples" in capsys.readouterr().err) is shown
+    evaluate(TRUSS, np.ones((600, 4)), progress=not shown)
+    assert ("600 of 600 samples" in capsys.readouterr().err) is not shown

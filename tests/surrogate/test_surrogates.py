@@ -1,16 +1,19 @@
 """M1 and M2, each on its own."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import BaseEstimator
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import make_truss
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, add_noise, sample
-from skthermo.surrogate import InverseSurrogate, TemperatureMapper, paper_network
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
 from tests.fem.frames import FRAME
 
 TRUSS = make_truss()
@@ -276,3 +279,61 @@ def test_a_frame_is_welcome_after_a_fit_that_saw_no_frequencies():
     inverse = InverseSurrogate(make_truss(), LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
     F = pd.DataFrame(make_truss().frequencies(np.ones((3, 4))), columns=list("abcdef"))
     np.testing.assert_array_equal(inverse.transform(F), inverse.transform(F.to_numpy()))
+
+
+def test_in_a_pipeline_the_labels_are_for_the_last_step():
+    """They could be taken for the multipliers otherwise."""
+    one = TRUSS.with_parameters(["bottom"])
+    severities = np.linspace(0.0, 0.4, 30)
+    F = one.frequencies(1 - severities[:, np.newaxis])
+    inverse = InverseSurrogate(one, QUADRATIC, bounds=0.5, random_state=0)
+    pipeline = make_pipeline(inverse, LinearRegression()).fit(F, severities)
+    np.testing.assert_allclose(pipeline.predict(F), severities, atol=0.01)
+    taken = InverseSurrogate(None, LinearRegression()).fit_transform(F, 1 - severities)
+    np.testing.assert_allclose(taken[:, 0], 1 - severities, atol=0.01)
+
+
+def test_unseeded_simulations_are_remembered_too(tmp_path):
+    model = CallableModel(counted, TRUSS.parameter_names, 6, vectorized=True)
+    CALLS.clear()
+    settings = {"bounds": 0.2, "n_samples": 30, "memory": str(tmp_path)}
+    first, second = (InverseSurrogate(model, LinearRegression(), **settings).fit() for _ in range(2))
+    assert sum(CALLS) == 30
+    np.testing.assert_array_equal(first.samples_.theta, second.samples_.theta)
+
+
+def test_bounds_go_by_name():
+    by_name = {"vertical": (0.5, 2.0), "top": 0.3, "bottom": 0.2, "diagonal": 0.1}
+    drawn = InverseSurrogate(TRUSS, LinearRegression(), bounds=by_name, n_samples=500, random_state=0).fit().samples_
+    np.testing.assert_allclose(drawn.theta.min(axis=0), [0.8, 0.7, 0.9, 0.5], atol=0.01)
+    np.testing.assert_allclose(drawn.theta.max(axis=0), [1.2, 1.3, 1.1, 2.0], atol=0.01)
+    with pytest.raises(ValueError, match=r"bounds leaves out \['vertical'\]; expected each of the parameters"):
+        InverseSurrogate(TRUSS, bounds={"top": 0.3, "bottom": 0.2, "diagonal": 0.1}).fit()
+
+
+def test_kelvin_and_markers_of_missing_temperatures_are_named():
+    with pytest.raises(ValueError, match="all above 150: kelvin"):
+        TemperatureMapper(Ridge()).fit(T + 273.15, THETA)
+    marked = T.copy()
+    marked.iloc[7, 1] = -999
+    with pytest.raises(ValueError, match=r"temperature column 'T2' is -999 in 1 of 60 rows; expected .* NaN where"):
+        TemperatureMapper(Ridge()).fit(marked, THETA)
+
+
+def test_a_model_that_is_an_estimator_keeps_its_seed():
+    class EstimatorModel(BaseEstimator):
+        parameter_names, n_modes = TRUSS.parameter_names, 6
+
+        def __init__(self, random_state=None):
+            self.random_state = random_state
+
+        def frequencies(self, theta):
+            return TRUSS.frequencies(theta)
+
+    model = EstimatorModel()
+    chain = DataInformedFEM(model, inverse=InverseSurrogate(model, LinearRegression(), noise=0.01), random_state=0)
+    year = make_truss_campaign(random_state=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        chain.fit(year.temperatures, year.frequencies)
+    assert model.random_state is None

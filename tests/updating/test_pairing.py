@@ -10,6 +10,8 @@ from skthermo.fem import AffineModel, mac, shape_jacobian
 from skthermo.updating import ModelUpdater, identifiability
 from tests.updating.test_updater import TRUSS, TRUTH, measured
 
+pytestmark = pytest.mark.filterwarnings("ignore:the optimum lies at the bounds")
+
 
 def oscillators(track, n_modes=3):
     """Three masses on springs of their own: frequencies in the ratio of roots of stiffness, shapes are axes."""

@@ -13,6 +13,8 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from skthermo.updating import ModelUpdater, identifiability, sensitivity
 from tests.fem.frames import FRAME, portal
 
+pytestmark = pytest.mark.filterwarnings("ignore:the optimum lies at the bounds")
+
 TRUSS = make_truss()
 TRUTH = np.array([0.9, 1.1, 0.95, 1.05])
 METHODS = ("least_squares", "lbfgs")

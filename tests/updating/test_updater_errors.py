@@ -1,5 +1,8 @@
 """What model updating says of wrong input."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 
@@ -102,3 +105,31 @@ def test_a_model_without_modes_at_any_start():
     model = CallableModel(lambda row: [np.nan], ["k"], 1)
     with pytest.raises(ValueError, match="no modes at any of the 2 starts"):
         ModelUpdater(model, n_starts=2, random_state=0).fit([[1.0]])
+
+
+@pytest.mark.parametrize("factor", [2 * np.pi, 1.5])
+def test_frequencies_that_no_parameters_explain_are_named(factor):
+    units = r".*rad/s instead of Hz" if factor > 2 else ""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ModelUpdater(TRUSS).fit(factor * TRUSS.frequencies(np.ones((1, 4))))
+    texts = [str(warning.message) for warning in caught]
+    assert any(re.match(r"the updated model misses \['f1', .*by more than 15 %" + units, text) for text in texts)
+    assert any(re.match(r"the optimum lies at the bounds of 'bottom' \(1.3\)", text) for text in texts)
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_residuals_beyond_the_noise_are_named():
+    measured = TRUSS.frequencies(np.ones((1, 4)))[0] * [1.0, 1.002, 0.998, 1.001, 1.0, 1.0]
+    with pytest.warns(UserWarning, match=r"misses \[.*\] by up to \d+ standard deviations of frequency_std"):
+        ModelUpdater(TRUSS).fit(measured, frequency_std=1e-4 * measured)
+
+
+def test_a_prior_goes_by_name():
+    measured = TRUSS.frequencies([[0.9, 1.0, 1.0, 1.0]])
+    by_name = {"top": 1e-6, "bottom": 1.0, "diagonal": 1e-6, "vertical": 1e-6}
+    in_order = [1.0, 1e-6, 1e-6, 1e-6]
+    fits = [ModelUpdater(TRUSS, prior=prior).fit(measured, frequency_std=0.01) for prior in (by_name, in_order)]
+    np.testing.assert_array_equal(fits[0].theta_, fits[1].theta_)
+    with pytest.raises(ValueError, match=r"prior names \['roof'\]"):
+        ModelUpdater(TRUSS, prior=by_name | {"roof": 1.0}).fit(measured)

@@ -1,6 +1,7 @@
 """A progress bar as a line of text."""
 
 import multiprocessing
+import os
 import sys
 import threading
 import time
@@ -16,9 +17,12 @@ WIDTH = 30
 def with_progress(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
     """Pass arrays through, and show on stderr how many of their rows have come.
 
-    With ``shown=None`` the bar appears only on a terminal, after a second, and only in the main thread of the main
-    process: bars of several workers would overwrite each other.
+    With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides: 1 shows the bar, 0 does not. Unset, the bar
+    appears only on a terminal, after a second, and only in the main thread of the main process: bars of several workers
+    would overwrite each other.
     """
+    if shown is None:
+        shown = {"0": False, "1": True}.get(os.environ.get("SKTHERMO_PROGRESS", ""))
     if shown is False or (shown is None and not _on_terminal()):
         yield from parts
         return
