@@ -1,5 +1,6 @@
 """Code in README and the user guide runs, and the figures that README shows are there."""
 
+import importlib
 import re
 import textwrap
 from pathlib import Path
@@ -31,6 +32,13 @@ def test_a_pages_code_runs_from_top_to_bottom(page, capsys):
 
 def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
+
+
+@pytest.mark.parametrize("room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets"])
+def test_the_reference_lists_every_public_name(room):
+    index = (ROOT / "docs" / "api" / "index.rst").read_text()
+    listed = re.search(rf"currentmodule:: skthermo\.{room}\n.*?\n\n((?:   \w+\n)+)", index, flags=re.DOTALL)[1].split()
+    assert listed == sorted(importlib.import_module(f"skthermo.{room}").__all__)
 
 
 def test_images_of_readme_exist():

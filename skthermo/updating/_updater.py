@@ -212,9 +212,9 @@ class ModelUpdater(BaseEstimator):
         -----
         UserWarning
             If there are more parameters than residuals and no prior, shapes are complex, the best start has not
-            converged or lies at a bound, frequencies are missed by 15 % or far beyond their noise, a mode of the optimum
-            is not the one it was paired with, or the optimum is outside the
-            bounds for which the model was reduced.
+            converged, the optimum lies at a bound, frequencies are missed by 15 % or far beyond their noise, a mode of
+            the optimum is not the one it was paired with, or the optimum is outside the bounds for which the model was
+            reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
         bounds, prior = self._read_bounds(), self._read_prior()
