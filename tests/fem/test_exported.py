@@ -152,7 +152,7 @@ def test_terms_that_are_not_named_stay_constant_where_the_total_is_there(tmp_pat
 def test_a_total_that_is_none_is_said_so(tmp_path):
     constant = spring(0, 0, 100.0)
     file = write_npz(tmp_path, MATRICES | {"K0": constant})
-    with pytest.raises(ValueError, match="'K0' is .*less than the sum of .*total=False if none is the total"):
+    with pytest.raises(ValueError, match=r"'K0' is .*less than the sum of .*total=False if none is the total"):
         load_affine(file, stiffness=list(TERMS))
     assert_same(load_affine(file, stiffness=list(TERMS), total=False, n_modes=4), EXPECTED)
     everything = load_affine(file, total=False, n_modes=4)

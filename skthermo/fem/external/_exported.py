@@ -192,8 +192,8 @@ def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matr
     for name, term in found.items():
         if term.nnz and not (term + term.T).count_nonzero():
             raise ValueError(
-                f"{file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric stiffness, "
-                "or stiffness=[...] that names the terms"
+                f"{file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric ones, or "
+                "stiffness=[...] that names the terms"
             )
     has_pattern = mass_matrix.shape[0] > 1
     like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
