@@ -66,15 +66,14 @@ def _lift_limit_after_last() -> None:
 
 
 def _forget_other_threads() -> None:
-    """In a forked process, where only the thread that forked goes on, and others may have held the lock."""
-    global _lock
-    _lock = Lock()
+    """In a forked process, where only the thread that forked goes on."""
     _inside[:] = [thread for thread in _inside if thread == get_ident()]
     _lift_limit_after_last()
+    _lock.release()
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows
-    os.register_at_fork(after_in_child=_forget_other_threads)
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_forget_other_threads)
 
 
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:

@@ -7,7 +7,9 @@ interpreter, or ask for gigabytes. Here every length is checked against the byte
 import math
 import struct
 import zlib
+from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ STORED_AS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "
 SPARSE_CLASS, OBJECT_CLASS = 5, 17
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX = 0x0800
+MOST_PARTS = 7  # of a sparse complex matrix
 NAME_WITHIN = 1024  # bytes of a variable's beginning, its name included
 PIECE = 16384  # bytes that are decompressed at a time, to at most a thousand times as many
 
@@ -59,7 +62,7 @@ def read_matlab(file: Path, *, complex_too: bool = False, limit: MemoryLimit | N
             place = f"variable {name!r}"
             if name in matrices:
                 raise ValueError("it stands there twice")
-            matrix = _matrix(list(_elements(body, order)), order, limit)
+            matrix = _matrix(_elements(body, order), order, limit)
             is_wanted = matrix is not None and (complex_too or not np.iscomplexobj(matrix))
             matrices[name] = matrix if is_wanted else None
             place = f"what follows variable {name!r}"
@@ -117,10 +120,12 @@ def _class(flags: memoryview, order: str) -> int:
     return struct.unpack(order + "II", flags)[0] & 0xFF
 
 
-def _matrix(parts: list[Part], order: str, limit: MemoryLimit) -> Matrix | None:
+def _matrix(elements: Iterator[Part], order: str, limit: MemoryLimit) -> Matrix | None:
     """Values of one variable, from its flags, dimensions, name and numbers."""
+    parts = list(islice(elements, MOST_PARTS + 1))
     kind, shape = _class(parts[0][1], order), np.frombuffer(parts[1][1][: len(parts[1][1]) // 4 * 4], order + "i4")
     if kind not in (SPARSE_CLASS, *NUMERIC_CLASSES) or len(shape) != 2:
+        deque(elements, maxlen=0)  # whose lengths are checked all the same
         return None
     is_complex = bool(struct.unpack(order + "II", parts[0][1])[0] & COMPLEX)
     numbers = [_numbers(part, order) for part in parts[3:]]

@@ -1,7 +1,7 @@
 """Matrices from Matrix Market files, damaged files included.
 
-Sizes are compared with the length of the text before anything is allocated, and numbers are read by NumPy. That takes
-twice the time of SciPy's reader, which trusts the sizes.
+Numbers are read by NumPy and compared with the sizes before a matrix is allocated. SciPy's reader takes a quarter of
+the time, but ends the interpreter at some damaged sizes, and reads 1.0x as 1.0.
 """
 
 import re
@@ -135,9 +135,11 @@ def _sparse(entries: Array, values: NDArray, size: Size, is_hermitian: bool) -> 
     """A sparse matrix from rows and columns (from 1) and values; a symmetric matrix has one side only."""
     shape = (size.n_rows, size.n_columns)
     places = entries[:, :2]
-    if not ((places >= 1) & (places <= shape) & (places % 1 == 0)).all():
+    within = bool(((places >= 1) & (places <= shape)).all())
+    whole = places.astype(np.int64) if within else None
+    if whole is None or (whole != places).any():
         raise ValueError(f"rows or columns outside 1 to {list(shape)}")
-    rows, columns = (places[:, side].astype(np.int64) - 1 for side in range(2))
+    rows, columns = whole.T - 1
     if size.mirror:
         if (rows < columns).any() and (rows > columns).any():
             raise ValueError("a symmetric matrix has entries on both sides of its diagonal; expected one")
