@@ -27,7 +27,7 @@ class Size(NamedTuple):
     n_rows: int
     n_columns: int
     mirror: int
-    count: int
+    n_values: int
 
 
 def read_matrix_market(file: Path, limit: MemoryLimit | None = None) -> Matrix:
@@ -59,12 +59,12 @@ def _read(text: bytes, limit: MemoryLimit) -> Matrix:
     size = _size(line, layout == "array", MIRRORS[symmetry])
     width = NUMBERS_FOR_AN_ENTRY[layout] + is_complex
     limit.take(0, 5 * len(text))
-    entries = _numbers(text[start:], size.count, width)
+    entries = _numbers(text[start:], size.n_values, width)
     value_size = 16 if is_complex else 8
     if layout == "array":
         limit.take(value_size * size.n_rows * size.n_columns, entries.nbytes)
     else:
-        n_entries = size.count * (2 if size.mirror else 1)
+        n_entries = size.n_values * (2 if size.mirror else 1)
         limit.take_sparse(size.n_rows, size.n_columns, n_entries, value_size)
     values = entries[:, -2] + 1j * entries[:, -1] if is_complex else entries[:, -1]
     return _dense(values, size, is_hermitian) if layout == "array" else _sparse(entries, values, size, is_hermitian)

@@ -16,6 +16,7 @@ from skthermo._io import read_named_matrices
 from skthermo.fem.affine import AffineModel
 
 Key = tuple[str, ...]
+Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass")
 TOTAL_NAMES = ("k", "k0", "stiffness")
@@ -28,7 +29,7 @@ def load_affine(
     *,
     stiffness: Collection[str] | Mapping[str, str | Key] | None = None,
     mass: str | None = None,
-    total: str | Literal[False] | None = None,
+    total: Total = None,
     n_modes: int = 6,
     parameter_names: Sequence[str] | None = None,
     groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
@@ -186,7 +187,7 @@ def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
     return f"no matrix is called {', '.join(MASS_NAMES)}"
 
 
-def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
+def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
     """Names of the stiffness terms; warns of matrices that look like something else."""
     found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
     for name, term in found.items():
