@@ -1,6 +1,7 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -87,6 +88,16 @@ def as_dense(matrix: Matrix) -> Array:
     return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
+def positive_integer(value: Any, what: str) -> int:
+    """Python's integer of an integer of any kind; what is none, or not positive, is an error.
+
+    NumPy's small integers overflow where they are multiplied.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+        raise ValueError(f"{what} is {value!r}; expected a positive integer")
+    return int(value)
+
+
 def as_random_state(seed: Any) -> np.random.RandomState:
     """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas.
 
@@ -101,5 +112,6 @@ def as_random_state(seed: Any) -> np.random.RandomState:
         return check_random_state(seed)
     except ValueError as error:
         raise ValueError(
-            f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState"
+            f"random_state is {seed!r}; expected an integer, a numpy.random.RandomState or None "
+            "(of a numpy.random.Generator, generator.integers(2**31) draws an integer)"
         ) from error

@@ -137,6 +137,37 @@ def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
     )
 
 
+@pytest.mark.parametrize("form", ["mat", "mtx sparse"])
+def test_terms_that_are_not_named_stay_constant_where_the_total_is_there(tmp_path, form):
+    file = WRITERS[form](tmp_path, MATRICES)
+    with pytest.warns(
+        UserWarning, match=r"'K0' is more than the sum of \['E_2'\]: the rest is taken as a constant part"
+    ):
+        model = load_affine(file, stiffness=["E_2"], n_modes=4)
+    assert_same(model, AffineModel({("E_2",): TERMS["E_2"], (): TOTAL - TERMS["E_2"]}, M, n_modes=4))
+    base = load_affine(file, stiffness=["k_base", "E_2", "E_10"], n_modes=4)
+    np.testing.assert_allclose(model.frequencies([[1.0]]), base.frequencies([[1.0] * 3]), rtol=1e-12)
+
+
+def test_a_total_that_is_none_is_said_so(tmp_path):
+    constant = spring(0, 0, 100.0)
+    file = write_npz(tmp_path, MATRICES | {"K0": constant})
+    with pytest.raises(ValueError, match=r"'K0' is .*less than the sum of .*total=False if none is the total"):
+        load_affine(file, stiffness=list(TERMS))
+    assert_same(load_affine(file, stiffness=list(TERMS), total=False, n_modes=4), EXPECTED)
+    everything = load_affine(file, total=False, n_modes=4)
+    assert everything.parameter_names == ("K0", *TERMS)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_skew_symmetric_matrix_is_named(tmp_path, form):
+    gyroscopic = np.triu(np.ones((N, N)), 1) - np.tril(np.ones((N, N)), -1)
+    file = WRITERS[form](tmp_path, MATRICES | {"G": gyroscopic})
+    with pytest.raises(ValueError, match=r"variable 'G' is skew-symmetric, as gyroscopic .*stiffness=\[\.\.\.\]"):
+        load_affine(file, n_modes=4)
+    assert_same(load_affine(file, stiffness=list(TERMS), n_modes=4), EXPECTED)
+
+
 def test_a_total_that_rounding_has_touched_is_still_the_total(tmp_path):
     rounded = np.vectorize(lambda value: float(f"{value:.8g}"))(TOTAL)
     assert (rounded != TOTAL).any()
@@ -235,14 +266,15 @@ def test_a_folder_is_read_in_natural_order(tmp_path):
         ({"K": TOTAL}, {}, r"\['K0', 'K'\] could each be the total; say total="),
         ({"E_2": np.eye(3)}, {}, r"variable 'E_2' has shape \(3, 3\); expected \(6, 6\) like the mass"),
         ({"E_2": TERMS["E_2"] * np.nan}, {}, "variable 'E_2' holds values that are not finite"),
-        ({"E_2": np.triu(TERMS["E_2"])}, {"total": None, "stiffness": ["E_2"]}, r"'E_2'.* is not symmetric"),
+        ({"E_2": np.triu(TERMS["E_2"])}, {"total": False, "stiffness": ["E_2"]}, r"'E_2'.* is not symmetric"),
         ({}, {"stiffness": ["E_7"]}, "no variable 'E_7'; found"),
         ({}, {"mass": "M"}, "no variable 'M'; found"),
         ({"E_2": np.ones(4)}, {"stiffness": "E_2"}, "variable 'E_2'"),
         ({"E_2": TERMS["E_2"] * 1j}, {"stiffness": ["E_2"]}, "variable 'E_2' is not a matrix of real numbers"),
         ({}, {"stiffness": []}, "no stiffness matrix beside the mass 'M0'"),
         ({}, {"n_modes": 5}, "n_modes is 5"),
-        ({}, {"stiffness": ["E_2"]}, "the structure is a mechanism"),
+        ({"K0": None}, {"stiffness": ["E_2"]}, "the structure is a mechanism"),
+        ({}, {"stiffness": ["E_2"], "total": False}, "the structure is a mechanism"),
         ({}, {"parameter_names": ["E_2"]}, "expected only the parameters"),
     ],
 )
@@ -273,7 +305,9 @@ def test_errors_of_paths(tmp_path):
         ("", "the first line is ''"),
         ("%%MatrixMarket matrix array real\n", "expected '%%MatrixMarket matrix"),
         ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "expected array or coordinate, real"),
-        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4", "the last line has no end"),
+        ("%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n", "would take .* MB of memory; exp"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n", "3 numbers; expected 9999"),
+        ("%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n1 1 5.0\n", "entries on its diagonal; exp"),
         ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n", "3 numbers; expected 4"),
         ("%%MatrixMarket matrix array real symmetric\n9999999 9999999\n1\n2\n3\n", "3 numbers; expected"),
         ("%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n", "the size is"),
