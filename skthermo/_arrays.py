@@ -112,6 +112,6 @@ def as_random_state(seed: Any) -> np.random.RandomState:
         return check_random_state(seed)
     except ValueError as error:
         raise ValueError(
-            f"random_state is {seed!r}; expected an integer, a numpy.random.RandomState or None "
-            "(of a numpy.random.Generator, generator.integers(2**31) draws an integer)"
+            f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState "
+            "(generator.integers(2**31) draws an integer from a numpy.random.Generator)"
         ) from error
