@@ -54,7 +54,7 @@ def as_floats(values: Any) -> Array:
     """
     values = without_mask(values)
     is_pandas = hasattr(values, "iloc")
-    array = values if is_pandas else np.asarray(values)
+    array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):
         raise ValueError("the values are complex; expected real numbers")
     try:
@@ -67,7 +67,8 @@ def without_mask(values: Any) -> Any:
     """A masked array as an array with NaN where it is masked; anything else as it is."""
     if not isinstance(values, np.ma.MaskedArray):
         return values
-    return (values if values.dtype.kind in "fc" else values.astype(float)).filled(np.nan)
+    floats: Any = values if values.dtype.kind in "fc" else values.astype(float)
+    return floats.filled(np.nan)
 
 
 def without_missing(objects: NDArray[np.object_]) -> NDArray[np.object_]:
