@@ -27,7 +27,7 @@ STORED_AS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "
 SPARSE_CLASS, OBJECT_CLASS = 5, 17
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX = 0x0800
-MOST_PARTS = 7  # of a sparse complex matrix
+MAX_PARTS = 7  # of a sparse complex matrix
 NAME_WITHIN = 1024  # bytes of a variable's beginning, its name included
 PIECE = 16384  # bytes that are decompressed at a time, to at most a thousand times as many
 
@@ -122,7 +122,7 @@ def _class(flags: memoryview, order: str) -> int:
 
 def _matrix(elements: Iterator[Part], order: str, limit: MemoryLimit) -> Matrix | None:
     """Values of one variable, from its flags, dimensions, name and numbers."""
-    parts = list(islice(elements, MOST_PARTS + 1))
+    parts = list(islice(elements, MAX_PARTS + 1))
     kind, shape = _class(parts[0][1], order), np.frombuffer(parts[1][1][: len(parts[1][1]) // 4 * 4], order + "i4")
     if kind not in (SPARSE_CLASS, *NUMERIC_CLASSES) or len(shape) != 2:
         deque(elements, maxlen=0)  # whose lengths are checked all the same
