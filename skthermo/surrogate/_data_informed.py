@@ -164,7 +164,14 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If lengths or indices differ, the number of modes is not the model's, a temperature
-            is constant or missing throughout, or a mode was never measured.
+            is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
+            was never measured.
+
+        Warns
+        -----
+        UserWarning
+            Once each, with counts, of what `report_` finds doubtful: few rows, rows left out, modes that are far from the
+            model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
         self.mode_names_ = column_names(F, "f")

@@ -161,8 +161,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Warns
         -----
         UserWarning
-            If there are more parameters than modes, or modes change their order within the box
-            and the model does not track them.
+            If there are more parameters than modes, or modes change their order in more than a tenth of the
+            simulations and the model does not track them.
         """
         random = check_random_state(self.random_state)
         self.box_ = None
@@ -207,6 +207,12 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
             NaN in rows where a mode is missing. A frame gives a frame on its own index.
+
+        Warns
+        -----
+        UserWarning
+            If more than 5 % of the rows give parameters that are farther outside the bounds than half the width of
+            the box.
         """
         theta = self._predict_arrays(X)[0]
         message = "" if self.box_ is None else self.box_.warning(theta)
