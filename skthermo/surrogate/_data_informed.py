@@ -170,8 +170,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            Once each, with counts, of what `report_` finds doubtful: few rows, rows left out, modes that are far from the
-            model's or look swapped, parameters far outside the bounds of the inverse.
+            Once each, with counts, of what `report_` finds doubtful: few rows, rows left out, modes that are far from
+            the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
         self.mode_names_ = column_names(F, "f")
