@@ -80,9 +80,13 @@ def match_modes(
     if shapes is not None:
         if local is None:
             raise ValueError(f"{model!r} has no method 'local_modes'; expected one where shapes are given")
+        expected = (np.size(dofs), len(measured))
+        if np.shape(shapes) != expected:
+            raise ValueError(
+                f"shapes have shape {np.shape(shapes)}; expected {expected}: a row for each of dofs and a column for "
+                "each measured mode"
+            )
         macs = mac(np.asarray(shapes), local.shapes(dofs))
-        if len(macs) != len(measured):
-            raise ValueError(f"shapes have {len(macs)} columns; expected {len(measured)}, one for each measured mode")
         cost += 1 - macs
     ranks: NDArray[np.intp] = linear_sum_assignment(cost)[1]
     table = pd.DataFrame({"mode": ranks, "measured": measured, "model": candidates[ranks]}, index=names)
