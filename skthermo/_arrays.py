@@ -1,6 +1,7 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -53,7 +54,7 @@ def as_floats(values: Any) -> Array:
     """
     values = without_mask(values)
     is_pandas = hasattr(values, "iloc")
-    array = values if is_pandas else np.asarray(values)
+    array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):
         raise ValueError("the values are complex; expected real numbers")
     try:
@@ -66,7 +67,8 @@ def without_mask(values: Any) -> Any:
     """A masked array as an array with NaN where it is masked; anything else as it is."""
     if not isinstance(values, np.ma.MaskedArray):
         return values
-    return (values if values.dtype.kind in "fc" else values.astype(float)).filled(np.nan)
+    floats: Any = values if values.dtype.kind in "fc" else values.astype(float)
+    return floats.filled(np.nan)
 
 
 def without_missing(objects: NDArray[np.object_]) -> NDArray[np.object_]:
@@ -87,6 +89,16 @@ def as_dense(matrix: Matrix) -> Array:
     return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
+def positive_integer(value: Any, what: str) -> int:
+    """Python's integer of an integer of any kind; what is none, or not positive, is an error.
+
+    NumPy's small integers overflow where they are multiplied.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+        raise ValueError(f"{what} is {value!r}; expected a positive integer")
+    return int(value)
+
+
 def as_random_state(seed: Any) -> np.random.RandomState:
     """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas.
 
@@ -101,5 +113,6 @@ def as_random_state(seed: Any) -> np.random.RandomState:
         return check_random_state(seed)
     except ValueError as error:
         raise ValueError(
-            f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState"
+            f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState "
+            "(generator.integers(2**31) draws an integer from a numpy.random.Generator)"
         ) from error

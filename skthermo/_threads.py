@@ -1,10 +1,11 @@
 """One BLAS thread for small matrices and small networks, which more threads make slower."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from threading import Lock
+from threading import Lock, get_ident
 from typing import Any, TypeVar
 
 import threadpoolctl  # installed with scikit-learn, which requires it
@@ -13,7 +14,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _lock = Lock()
-_depth = 0
+_inside: list[int] = []  # one entry for each context that is open, the thread that opened it
 _limits: Any = None
 
 
@@ -37,23 +38,42 @@ def single_blas_thread() -> Iterator[None]:
     """Hold every BLAS of this process to one thread.
 
     The limit is global to the process. Contexts that overlap in several Python threads are therefore
-    counted: the first to enter sets the limit, the last to leave lifts it.
+    counted: the first to enter sets the limit, the last to leave lifts it. A process forked meanwhile keeps only
+    the contexts of the thread that forked it.
     """
-    global _depth, _limits
+    global _limits
+    thread = get_ident()
     with _lock:
-        if _depth == 0:
+        if not _inside:
             with _in_control():
                 _limits = _controller().limit(limits=1)
-        _depth += 1
+        _inside.append(thread)
     try:
         yield
     finally:
         with _lock:
-            _depth -= 1
-            if _depth == 0:
-                with _in_control():
-                    _limits.restore_original_limits()
-                _limits = None
+            if thread in _inside:
+                _inside.remove(thread)
+            _lift_limit_after_last()
+
+
+def _lift_limit_after_last() -> None:
+    global _limits
+    if not _inside and _limits is not None:
+        with _in_control():
+            _limits.restore_original_limits()
+        _limits = None
+
+
+def _forget_other_threads() -> None:
+    """In a forked process, where only the thread that forked goes on."""
+    _inside[:] = [thread for thread in _inside if thread == get_ident()]
+    _lift_limit_after_last()
+    _lock.release()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_forget_other_threads)
 
 
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:

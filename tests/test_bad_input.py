@@ -12,7 +12,7 @@ import sklearn
 from sklearn.covariance import EmpiricalCovariance
 from sklearn.dummy import DummyRegressor
 from sklearn.ensemble import IsolationForest
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import Ridge
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
@@ -246,6 +246,9 @@ NOISE = [
     ("frequencies None", lambda: add_noise(None, 0.01), "error", "frequencies.*expected"),
     ("frequencies complex", lambda: add_noise(NOMINAL + 1j, 0.01), "error", "complex"),
     ("a generator", lambda: add_noise(NOMINAL, 0.01, random_state=GENERATOR), "error", "random_state is"),
+    ("noise in percent", lambda: add_noise(NOMINAL, 1), "error", "noise is 1"),
+    ("noise a string", lambda: check_noise("low", 6), "error", "noise.*expected"),
+    ("noise complex", lambda: check_noise(0.01j, 6), "error", "complex"),
 ]
 
 AFFINE = [
@@ -302,6 +305,7 @@ AFFINE = [
         "warning",
         "3 of 3",
     ),
+    ("few names of dofs", lambda: affine(STIFF, dof_names=["x"]), "error", "dof_names"),
 ]
 
 STRUCTURE = [
@@ -363,6 +367,12 @@ STRUCTURE = [
         "mechanism",
     ),
     ("too many modes", lambda: FRAME.assemble(["rafters"], n_modes=50), "error", "n_modes is 50"),
+    ("nodes a list", lambda: Structure([(0, 0)], BARS, SUPPORTS), "error", "nodes is .*expected a mapping"),
+    ("members a list", lambda: Structure(NODES, list(BARS.values()), SUPPORTS), "error", "members is .*expected a map"),
+    ("members None", lambda: Structure(NODES, None, SUPPORTS), "error", "members is None; expected a mapping"),
+    ("supports None", lambda: Structure(NODES, BARS, None), "error", "supports is None"),
+    ("supports a list", lambda: Structure(NODES, BARS, ["left"]), "error", "supports is .*expected a mapping"),
+    ("groups a list", lambda: truss_of(groups=["tie"]), "error", "groups is .*expected a mapping"),
 ]
 
 EXTERNAL = [
@@ -385,6 +395,7 @@ EXTERNAL = [
     ("no effect", lambda: probe(lambda t: (EYE, EYE), ["k"], n_modes=1), "error", "changes neither"),
     ("no file", lambda: load_affine("no_such_file.npz"), "error", "no_such_file"),
     ("a text file", lambda: load_affine(__file__), "error", "test_bad_input"),
+    ("text", lambda: CallableModel(lambda t: "no", ["k"], 1).frequencies([[1.0]]), "error", "expected"),
 ]
 
 MODAL = [
@@ -432,6 +443,15 @@ MODAL = [
         "error",
         r"shape \(3, 6\); expected \(2, 6\)",
     ),
+    ("no model", lambda: evaluate(None, ONES), "error", "model is None; expected"),
+    ("a class", lambda: evaluate(AffineModel, ONES), "error", "model is .*; expected"),
+    ("a regressor", lambda: evaluate(Ridge(), ONES), "error", r"model is Ridge\(\); expected"),
+    ("sample of None", lambda: sample(None), "error", "model is None; expected"),
+    ("linearise None", lambda: linearise(None, ONES), "error", "model is None; expected"),
+    ("n_jobs text", lambda: evaluate(TRUSS, ONES, n_jobs="2"), "error", "n_jobs is '2'"),
+    ("n_jobs zero", lambda: evaluate(TRUSS, ONES, n_jobs=0), "error", "n_jobs"),
+    ("mac of a sparse matrix", lambda: mac(scipy.sparse.eye_array(2), EYE), "error", "sparse"),
+    ("match with no model", lambda: match_modes(None, NOMINAL), "error", "model is None; expected"),
 ]
 
 PREPROCESSING = [
@@ -807,6 +827,7 @@ UPDATING = [
     ),
     ("a masked theta", lambda: sensitivity(TRUSS, np.ma.masked_equal([1, 1, 1, 2], 2)), "error", "'vertical' is nan"),
     ("theta of NaN", lambda: identifiability(TRUSS, [1, 1, 1, NAN], noise=0.01), "error", "'vertical' is nan"),
+    ("noise in percent", lambda: identifiability(TRUSS, noise=1), "error", "noise is 1"),
 ]
 
 DATASETS = [
@@ -822,7 +843,7 @@ DATASETS = [
     ("damage unknown", lambda: make_truss_campaign(damage={"deck": 0.1}), "error", "'deck'"),
     ("damage in percent", lambda: make_truss_campaign(damage={"top": 30}), "error", "30"),
     ("damage a number", lambda: make_truss_campaign(damage=0.3), "error", "damage is 0.3; expected"),
-    ("a generator", lambda: make_truss_campaign(random_state=GENERATOR), "error", "RandomState"),
+    ("a generator", lambda: make_truss_campaign(random_state=GENERATOR), "error", "random_state is Generator"),
     ("kelvin", lambda: steel_modulus([293.15, 300.0]), "error", "kelvin|temperature"),
     ("text", lambda: steel_modulus("cold"), "error", "temperature is 'cold'; expected numbers"),
     ("None", lambda: steel_modulus(None), "error", "temperature is None"),
@@ -834,6 +855,7 @@ DATASETS = [
     ("parameters none", lambda: make_kw51([]), "error", "parameters"),
     ("modes of text", lambda: make_z24("4"), "error", "n_modes is '4'"),
     ("an unknown group", lambda: kw51_structure().assemble(["cables"]), "error", "unknown group 'cables'"),
+    ("noise in percent", lambda: make_truss_campaign(noise=1), "error", "noise is 1"),
 ]
 
 SURROGATE = [
@@ -939,20 +961,16 @@ SURROGATE = [
     ("parameters of no rows", lambda: CHAIN.predict(T[:0]), "error", "0 sample"),
     ("predicted kelvin", lambda: CHAIN.predict_parameters(T + 273.15), "warning", "365 of 365 rows have temperatures"),
     (
-        "a regressor of labels",
-        lambda: make_pipeline(InverseSurrogate(TRUSS, Ridge(), bounds=0.1, n_samples=50), LinearRegression()).fit(
-            F, np.ones(364)
-        ),
-        "error",
-        "364",
-    ),
-    (
         "simulated with severities in percent",
         lambda: CHAIN.simulate(T, damage={"top": 10}),
         "error",
         "severity 10; expected",
     ),
     ("seed of text", lambda: CHAIN.simulate(T, noise=0.01, random_state="7"), "error", "random_state is '7'"),
+    ("noise in percent", lambda: InverseSurrogate(TRUSS, Ridge(), noise=1, n_samples=10).fit(), "error", "noise is 1"),
+    ("memory a file", lambda: InverseSurrogate(TRUSS, Ridge(), memory=__file__, n_samples=10).fit(), "error", "memory"),
+    ("noise in percent", lambda: CHAIN.simulate(T, noise=5), "error", "noise is 5"),
+    ("noise of text", lambda: CHAIN.simulate(T, noise="much"), "error", "noise.*expected"),
 ]
 
 ROWS = {

@@ -1,6 +1,7 @@
 """The reader of MATLAB v5 files: as SciPy reads them, and never astray in damaged ones."""
 
 import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -174,3 +175,27 @@ def test_a_damaged_compressed_variable_is_named(tmp_path, place):
     file.write_bytes(content)
     with pytest.raises(ValueError, match=r"any\.mat: variable 'stiffness' is not readable"):
         read_matlab(file)
+
+
+def test_a_variable_that_grows_without_bound_is_refused(tmp_path):
+    file = tmp_path / "any.mat"
+    packed = zlib.compress(matrix_of_zeros(40_000_000))
+    assert len(packed) < 1_000_000
+    file.write_bytes(mat_file("<", struct.pack("<II", 15, len(packed)) + packed))
+    with pytest.raises(ValueError, match=r"any\.mat: variable 'x' .* MB of memory; expected at most 256 MB"):
+        read_matlab(file)
+
+
+def matrix_of_zeros(n):
+    dimensions = element(5, struct.pack("<2i", n, 1), "<")
+    return variable("<", 6, dimensions, element(1, b"x", "<"), element(9, bytes(8 * n), "<"))
+
+
+def test_a_packed_variable_of_another_length_than_it_says_is_refused(tmp_path):
+    file = tmp_path / "any.mat"
+    content = matrix_2x1("<", b"x")
+    for stated, message in ((len(content) - 16, "more than"), (len(content) + 8, "bytes when decompressed; expected")):
+        packed = zlib.compress(struct.pack("<II", 14, stated) + content[8:])
+        file.write_bytes(mat_file("<", struct.pack("<II", 15, len(packed)) + packed))
+        with pytest.raises(ValueError, match=rf"variable 'x' .*{message}"):
+            read_matlab(file)

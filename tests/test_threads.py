@@ -4,10 +4,12 @@ import os
 import subprocess
 import sys
 
-PROGRAM = """
+PROGRAM = '''
 from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
+import os
+from threading import Barrier, Event, Thread
 
+import numpy as np
 import scipy.linalg  # brings a BLAS of its own
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -22,6 +24,32 @@ def limited(barrier=None):
             barrier.wait()
         return blas_threads()
 
+def forked_beside_a_limit():
+    """Threads of BLAS in a process that is forked while another thread holds them to one."""
+    reader, writer = os.pipe()
+    entered, left = Event(), Event()
+
+    def hold():
+        with single_blas_thread():
+            entered.set()
+            left.wait()
+
+    thread = Thread(target=hold)
+    thread.start()
+    entered.wait()
+    child = os.fork()
+    if not child:
+        counts = blas_threads()
+        assert limited() == {1}
+        assert blas_threads() == counts
+        np.ones((500, 500)) @ np.ones((500, 500))
+        os.write(writer, bytes(counts))
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    left.set()
+    thread.join()
+    return set(os.read(reader, 8))
+
 if blas_threads() == {1}:  # all that one core gets unasked
     threadpool_limits(2, "blas")
 assert blas_threads() == {2}
@@ -35,7 +63,11 @@ assert list(map_on_blas_threads(lambda _: blas_threads(), range(4))) == [{1}] * 
 with threadpool_limits(2, "blas"), ThreadPoolExecutor(1) as pool:
     assert pool.submit(limited).result() == {1}
 assert blas_threads() == {2}
-"""
+if hasattr(os, "fork"):
+    assert forked_beside_a_limit() == {2}
+    with single_blas_thread():
+        assert forked_beside_a_limit() == {1}
+'''
 
 
 def test_limits_hold_in_every_thread_and_are_lifted_again():

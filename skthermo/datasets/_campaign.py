@@ -1,14 +1,13 @@
 """Synthetic monitoring of the 28-bar truss."""
 
 from collections.abc import Mapping
-from numbers import Integral
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.utils import Bunch, check_random_state
+from sklearn.utils import Bunch
 
-from skthermo._arrays import real_array
+from skthermo._arrays import as_random_state, positive_integer, real_array
 from skthermo.datasets._truss import PARAMETERS, ZONES, truss_structure
 from skthermo.fem import add_noise
 
@@ -113,11 +112,10 @@ def make_truss_campaign(
     >>> campaign.temperatures.shape, campaign.frequencies.shape
     ((365, 3), (365, 6))
     """
-    counts = {"n_years": n_years, "samples_per_year": samples_per_year, "samples_per_day": samples_per_day}
-    for name, count in counts.items():
-        if not isinstance(count, Integral) or count < 1:
-            raise ValueError(f"{name} is {count!r}; expected a positive integer")
-    random = check_random_state(random_state)
+    n_years = positive_integer(n_years, "n_years")
+    samples_per_year = positive_integer(samples_per_year, "samples_per_year")
+    samples_per_day = positive_integer(samples_per_day, "samples_per_day")
+    random = as_random_state(random_state)
     index = pd.date_range(
         "2025-01-01", periods=n_years * samples_per_year, freq=pd.Timedelta(days=1) / samples_per_day, name="time"
     )

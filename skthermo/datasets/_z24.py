@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._arrays import Matrix
-from skthermo._io import read_matlab
+from skthermo._io import MemoryLimit, read_matlab
 
 EPOCH = pd.Timestamp("1997-11-11")
 MODES = ["f1", "f2", "f3", "f4"]
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 STATES = ("undamaged", "damaged")
 UNKNOWN = "unknown"
+BYTES_FOR_EACH_CHARACTER = 20  # that a table of short texts takes
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
@@ -97,10 +98,12 @@ def load_z24(path: str | PathLike) -> Bunch:
 
 
 def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
+    size = file.stat().st_size
     try:
+        MemoryLimit(size).take(0, BYTES_FOR_EACH_CHARACTER * size)
         with open(file, newline="", encoding="utf-8-sig") as stream:
             header, *rows = list(csv.reader(stream)) or [[]]
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise ValueError(f"{file}: not a readable CSV file ({error})") from error
     wanted = ["record", *MODES, *SENSORS, "state"]
     missing = [name for name in wanted if header.count(name) != 1]

@@ -63,7 +63,7 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
 def _pair(width: Any, name: str) -> Any:
     """A half-width, or lowest and highest as the only row."""
     if np.ndim(width) == 0:
-        if not (isinstance(width, Real) and 0 < width < 1):
+        if not (isinstance(width, Real) and 0 < float(width) < 1):
             raise ValueError(
                 f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
                 "highest)"

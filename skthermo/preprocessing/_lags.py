@@ -23,8 +23,8 @@ from skthermo.preprocessing._stamps import as_duration, as_stamps
 
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row
-MOST_LAGS = 10_000  # or as many as there are rows
-MOST_BYTES = 16 * 2**30
+MAX_LAGS = 10_000  # or as many as there are rows
+MAX_BYTES = 16 * 2**30
 FARTHEST = np.timedelta64(100 * 365, "D")
 
 
@@ -213,10 +213,10 @@ class LagFeatures(TransformerMixin, BaseEstimator):
 
     def _check_size(self, values: NDArray) -> None:
         size = values.nbytes * len(self.lags_)
-        if size > MOST_BYTES:
+        if size > MAX_BYTES:
             raise ValueError(
                 f"{len(self.lags_)} lags of {values.shape[0]} rows and {values.shape[1]} sensors take "
-                f"{size / 2**30:.0f} GiB; expected at most {MOST_BYTES / 2**30:.0f} GiB: fewer lags, or fewer rows at "
+                f"{size / 2**30:.0f} GiB; expected at most {MAX_BYTES / 2**30:.0f} GiB: fewer lags, or fewer rows at "
                 "a time"
             )
 
@@ -282,9 +282,9 @@ def _read_lags(lags: Any, n_rows: int) -> list[int]:
     if isinstance(lags, bool | np.bool_):
         raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     count = lags if isinstance(lags, Integral) else len(lags)
-    if count > max(MOST_LAGS, n_rows):
+    if count > max(MAX_LAGS, n_rows):
         raise ValueError(
-            f"lags are {count} for {n_rows} rows; expected at most {MOST_LAGS}, or as many as there are rows"
+            f"lags are {count} for {n_rows} rows; expected at most {MAX_LAGS}, or as many as there are rows"
         )
     if isinstance(lags, Integral):
         return list(range(lags))

@@ -12,9 +12,7 @@ from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
 from skthermo.surrogate._report import fit_report, spread_rows
-from skthermo.surrogate._simulator import Simulator
-
-DEFAULT_TOLERANCE = 1e-5
+from skthermo.surrogate._simulator import Simulator, tolerance
 
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """What a reduced model's box leaves around the learned parameters: of their range, and of their values."""
@@ -58,9 +56,9 @@ class ChainSteps:
 
     def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
         """The model and, with ``reduce``, its reduced model about the parameters learned for the training weather."""
-        if not self.reduce:
+        tol = tolerance(self.model, self.reduce)
+        if tol is None:
             return Simulator(self.model)
-        tol = DEFAULT_TOLERANCE if isinstance(self.reduce, (bool, np.bool_)) else self.reduce
         lowest, highest = np.nanmin(learned, axis=0), np.nanmax(learned, axis=0)
         margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
         box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])

@@ -18,8 +18,7 @@ from skthermo.fem import FEModel, add_noise, check_bounds, check_theta, evaluate
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
-
-DEFAULT_TOLERANCE = 1e-5
+from skthermo.surrogate._simulator import tolerance
 
 MANY_REORDERED = 0.1
 """Share of simulations in which modes change their order that gives a warning. 5 % of the truss's box cost its tables
@@ -274,7 +273,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
         is_remembered = self.memory is not None and self.random_state is None
         seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
-        tol = self._tolerance()
+        tol = tolerance(self.model, self.reduce)
         drawn, share_reordered = remembered_simulations(
             self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed
         )
@@ -299,14 +298,3 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
                 "frequencies in Hz, NaN where one is missing"
             )
         return frequencies
-
-    def _tolerance(self) -> float | None:
-        """Relative error of frequencies that a reduced model may have; None for the model itself."""
-        if not self.reduce:
-            return None
-        if not hasattr(self.model, "reduced"):
-            raise ValueError(
-                f"reduce is {self.reduce}, but {self.model!r} has no method 'reduced'; expected a model with one, such "
-                "as AffineModel, or reduce=False"
-            )
-        return DEFAULT_TOLERANCE if isinstance(self.reduce, (bool, np.bool_)) else self.reduce

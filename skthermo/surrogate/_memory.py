@@ -24,9 +24,13 @@ def remembered_simulations(
     Raises
     ------
     ValueError
-        If the model cannot be recognised when it comes again.
+        If the memory is a file, or the model cannot be recognised when it comes again.
     """
-    memory, bounds = check_memory(memory), check_bounds(bounds, model.parameter_names)
+    bounds = check_bounds(bounds, model.parameter_names)
+    try:
+        memory = check_memory(memory)
+    except OSError as error:
+        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
     if memory.location is None:
         return simulations("", model, bounds, n_samples, tol, n_jobs, seed)
     try:

@@ -14,6 +14,27 @@ MANY_ROWS = 2000
 """Rows from which on a full sparse model takes minutes."""
 
 
+DEFAULT_TOLERANCE = 1e-5
+
+
+def tolerance(model: FEModel, reduce: bool | float) -> float | None:
+    """Relative error of frequencies that a reduced model may have, by a parameter ``reduce``; None without reduction.
+
+    Raises
+    ------
+    ValueError
+        If the model cannot be reduced.
+    """
+    if not reduce:
+        return None
+    if not hasattr(model, "reduced"):
+        raise ValueError(
+            f"reduce is {reduce}, but {model!r} has no method 'reduced'; expected a model with one, such as "
+            "AffineModel, or reduce=False"
+        )
+    return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
+
+
 @dataclass(frozen=True)
 class Simulator:
     """An FE model and, where there is one, its reduced model for a box.
@@ -35,11 +56,6 @@ class Simulator:
     @classmethod
     def within(cls, model: FEModel, box: Array, tol: float, random_state: int) -> "Simulator":
         """The simulator with a reduced model for a box."""
-        if not hasattr(model, "reduced"):
-            raise ValueError(
-                f"reduce was asked for, but {model!r} has no method 'reduced'; expected a model with one, such as "
-                "AffineModel, or reduce=False"
-            )
         return cls(model, model.reduced(box, tol=tol, random_state=random_state), box)
 
     def damaged(self, damage: Mapping[str, float] | None) -> "Simulator":

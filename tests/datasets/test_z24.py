@@ -126,6 +126,12 @@ def test_bad_matlab_names_file_and_field(tmp_path, changes, message):
         load_z24(tmp_path / "broken.mat")
 
 
+def test_a_table_far_too_large_is_refused(tmp_path):
+    (tmp_path / "large.csv").write_text(csv_text() + "0,1\n" * 4_000_000)
+    with pytest.raises(ValueError, match=r"large\.csv: .* MB of memory; expected at most 256 MB"):
+        load_z24(tmp_path / "large.csv")
+
+
 FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

@@ -217,6 +217,27 @@ def test_a_function_that_fails_everywhere_is_an_error(file):
     np.testing.assert_array_equal(counted.rows, THETA[5:])
 
 
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_the_second_run_gives_what_the_first_gave(file, vectorized):
+    def fails_below_one(theta):
+        rows = np.atleast_2d(theta)
+        if len(rows) == 1 and rows[0, 0] < 1 and not vectorized:
+            raise ArithmeticError("no convergence")
+        result = np.array([three_modes(row) for row in rows])
+        result[rows[:, 0] < 1] = -1.0
+        return result if vectorized else result[0]
+
+    model = CallableModel(fails_below_one, NAMES, 3, vectorized=vectorized, cache=file)
+    count = (THETA[:, 0] < 1).sum()
+    assert count > 1
+    for _ in range(2):
+        with pytest.warns(UserWarning, match=f"{count} of 20 rows are NaN"):
+            frequencies = model.frequencies(THETA)
+        np.testing.assert_array_equal(frequencies, np.where(THETA[:, :1] < 1, np.nan, PLAIN))
+    with pytest.raises(RuntimeError, match="the model's function"):
+        model.frequencies(THETA[THETA[:, 0] < 1])
+
+
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_failing_sample_does_not_end_a_monte_carlo(n_jobs):
     def fails_sometimes(row):

@@ -1,11 +1,26 @@
 """Bad structures, models and parameters are refused by name."""
 
+import re
+
 import numpy as np
 import pytest
 import scipy.sparse
 
-from skthermo.datasets import make_truss
-from skthermo.fem import AffineModel, Bar, CallableModel, PointMass, Spring, Structure, sample
+from skthermo.datasets import make_truss, make_truss_campaign, make_z24
+from skthermo.fem import (
+    AffineModel,
+    Bar,
+    CallableModel,
+    PointMass,
+    Spring,
+    Structure,
+    add_noise,
+    evaluate,
+    linearise,
+    match_modes,
+    probe,
+    sample,
+)
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
 NODES = {"a": (0, 0), "b": (3, 0), "c": (3, 2)}
@@ -36,6 +51,14 @@ def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
         ({"members": MEMBERS | {"m": PointMass("c", -2.0)}}, "member 'm' has m = -2.0"),
         ({"members": MEMBERS | {"ab": ("a", "b")}}, "member 'ab' is .* expected an element such as Bar"),
         ({"nodes": NODES | {"c": "xy"}}, "node 'c' has the coordinates 'xy'"),
+        (
+            {"nodes": NODES | {"d": (3, 2 + 1e-9)}, "members": MEMBERS | {"cd": Bar("c", "d", **STEEL)}},
+            "member 'cd' has a length of 1e-09 m; expected at least 3.61e-06 m, a millionth of the structure's extent",
+        ),
+        ({"supports": None}, "supports is None; expected a mapping of node to directions, such as"),
+        ({"members": list(MEMBERS.values())}, "members is .*; expected a mapping of member to element"),
+        ({"nodes": [(0, 0), (3, 0)]}, "nodes is .*; expected a mapping of node to coordinates"),
+        ({"groups": ["tie"]}, "groups is .*; expected a mapping of group to members"),
         ({"supports": {"q": "x"}}, "supports name node 'q'"),
         ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'; expected some of"),
         ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
@@ -165,6 +188,90 @@ def test_affine_model_names_what_is_wrong(arguments, message):
 def test_sampling_names_what_is_wrong(arguments, message):
     with pytest.raises(ValueError, match=message):
         sample(make_truss(), **({"bounds": 0.2, "n_samples": 4} | arguments))
+
+
+def test_too_few_names_of_degrees_of_freedom_are_counted():
+    with pytest.raises(ValueError, match="dof_names holds 1 names; expected 2, one for each row"):
+        AffineModel({("k",): np.eye(2)}, np.eye(2), n_modes=1, dof_names=["a"])
+    with pytest.raises(ValueError, match="mechanism: b can move"):
+        AffineModel({("k",): np.diag([1.0, 0.0])}, np.eye(2), n_modes=1, dof_names=np.array(["a", "b"]))
+
+
+class Shaped:
+    """A model of one's own that returns frequencies of any shape."""
+
+    parameter_names = ("E",)
+    n_modes = 3
+
+    def __init__(self, shape):
+        self.shape = shape
+
+    def frequencies(self, theta):
+        return np.ones(self.shape)
+
+
+@pytest.mark.parametrize("shape", [(3,), (4, 1), (1, 3), (), (1,)])
+@pytest.mark.parametrize("solve", [evaluate, linearise])
+def test_frequencies_of_another_shape_are_not_repeated(solve, shape):
+    with pytest.raises(ValueError, match=re.escape(f"the model's frequencies have shape {shape}; expected (4, 3)")):
+        solve(Shaped(shape), np.ones((4, 1)))
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize("shape", [(2,), (4, 1), (3, 1), (), (1,), (4, 3, 1)])
+def test_callable_models_of_another_shape_are_refused(vectorized, shape):
+    model = CallableModel(lambda theta: np.ones(shape), ["E"], 3, vectorized=vectorized)
+    expected = (4, 3) if vectorized else (3,)
+    with pytest.raises(ValueError, match=re.escape(f"returned shape {shape}; expected {expected}")):
+        model.frequencies([[1.0], [1.1], [1.2], [1.3]])
+
+
+def test_callable_models_of_complex_numbers_are_refused():
+    with pytest.raises(ValueError, match=r"what the model's function returned at theta = {'E': 1.0} is complex"):
+        CallableModel(lambda row: np.array([1 + 1j]), ["E"], 1).frequencies([[1.0]])
+
+
+@pytest.mark.parametrize(
+    "solve",
+    [sample, lambda model: evaluate(model, [[1.0]]), lambda model: linearise(model, [[1.0]])]
+    + [lambda model: match_modes(model, [1.0])],
+)
+@pytest.mark.parametrize("model", [None, make_truss, CallableModel])
+def test_what_is_no_model_is_said(solve, model):
+    with pytest.raises(ValueError, match=r"model is .*; expected an FE model, an object with parameter_names"):
+        solve(model)
+
+
+@pytest.mark.parametrize("n_jobs", ["2", 0, 1.5, True])
+def test_n_jobs_is_an_integer(n_jobs):
+    with pytest.raises(ValueError, match=f"n_jobs is {n_jobs!r}; expected an integer"):
+        evaluate(make_truss(), np.ones((2, 4)), n_jobs=n_jobs)
+
+
+@pytest.mark.parametrize("seed", [np.random.default_rng(0), "0", 1.5])
+def test_seeds_are_named(seed):
+    for use in (
+        lambda: sample(make_truss(), 0.2, 4, random_state=seed),
+        lambda: add_noise([[1.0]], 0.01, random_state=seed),
+        lambda: probe(lambda theta: (theta[0] * np.eye(2), np.eye(2)), ["k"], n_modes=1, random_state=seed),
+        lambda: make_truss().reduced(0.2, random_state=seed),
+    ):
+        with pytest.raises(ValueError, match=r"random_state is .*; expected None, an integer from 0"):
+            use()
+
+
+@pytest.mark.filterwarnings("error")
+def test_numpy_integers_are_integers():
+    model = make_z24(np.int8(40))
+    assert type(model.n_modes) is int
+    assert model.n_modes == 40
+    assert "40 modes" in repr(make_z24(np.int64(40)))
+    assert CallableModel(np.sqrt, "k", np.uint8(1)).n_modes == 1
+    drawn = sample(make_truss(np.int8(6)), 0.2, np.int8(64), n_jobs=np.int8(1), method="sobol", random_state=np.int8(0))
+    expected = sample(make_truss(), 0.2, 64, method="sobol", random_state=0)
+    np.testing.assert_array_equal(drawn.frequencies, expected.frequencies)
+    campaign = make_truss_campaign(np.int8(2), samples_per_year=np.int16(365), samples_per_day=np.int8(1))
+    assert len(campaign.temperatures) == 730
 
 
 def test_callable_model_names_the_shape_it_got():

@@ -1,15 +1,12 @@
 """Exported models: the same model from every format, what each matrix is taken for, and damaged files."""
 
 import os
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, load_affine
 
@@ -123,45 +120,31 @@ def test_a_lone_stiffness_is_a_term_though_it_is_called_k(tmp_path):
     assert model.parameter_names == ("K",)
 
 
-def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
-    rest = spring(3, 3, 500.0)
-    expected = AffineModel([((name,), matrix) for name, matrix in TERMS.items()] + [((), rest)], M, n_modes=4)
-    file = write_mat(tmp_path, MATRICES | {"K0": TOTAL + rest}, sparse=True)
-    with pytest.warns(UserWarning, match=r"model\.mat: 'K0' is more than the sum of \['E_2', 'E_10', 'k_base'\]"):
-        assert_same(load_affine(file, n_modes=4), expected)
-    assert_same(load_affine(file, n_modes=4, total="K0"), expected)
-    some = load_affine(file, stiffness=["E_2", "k_base"], total="K0", n_modes=4)
-    assert_same(
-        some,
-        AffineModel({("E_2",): TERMS["E_2"], ("k_base",): TERMS["k_base"], (): rest + TERMS["E_10"]}, M, n_modes=4),
-    )
+@pytest.mark.parametrize("form", ["mat", "mtx sparse"])
+def test_terms_that_are_not_named_stay_constant_where_the_total_is_there(tmp_path, form):
+    file = WRITERS[form](tmp_path, MATRICES)
+    with pytest.warns(
+        UserWarning, match=r"'K0' is more than the sum of \['E_2'\]: the rest is taken as a constant part"
+    ):
+        model = load_affine(file, stiffness=["E_2"], n_modes=4)
+    assert_same(model, AffineModel({("E_2",): TERMS["E_2"], (): TOTAL - TERMS["E_2"]}, M, n_modes=4))
+    base = load_affine(file, stiffness=["k_base", "E_2", "E_10"], n_modes=4)
+    np.testing.assert_allclose(model.frequencies([[1.0]]), base.frequencies([[1.0] * 3]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_skew_symmetric_matrix_is_named(tmp_path, form):
+    gyroscopic = np.triu(np.ones((N, N)), 1) - np.tril(np.ones((N, N)), -1)
+    file = WRITERS[form](tmp_path, MATRICES | {"G": gyroscopic})
+    with pytest.raises(ValueError, match=r"variable 'G' is skew-symmetric, as gyroscopic .*stiffness=\[\.\.\.\]"):
+        load_affine(file, n_modes=4)
+    assert_same(load_affine(file, stiffness=list(TERMS), n_modes=4), EXPECTED)
 
 
 def test_a_total_that_rounding_has_touched_is_still_the_total(tmp_path):
     rounded = np.vectorize(lambda value: float(f"{value:.8g}"))(TOTAL)
     assert (rounded != TOTAL).any()
     assert_same(load_affine(write_npz(tmp_path, MATRICES | {"K0": rounded}), n_modes=4), EXPECTED)
-
-
-def test_a_constant_part_called_k0_is_refused_until_it_is_named(tmp_path):
-    constant = spring(0, 0, 100.0)
-    file = write_npz(tmp_path, MATRICES | {"K0": constant})
-    with pytest.raises(ValueError, match=r"model\.npz: 'K0' is .*less than the sum of .*expected a total"):
-        load_affine(file)
-    keys = {"K0": (), "E_2": "E", "E_10": ("E", "A"), "k_base": "k"}
-    model = load_affine(file, stiffness=keys, parameter_names=["k", "E", "A"], n_modes=4)
-    terms = {(): constant, ("E",): TERMS["E_2"], ("E", "A"): TERMS["E_10"], ("k",): TERMS["k_base"]}
-    assert model.parameter_names == ("k", "E", "A")
-    assert_same(model, AffineModel(terms, M, n_modes=4, parameter_names=["k", "E", "A"]))
-
-
-def test_matrices_may_share_a_parameter_and_damage_groups_cut_through_it(tmp_path):
-    file = write_npz(tmp_path, MATRICES)
-    keys = {"E_2": "E", "E_10": "E", "k_base": "k"}
-    model = load_affine(file, stiffness=keys, groups={"left": [0], "base": [("k",)]}, n_modes=4)
-    assert model.parameter_names == ("E", "k")
-    damaged = model.damaged({"left": 0.4}).frequencies([[1.0, 1.0]])
-    np.testing.assert_allclose(damaged, EXPECTED.damaged({"E_2": 0.4}).frequencies([[1.0] * 3]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("form", WRITERS)
@@ -171,32 +154,6 @@ def test_a_total_of_any_name_is_told_by_its_values(tmp_path, form, name):
     with pytest.warns(UserWarning, match=rf"'{name}' is the sum of \['E_2', .* taken as the total.*total='{name}'"):
         assert_same(load_affine(file, n_modes=4), EXPECTED)
     assert_same(load_affine(file, n_modes=4, total=name), EXPECTED)
-    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
-
-
-@pytest.mark.parametrize(
-    ("name", "matrix", "what"),
-    [
-        ("M1", M / 2, "0.5 times the mass 'M'"),
-        ("C", 0.02 * TOTAL, r"0.02 times the sum of \['E_2', 'E_10', 'k_base'\]"),
-    ],
-)
-@pytest.mark.parametrize("form", ["mat sparse", "npz"])
-def test_a_term_that_looks_like_mass_or_damping_is_said(tmp_path, form, name, matrix, what):
-    file = WRITERS[form](tmp_path, TERMS | {name: matrix, "M": M})
-    with pytest.warns(UserWarning, match=rf"model\..*'{name}' is {what}.*stiffness=\[\.\.\.\]"):
-        model = load_affine(file, n_modes=4)
-    assert model.parameter_names == (*TERMS, name)
-    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
-
-
-@pytest.mark.parametrize("form", WRITERS)
-def test_complex_matrices_are_real_or_refused(tmp_path, form):
-    file = WRITERS[form](tmp_path, MATRICES | {"E_2": TERMS["E_2"].astype(complex)})
-    assert_same(load_affine(file, n_modes=4), EXPECTED)
-    WRITERS[form](tmp_path, MATRICES | {"hysteretic": 0.1j * TOTAL})
-    with pytest.raises(ValueError, match=r"variable 'hysteretic' is not a matrix of real .*imaginary part is not zero"):
-        load_affine(file, n_modes=4)
     assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
 
 
@@ -235,14 +192,15 @@ def test_a_folder_is_read_in_natural_order(tmp_path):
         ({"K": TOTAL}, {}, r"\['K0', 'K'\] could each be the total; say total="),
         ({"E_2": np.eye(3)}, {}, r"variable 'E_2' has shape \(3, 3\); expected \(6, 6\) like the mass"),
         ({"E_2": TERMS["E_2"] * np.nan}, {}, "variable 'E_2' holds values that are not finite"),
-        ({"E_2": np.triu(TERMS["E_2"])}, {"total": None, "stiffness": ["E_2"]}, r"'E_2'.* is not symmetric"),
+        ({"E_2": np.triu(TERMS["E_2"])}, {"total": False, "stiffness": ["E_2"]}, r"'E_2'.* is not symmetric"),
         ({}, {"stiffness": ["E_7"]}, "no variable 'E_7'; found"),
         ({}, {"mass": "M"}, "no variable 'M'; found"),
         ({"E_2": np.ones(4)}, {"stiffness": "E_2"}, "variable 'E_2'"),
         ({"E_2": TERMS["E_2"] * 1j}, {"stiffness": ["E_2"]}, "variable 'E_2' is not a matrix of real numbers"),
         ({}, {"stiffness": []}, "no stiffness matrix beside the mass 'M0'"),
         ({}, {"n_modes": 5}, "n_modes is 5"),
-        ({}, {"stiffness": ["E_2"]}, "the structure is a mechanism"),
+        ({"K0": None}, {"stiffness": ["E_2"]}, "the structure is a mechanism"),
+        ({}, {"stiffness": ["E_2"], "total": False}, "the structure is a mechanism"),
         ({}, {"parameter_names": ["E_2"]}, "expected only the parameters"),
     ],
 )
@@ -267,68 +225,12 @@ def test_errors_of_paths(tmp_path):
         load_affine(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "the first line is ''"),
-        ("%%MatrixMarket matrix array real\n", "expected '%%MatrixMarket matrix"),
-        ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "expected array or coordinate, real"),
-        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4", "the last line has no end"),
-        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n", "3 numbers; expected 4"),
-        ("%%MatrixMarket matrix array real symmetric\n9999999 9999999\n1\n2\n3\n", "3 numbers; expected"),
-        ("%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n", "the size is"),
-        ("%%MatrixMarket matrix array real general\n\n", "the size is"),
-        ("%%MatrixMarket matrix array real general\n1 1\n1.0x\n", "1.0x"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 3 5.0\n", r"outside 1 to \[2, 2\]"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 0 5.0\n", "outside 1 to"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "5 numbers; expected 2 times"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 5.0\n2 1 5.0\n", "both sides of its diagonal"),
-    ],
-)
-def test_bad_matrix_market_files_are_refused(tmp_path, text, message):
-    write_mtx(tmp_path, MATRICES)
-    (tmp_path / "E_2.mtx").write_text(text)
-    with pytest.raises(ValueError, match=rf"E_2\.mtx: not readable as Matrix Market .*{message}"):
-        load_affine(tmp_path)
-
-
-def outcome(path, n_modes=4):
-    """The model, or what the error says."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return load_affine(path, n_modes=n_modes)
-        except ValueError as error:
-            return str(error)
-
-
-FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
 @pytest.fixture
 def intact(tmp_path, form):
     """A model's path, the file that holds its total, and what is in that."""
     path = WRITERS[form](tmp_path, MATRICES)
     file = path if path.is_file() else next(path.glob("K0.*"))
     return path, file, file.read_bytes()
-
-
-@FUZZ
-@given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())
-@pytest.mark.parametrize("form", ["npz", "mtx", "mtx sparse", "folder of npz"])
-def test_damaged_files_are_named_or_their_damage_is_harmless(intact, form, position, bit, cut):
-    path, file, content = intact
-    content = bytearray(content)
-    if cut:
-        content = content[: position % len(content)]
-    else:
-        content[position % len(content)] ^= 1 << bit
-    file.write_bytes(content)
-    result = outcome(path)
-    if isinstance(result, str):
-        assert file.name in result or path.name in result
-    elif "npz" in form:  # whose checksums leave no number wrong
-        assert_same(result, EXPECTED)
 
 
 needs_data = pytest.mark.skipif("SKTHERMO_DATA" not in os.environ, reason="SKTHERMO_DATA names no folder of real data")

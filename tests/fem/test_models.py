@@ -4,6 +4,7 @@ import pickle
 
 import joblib
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.sparse
 from scipy.stats import qmc
@@ -11,7 +12,7 @@ from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from skthermo.datasets import make_truss
-from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, sample
+from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, check_noise, mac, sample
 
 
 def big_model(n_dof, reach=1):
@@ -135,3 +136,40 @@ def test_no_rows_in_no_rows_out():
     frequencies, shapes = make_truss().modes(np.empty((0, 4)))
     assert frequencies.shape == (0, 6)
     assert shapes.shape == (0, 23, 6)
+
+
+@pytest.mark.parametrize("noise", [1.0, 5, [0.01, 1.5], [0.01 + 1j, 0.01]])
+def test_noise_is_a_share_and_no_percentage(noise):
+    for use in (lambda: add_noise(np.ones((3, 2)), noise), lambda: check_noise(noise, 2)):
+        with pytest.raises(ValueError, match=r"noise is .*(below 1 \(0.01 means 1 %\)|complex; expected real numbers)"):
+            use()
+
+
+def test_noise_on_complex_frequencies_is_refused():
+    with pytest.raises(ValueError, match="frequencies is complex; expected real numbers"):
+        add_noise(np.array([[1 + 1j]]), 0.01)
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint8, bool, np.int64])
+def test_mac_of_integers_is_that_of_floats(dtype):
+    a, b = np.array([[100, 3], [100, 0], [0, 7]]).astype(dtype), np.array([100, 90, 7]).astype(dtype)
+    np.testing.assert_array_equal(mac(a, b), mac(a.astype(float), b.astype(float)))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("scale", [1e200, 1e-200, 1e-320, 1e300 * (1 + 1j), 1.5e308])
+def test_mac_does_not_depend_on_the_scale(scale):
+    phi = np.array([[0.5, 0.1], [1.0, -0.2], [-0.3, 0.9]])
+    np.testing.assert_allclose(mac(phi * scale, phi[:, ::-1] * scale), mac(phi, phi[:, ::-1]), rtol=1e-3)
+    np.testing.assert_allclose(mac(phi * [scale, 1.0], phi), mac(phi, phi), rtol=1e-3)
+
+
+@pytest.mark.filterwarnings("error")
+def test_mac_names_what_is_no_number():
+    for phi, message in (
+        (["a", "b"], "phi_b is .*; expected numbers"),
+        (scipy.sparse.eye_array(2), "phi_b is a sparse matrix; expected a dense array"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            mac([1.0, 2.0], phi)
+    assert np.isnan(mac([1.0, 2.0], [pd.NA, 1.0])).all()  # a missing value

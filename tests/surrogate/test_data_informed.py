@@ -3,23 +3,20 @@
 import pickle
 import warnings
 
-import joblib
 import numpy as np
 import pandas as pd
 import pytest
-from joblib.externals.loky import get_reusable_executor
 from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
-from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score, cross_validate
+from sklearn.model_selection import KFold, cross_val_predict, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.fem import AffineModel, CallableModel
+from skthermo.fem import CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
@@ -81,12 +78,6 @@ def test_damage_is_put_into_the_fe_model():
     expected = FITTED.aligner_.inverse_transform(TRUSS.damaged({"top": 0.4}).frequencies(theta))
     np.testing.assert_allclose(FITTED.simulate(T, damage={"top": 0.4}), expected, rtol=1e-12)
     np.testing.assert_array_equal(FITTED.simulate(T), FITTED.predict(T))
-
-
-def test_simulated_noise_is_relative_and_seeded():
-    noisy = [FITTED.simulate(T, noise=0.01, random_state=0) for _ in range(2)]
-    pd.testing.assert_frame_equal(*noisy)
-    assert np.std(noisy[0].to_numpy() / FITTED.predict(T).to_numpy() - 1) == pytest.approx(0.01, rel=0.1)
 
 
 def test_frames_in_frames_out_arrays_in_arrays_out():
@@ -204,66 +195,6 @@ def test_feature_names_are_remembered_and_checked():
         FITTED.predict(T[["T1", "T2"]])
 
 
-def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
-    grid = {"mapper__lagfeatures__lags": [1, 2], "inverse__noise": [0.0, 0.01]}
-    searches = [
-        GridSearchCV(chain(inverse=inverse(memory=str(tmp_path))), grid, cv=KFold(3), n_jobs=n_jobs).fit(T, F)
-        for n_jobs in (1, 2)
-    ]
-    np.testing.assert_array_equal(*(search.cv_results_["mean_test_score"] for search in searches))
-    np.testing.assert_array_equal(*(search.predict(T) for search in searches))
-
-
-LOGGED_MODEL = """
-import time
-import numpy as np
-
-class Logged:
-    parameter_names = ("k",)
-    n_modes = 1
-
-    def __init__(self, log):
-        self.log = log
-
-    def frequencies(self, theta):
-        time.sleep(0.3 * (len(theta) == 77))  # long enough for the other process to come along
-        with open(self.log, "a") as file:
-            file.write(f"{len(theta)}\\n")
-        return np.sqrt(theta)
-"""
-
-
-def test_processes_that_search_together_simulate_once(tmp_path, monkeypatch):
-    (tmp_path / "logged_model.py").write_text(LOGGED_MODEL.replace("\\\\n", "\\n"))
-    monkeypatch.syspath_prepend(tmp_path)
-    get_reusable_executor().shutdown()  # its workers do not know the new path
-    from logged_model import Logged
-
-    model = Logged(tmp_path / "solved.txt")
-    air = np.linspace(0, 30, 60)[:, np.newaxis]
-    measured = np.sqrt(1 - 0.005 * air)
-    simulated = InverseSurrogate(model, LinearRegression(), n_samples=77, memory=str(tmp_path / "memory"))
-    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
-    search = GridSearchCV(estimator, {"inverse__noise": [0.0, 0.001, 0.002, 0.003]}, cv=KFold(3), n_jobs=2)
-    search.fit(air, measured)
-    solved = model.log.read_text().split()
-    assert solved.count("77") == 1
-    assert len(solved) > 12  # predictions go through the model too
-
-
-def test_large_models_are_recognised_in_worker_processes(tmp_path):
-    n = 380
-    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
-    model = AffineModel({("k",): chain_of_springs}, np.eye(n), n_modes=1)
-    air = np.linspace(0, 30, 24)[:, np.newaxis]
-    measured = model.frequencies(1 - 0.005 * air)
-    simulated = InverseSurrogate(model, LinearRegression(), n_samples=20, memory=str(tmp_path))
-    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
-    for n_jobs in (1, 2):
-        cross_val_score(estimator, air, measured, cv=2, n_jobs=n_jobs)
-    assert len(list(tmp_path.rglob("output.pkl"))) == 1
-
-
 def test_impossible_parameters_are_nan_with_a_warning():
     class Wild(TemperatureMapper):
         def predict(self, X):
@@ -301,16 +232,6 @@ def test_imputers_that_append_indicators_serve_too():
     pd.testing.assert_frame_equal(marked.parameters_, plain.parameters_)
 
 
-def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
-    trees = ExtraTreesRegressor(3)
-    parts = {
-        "inverse": InverseSurrogate(TRUSS, trees, bounds=0.2, n_samples=50, random_state=1),
-        "mapper": TemperatureMapper(trees, random_state=2),
-    }
-    first, second = (chain(**parts, random_state=seed).fit(T, F).predict(T) for seed in (0, 9))
-    pd.testing.assert_frame_equal(first, second)
-
-
 def test_nullable_frames_are_frames():
     holed_T, holed_F = gappy()
     nullable = holed_F.astype("Float64")
@@ -334,42 +255,6 @@ def test_an_inverse_within_a_pipeline_gets_the_model_too():
     fitted = chain(inverse=nested).fit(T, F)
     assert fitted.inverse_[0].model is TRUSS
     np.testing.assert_array_equal(fitted.predict(T), FITTED.predict(T))
-
-
-def test_same_seed_same_bits():
-    model = DataInformedFEM(TRUSS, inverse=InverseSurrogate(bounds=0.2, noise=0.01, n_samples=300), random_state=0)
-    alone = clone(model).fit(T, F).predict(T)
-    with joblib.parallel_config("loky"):
-        for _ in range(2):
-            spread = clone(model).set_params(inverse__n_jobs=2).fit(T, F).predict(T)
-            np.testing.assert_array_equal(spread, alone)
-    other = clone(model).set_params(random_state=1).fit(T, F).predict(T)
-    assert not np.array_equal(other, alone)
-
-
-def test_seed_fills_only_what_has_none():
-    seeded = DataInformedFEM(TRUSS, inverse=inverse(), random_state=0).fit(T, F)
-    assert seeded.inverse_.random_state == 3
-    assert isinstance(seeded.mapper_.random_state, int)
-    assert seeded.mapper is None
-
-
-def test_large_models_work_in_worker_processes():
-    """Matrices above 1 MB reach workers as read-only memory maps."""
-    n = 380
-    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
-    model = AffineModel({("k",): 1e4 * chain_of_springs, ("g",): np.eye(n)}, np.eye(n), n_modes=2)
-    warm = pd.DataFrame({"T": np.linspace(0, 30, 40)})
-    measured = model.frequencies(np.column_stack([1 - 0.005 * warm["T"], 1 + 0 * warm["T"]]))
-    estimator = DataInformedFEM(
-        model,
-        inverse=InverseSurrogate(regressor=LinearRegression(), n_samples=30, bounds=0.2),
-        mapper=TemperatureMapper(LinearRegression()),
-        random_state=0,
-    )
-    alone, spread = (cross_val_predict(estimator, warm, measured, cv=2, n_jobs=n_jobs) for n_jobs in (1, 2))
-    np.testing.assert_array_equal(spread, alone)
-    np.testing.assert_allclose(alone, measured, rtol=0.02)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_noise_in_training_damps_the_noise_of_estimates():
 
 def test_noise_by_mode_reaches_that_mode_only():
     """A mode that is pure noise in training is ignored: its coefficients vanish."""
-    noise = [0, 0, 0, 0, 0, 10.0]
+    noise = [0, 0, 0, 0, 0, 0.9]
     inverse = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, noise=noise, random_state=0).fit()
     weights = np.abs(inverse.regressor_.coef_).max(axis=0)
     assert weights[5] < 0.2 * weights[:5].max()
@@ -148,6 +148,12 @@ def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
     model = CallableModel(lambda theta: TRUSS.frequencies(theta), TRUSS.parameter_names, 6)
     with pytest.raises(ValueError, match=r"memory cannot recognise CallableModel.*expected one that can be pickled"):
         InverseSurrogate(model, LinearRegression(), n_samples=5, memory=str(tmp_path)).fit()
+
+
+def test_a_memory_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(ValueError, match=r"memory is '.*file'; expected a folder that can be written to"):
+        InverseSurrogate(make_truss(), LinearRegression(), n_samples=5, memory=str(tmp_path / "file")).fit()
 
 
 def test_more_parameters_than_modes_warns():

@@ -105,7 +105,7 @@ class AffineModel(AffineBase):
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
         self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
-        check_n_modes(n_modes)
+        n_modes = check_n_modes(n_modes)
 
         terms: type[AffineTerms] = (
             SparseTerms if are_sparse(stiffness_matrices + mass_matrices, n_modes) else DenseTerms
@@ -114,9 +114,7 @@ class AffineModel(AffineBase):
         mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         n_dof = stiffness_terms.n_dof
         nominal = nominal_theta(len(self._parameter_names))
-        check_supported(
-            stiffness_terms.assemble(nominal)[0], dof_names or [f"degree of freedom {i}" for i in range(n_dof)]
-        )
+        check_supported(stiffness_terms.assemble(nominal)[0], dof_names)
         available = count_modes(mass_terms.assemble(nominal)[0], at_least=n_modes)
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
         self._core = AffineCore.from_terms(

@@ -1,13 +1,13 @@
 """Reads and checks the arguments of an affine model."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arrays import Matrix
+from skthermo._arrays import Matrix, positive_integer
 
 Key = tuple[str, ...]
 
@@ -136,10 +136,8 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
 
 
 def check_n_modes(n_modes: int) -> int:
-    """Checks that a number of modes is a positive integer."""
-    if not isinstance(n_modes, Integral) or isinstance(n_modes, bool) or n_modes < 1:
-        raise ValueError(f"n_modes is {n_modes!r}; expected a positive integer")
-    return n_modes
+    """A number of modes as an integer of Python."""
+    return positive_integer(n_modes, "n_modes")
 
 
 def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:

@@ -12,6 +12,13 @@ from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_e
 Binding = tuple[str, str] | tuple[str, str, str]
 Target = tuple[str, str, tuple[str, ...]]
 
+EXPECTED = {
+    "nodes": "a mapping of node to coordinates",
+    "members": "a mapping of member to element",
+    "supports": "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure",
+    "groups": "a mapping of group to members",
+}
+
 
 class Structure:
     """Nodes, members, supports and named groups, from which FE models are assembled.
@@ -36,7 +43,7 @@ class Structure:
     ------
     ValueError
         Names the node, member, group or direction that is unknown, duplicated, disconnected,
-        of zero length or of a property that is not positive.
+        shorter than a millionth of the structure or of a property that is not positive.
 
     Examples
     --------
@@ -64,10 +71,16 @@ class Structure:
         supports: Mapping[Hashable, Collection[str]],
         groups: Mapping[str, Collection[Hashable]] | None = None,
     ):
+        arguments = {"nodes": nodes, "members": members, "supports": supports, "groups": groups or {}}
+        for what, argument in arguments.items():
+            if not isinstance(argument, Mapping):
+                raise ValueError(f"{what} is {argument!r:.200}; expected {EXPECTED[what]}")
         self._coordinates = _read_nodes(nodes)
         self._members = dict(members)
+        places = np.array(list(self._coordinates.values()))
+        extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
         for name, element in self._members.items():
-            check_element(name, element, self._coordinates)
+            check_element(name, element, self._coordinates, extent)
         self._groups = {
             group: frozenset([names] if isinstance(names, str) else names) for group, names in (groups or {}).items()
         }

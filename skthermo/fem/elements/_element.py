@@ -19,6 +19,9 @@ ByProperties = dict[tuple[str, ...], Array]
 TRANSLATIONS = ("x", "y", "z")
 ROTATIONS = ("rx", "ry", "rz")
 
+SHORTEST = 1e-6
+"""Length of a member, as a share of the structure's extent, below which its two ends are taken for one place."""
+
 
 class Element(Protocol):
     """The duck type of what `Structure` assembles: an element of your own needs these members.
@@ -71,8 +74,8 @@ class PhysicalElement:
         return coordinates
 
 
-def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array]) -> None:
-    """Refuse an element with unknown nodes, no length, or a property that is not positive."""
+def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
+    """Refuse an element with unknown nodes, hardly any length, or a property that is not positive."""
     if not hasattr(element, "nodes"):
         raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
     for node in element.nodes:
@@ -82,6 +85,12 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
     if len(ends) == 2 and np.array_equal(*ends):
         first, last = element.nodes
         raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
+    sides = np.linalg.norm(ends - np.roll(ends, 1, axis=0), axis=1)
+    if len(ends) > 1 and sides.min() < SHORTEST * extent:
+        raise ValueError(
+            f"member {name!r} has a length of {sides.min():.3g} m; expected at least {SHORTEST * extent:.3g} m, a "
+            f"millionth of the structure's extent of {extent:.6g} m: are two of its nodes the same?"
+        )
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
         if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):

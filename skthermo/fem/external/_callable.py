@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, check_theta, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
@@ -120,11 +120,12 @@ class CallableModel:
         Raises
         ------
         ValueError
-            If theta has the wrong width or values, the function returns another shape, or the
-            cache belongs to other parameters.
+            If theta has the wrong width or values, the function returns another shape or what is not real
+            numbers, or the cache belongs to other parameters.
         RuntimeError
-            If the function fails at all of several rows, by an error or by a frequency that is neither
-            NaN nor finite and positive; the error says at which theta first.
+            If the function fails at all of several rows, rows that the cache holds included, by an error or by a
+            frequency that is neither NaN nor finite and positive, or, with ``vectorized=True``, raises an error at
+            several rows at once; the error says at which theta first.
 
         Warns
         -----
@@ -138,12 +139,14 @@ class CallableModel:
         batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
         solved: dict[bytes, Array] = {}
         failures: dict[bytes, RuntimeError] = {}
+        whole_batch_fails = False
         for batch in batches:
             asked = np.array([missing[key] for key in batch])
             try:
                 frequencies = self._solve(asked)
             except RuntimeError as failure:
                 failures |= dict.fromkeys(batch, failure)
+                whole_batch_fails = len(batch) > 1
                 continue
             impossible = self._impossible(asked, frequencies)
             failures |= {batch[row]: failure for row, failure in impossible.items()}
@@ -153,7 +156,8 @@ class CallableModel:
             solved |= {batch[row]: frequencies[row] for row in good}
         if failures:
             first = next(iter(failures.values()))
-            if len(failures) == len(missing) > 1 and not self._is_quiet:
+            everywhere = whole_batch_fails or len(failures) == len(set(keys))
+            if len(failures) > 1 and everywhere and not self._is_quiet:
                 raise first
             if not self._is_quiet:
                 warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {first}", UserWarning, stacklevel=2)
@@ -164,12 +168,14 @@ class CallableModel:
     def _solve(self, rows: Array) -> Array:
         argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))
         with failures_named(argument, self.parameter_names):
-            result = np.asarray(self.function(argument.copy()), dtype=float)
+            returned = self.function(argument.copy())
+        where = f"at theta = {by_name(rows[0], self.parameter_names)}"
+        result = real_array(returned, f"what the model's function returned {where}")
         if result.size != np.prod(shape) or result.shape[-1:] != shape[-1:]:
             raise ValueError(
                 f"the model's function returned shape {result.shape}; expected {shape}"
                 + ("" if self.vectorized else " for one row of theta (for many rows: vectorized=True)")
-                + f", at theta = {by_name(rows[0], self.parameter_names)}"
+                + f", {where}"
             )
         return result.reshape(len(rows), self.n_modes)
 

@@ -6,6 +6,7 @@ from functools import reduce
 from operator import add
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import scipy.sparse
@@ -15,6 +16,7 @@ from skthermo._io import read_named_matrices
 from skthermo.fem.affine import AffineModel
 
 Key = tuple[str, ...]
+Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass")
 TOTAL_NAMES = ("k", "k0", "stiffness")
@@ -27,7 +29,7 @@ def load_affine(
     *,
     stiffness: Collection[str] | Mapping[str, str | Key] | None = None,
     mass: str | None = None,
-    total: str | None = None,
+    total: Total = None,
     n_modes: int = 6,
     parameter_names: Sequence[str] | None = None,
     groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
@@ -49,9 +51,10 @@ def load_affine(
         but the mass and the total is a term.
     mass : str, optional
         The mass matrix. By default the one called M, M0 or mass, in lower or upper case.
-    total : str, optional
-        The whole nominal stiffness, with which the terms are compared. By default, where ``stiffness`` is
-        not given, the matrix called K, K0 or stiffness, in lower or upper case, if there are others.
+    total : str or False, optional
+        The whole nominal stiffness, with which the terms are compared. By default the matrix called K, K0 or
+        stiffness, in lower or upper case, if there are others and ``stiffness`` does not name it. False says that
+        there is none: the stiffness is the sum of the terms, whatever else the file holds.
     n_modes : int, default=6
         How many of the lowest modes the model gives.
     parameter_names : sequence of str, optional
@@ -77,7 +80,8 @@ def load_affine(
     Warns
     -----
     UserWarning
-        If, without ``stiffness``, a total that was found by its name is more than the sum of the terms; if a matrix
+        If a total that was found by its name is more than the sum of the terms, the others left out by ``stiffness``
+        or not: the rest is then a constant part of the stiffness; if, without ``stiffness``, a matrix
         of another name is the sum of all others, and so taken as the total; or if a term is proportional to the
         mass or to the sum of the other terms.
 
@@ -91,12 +95,15 @@ def load_affine(
     Which matrix is which is decided by these rules alone:
 
     - Text, structs, numbers, vectors and matrices that are not square are left alone. A square matrix of another
-      size than the mass, not finite, or of the mass's size and complex, is an error unless ``stiffness`` names
-      the terms; an imaginary part of zeros is left out. Of a folder, only the files of these names are then read.
+      size than the mass, not finite, skew-symmetric (gyroscopic), or of the mass's size and complex, is an error
+      unless ``stiffness`` names the terms; an imaginary part of zeros is left out. Of a folder, only the files of
+      these names and the total are then read.
     - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
+    - A file may need at most ten times its size of memory, or 256 MB.
     - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If it is
       more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal,
-      that is an error. A matrix K0 that comes on top of the terms is said to be so by
+      that is an error. So a file with the total and all terms, of which ``stiffness`` names a few, is a
+      model in which these vary and the others stay. A matrix K0 that comes on top of the terms is said to be so by
       ``stiffness={"K0": (), "K1": "E_deck", ...}``.
 
     Examples
@@ -115,15 +122,17 @@ def load_affine(
     """
     file = Path(path)
     named = None if stiffness is None else {*_keys(stiffness), mass, total}
-    matrices = read_named_matrices(
-        file, lambda name: named is None or name in named or (mass is None and name.lower() in MASS_NAMES)
-    )
+    usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
+    matrices = read_named_matrices(file, lambda name: named is None or name in named or name.lower() in usual)
     square = _square(matrices)
     mass = mass or _usual(square, MASS_NAMES, "mass", file)
     if mass is None:
         raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
     mass_matrix = _find(matrices, mass, file)
     says_total = total is not None
+    if total is None and stiffness is not None:
+        unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
+        total = _usual([name for name in unnamed if _fits(matrices[name], mass_matrix)], TOTAL_NAMES, "total", file)
     if stiffness is None:
         others = {
             name: _find(matrices, name, file, mass_matrix.shape)
@@ -138,7 +147,7 @@ def load_affine(
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
     terms = {name: _find(matrices, name, file, mass_matrix.shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
-    if total is not None:
+    if total:
         rest = _rest(_find(matrices, total, file, mass_matrix.shape), terms, f"{file}: {total!r}", says_total)
         pairs += [] if rest is None else [((), rest)]
     try:
@@ -160,6 +169,14 @@ def _is_complex(matrix: Matrix | None, shape: tuple[int, ...]) -> bool:
     return matrix is not None and np.iscomplexobj(matrix) and matrix.shape == shape
 
 
+def _fits(matrix: Matrix | None, mass: Matrix) -> bool:
+    return matrix is not None and matrix.shape == mass.shape and _is_finite(matrix)
+
+
+def _is_finite(matrix: Matrix) -> bool:
+    return bool(np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all())
+
+
 def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
     """The reason why no matrix can be the mass, for an error."""
     for name, matrix in matrices.items():
@@ -170,9 +187,15 @@ def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
     return f"no matrix is called {', '.join(MASS_NAMES)}"
 
 
-def _terms(others: Mapping[str, Matrix], total: str | None, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
+def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
     """Names of the stiffness terms; warns of matrices that look like something else."""
     found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
+    for name, term in found.items():
+        if term.nnz and not (term + term.T).count_nonzero():
+            raise ValueError(
+                f"{file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric ones, or "
+                "stiffness=[...] that names the terms"
+            )
     has_pattern = mass_matrix.shape[0] > 1
     like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
     alike = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
@@ -240,7 +263,7 @@ def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: t
             f"{file}: variable {name!r} is not a matrix of real numbers: its imaginary part is not zero; expected real "
             "ones, or stiffness=[...] that names the terms"
         )
-    if not np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all():
+    if not _is_finite(matrix):
         raise ValueError(f"{file}: variable {name!r} holds values that are not finite")
     if shape and matrix.shape != shape:
         raise ValueError(
@@ -261,12 +284,13 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
         row = int(np.argmax(less))
         raise ValueError(
             f"{what} is {total.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; expected a "
-            "total of the stiffness, or stiffness=... that says which matrices are terms"
+            "total of the stiffness, stiffness=... that says which matrices are terms, or total=False if none is the "
+            "total"
         )
     if not is_meant:
         warnings.warn(
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
-            "total=... says that it is, stiffness=... what else the matrices are",
+            "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
             stacklevel=3,
         )
     return rest

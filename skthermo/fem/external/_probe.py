@@ -83,7 +83,7 @@ def probe(
     array([[1.967, 5.15 ],
            [1.723, 4.159]])
     """
-    if not isinstance(n_checks, Integral) or n_checks < 0:
+    if not isinstance(n_checks, Integral) or isinstance(n_checks, bool) or n_checks < 0:
         raise ValueError(f"n_checks is {n_checks!r}; expected zero or a positive integer")
     names = check_different(parameter_names)
     program = Program(assemble, names)

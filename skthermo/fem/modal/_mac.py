@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arrays import real_array
+
 
 def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     """Modal assurance criterion of every pair of mode shapes.
@@ -24,7 +26,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If the numbers of degrees of freedom differ, or a shape is zero throughout.
+        If the numbers of degrees of freedom differ, a shape is zero throughout, or a value is not a number.
 
     References
     ----------
@@ -44,14 +46,22 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:
-    array = np.asarray(phi)
+    array = np.asarray(phi, dtype=complex) if np.iscomplexobj(phi) else real_array(phi, name)
     array = array[:, np.newaxis] if array.ndim == 1 else array
     if array.ndim != 2:
         raise ValueError(f"{name} has shape {array.shape}; expected (n_dof, n_modes)")
     empty = np.flatnonzero(~array.any(axis=0))
     if empty.size:
         raise ValueError(f"{name}: shape {empty[0]} is zero at every degree of freedom")
-    return array
+    return _scaled(array)
+
+
+def _scaled(phi: NDArray) -> NDArray:
+    """Shapes times powers of two, which change no digit, so that squares neither overflow nor vanish."""
+    largest = np.maximum(abs(phi.real), abs(phi.imag)).max(axis=0)
+    exponents = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
+    half = exponents // 2
+    return phi * np.ldexp(1.0, -half) * np.ldexp(1.0, half - exponents)
 
 
 def _squared_norms(phi: NDArray) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from skthermo._arrays import Array, real_array
-from skthermo.fem._protocol import FEModel
+from skthermo.fem._protocol import FEModel, check_model
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal._mac import mac
 
@@ -68,6 +68,7 @@ def match_modes(
     names = [str(name) for name in getattr(frequencies, "columns", ())]
     measured = _mean_frequencies(frequencies)
     names = names or [f"f{i + 1}" for i in range(len(measured))]
+    check_model(model)
     if (shapes is None) != (dofs is None):
         raise ValueError("expected both shapes and dofs, or neither")
     nominal = nominal_theta(len(model.parameter_names))
@@ -77,7 +78,7 @@ def match_modes(
         raise ValueError(f"{len(measured)} modes were measured; expected at most {len(candidates)}, as the model has")
     cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(FAR)) ** 2
     macs = None
-    if shapes is not None:
+    if shapes is not None and dofs is not None:
         if local is None:
             raise ValueError(f"{model!r} has no method 'local_modes'; expected one where shapes are given")
         expected = (np.size(dofs), len(measured))

@@ -4,9 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse.linalg
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix, as_dense
 from skthermo.fem.modal._shift_invert import factorise, seeded_start
+
+EPS = np.finfo(float).eps
 
 FEW_DOFS = 500
 """Degrees of freedom up to which a mass matrix is examined as a dense one."""
@@ -15,36 +18,44 @@ SMALL_SHIFT = 1e-10
 """Multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite."""
 
 
-def check_supported(stiffness: Matrix, names: Sequence[str]) -> None:
+def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> None:
     """Refuse a stiffness matrix with a motion that nothing resists.
 
     Parameters
     ----------
     stiffness : matrix of shape (n_dof, n_dof)
         Nominal stiffness, dense or sparse.
-    names : sequence of str
+    names : sequence of str, optional
         What each degree of freedom is called in the error.
 
     Raises
     ------
     ValueError
-        If the matrix is not positive definite; the error names where the motion is largest.
+        If the matrix is not positive definite, within rounding; the error names where the motion is largest.
+        If there are too few or too many names.
+
+    Notes
+    -----
+    The energy x'Kx of a motion is a sum of entries that cancel where the motion is nearly rigid. Of a mechanism,
+    rounding of these entries is all that is left; the softest motion of a fine mesh has more.
     """
     diagonal = stiffness.diagonal()
+    if names is not None and len(names) != len(diagonal):
+        raise ValueError(f"dof_names holds {len(names)} names; expected {len(diagonal)}, one for each row")
     if (diagonal <= 0).any():
-        _refuse([name for name, stiff in zip(names, diagonal, strict=True) if stiff <= 0])
+        _refuse(np.flatnonzero(diagonal <= 0), names)
     scale = 1 / np.sqrt(diagonal)
     if isinstance(stiffness, np.ndarray):
         eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
-        lowest, vector, highest = eigenvalues[0], vectors[:, 0], eigenvalues[-1]
+        lowest, vector, rounding = eigenvalues[0], vectors[:, 0], 50 * EPS * eigenvalues[-1]
     else:
         scaled = _scaled(stiffness, scale)
         lowest, vector = _lowest(scaled)
-        highest = abs(scaled).sum(axis=0).max()
-    if lowest <= 50 * np.finfo(float).eps * highest:
+        rounding = 10 * EPS * (np.abs(vector) @ (abs(scaled) @ np.abs(vector)))
+    if lowest <= rounding:
         motion = np.abs(scale * vector)
         largest = np.argsort(-motion, kind="stable")
-        _refuse([names[i] for i in largest if motion[i] > 0.5 * motion[largest[0]]])
+        _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], names)
 
 
 def count_modes(mass: Matrix, *, at_least: int) -> int:
@@ -98,8 +109,9 @@ def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     return float(eigenvalue[0]), vector[:, 0]
 
 
-def _refuse(free: list[str]) -> None:
-    listed = ", ".join(free[:6]) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
+def _refuse(free: NDArray[np.intp], names: Sequence[str] | None) -> None:
+    shown = [f"degree of freedom {i}" if names is None else names[i] for i in free[:6]]
+    listed = ", ".join(shown) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
     raise ValueError(
         f"the structure is a mechanism: {listed} can move without resistance; "
         "expected supports, springs or members that hold every motion (a positive definite stiffness)"

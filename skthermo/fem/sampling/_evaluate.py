@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator
 from contextlib import closing
+from numbers import Integral
 from typing import Any, cast
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads, single_blas_thread
-from skthermo.fem._protocol import BatchModel, FEModel
+from skthermo.fem._protocol import BatchModel, FEModel, check_model
 from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta, warn_of_failures
 from skthermo.fem.sampling._progress import with_progress
 
@@ -37,7 +38,8 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     Raises
     ------
     ValueError
-        If theta has the wrong width, or a value that is neither NaN nor finite and positive.
+        If the model is none or gives another shape, or theta has the wrong width, or a value that is neither
+        NaN nor finite and positive.
 
     Warns
     -----
@@ -58,6 +60,9 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     array([[ 7.48, 27.5 ],
            [  nan,   nan]])
     """
+    check_model(model)
+    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
+        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
@@ -67,9 +72,17 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     places = [known[i : i + size] for i in range(0, len(known), size)]
     with closing(_solved(model, rows, places, n_jobs)) as parts:
         for place, part in zip(places, with_progress(parts, len(known), progress), strict=True):
-            frequencies[place] = part
+            frequencies[place] = check_shape(part, (len(place), model.n_modes), "the model's frequencies")
     getattr(model, "warn_of", warn_of_failures)(rows, frequencies)
     return frequencies
+
+
+def check_shape(result: ArrayLike, expected: tuple[int, ...], what: str) -> Array:
+    """Refuse what a model gives in another shape, instead of repeating it to fill a table."""
+    array = np.asarray(result)
+    if array.shape != expected:
+        raise ValueError(f"{what} have shape {array.shape}; expected {expected}, the first for the rows of theta")
+    return array
 
 
 def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array
-from skthermo.fem._protocol import FEModel
+from skthermo.fem._protocol import FEModel, check_model
 from skthermo.fem._theta import check_theta
-from skthermo.fem.sampling._evaluate import evaluate
+from skthermo.fem.sampling._evaluate import check_shape, evaluate
 
 
 def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple[Array, Array]:
@@ -47,6 +47,7 @@ def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple
     >>> (jacobian[:, 0, 0] / frequencies[:, 0]).round(6)
     array([0.5  , 0.125])
     """
+    check_model(model)
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
     jacobian = np.full((len(rows), model.n_modes, rows.shape[1]), np.nan)
@@ -54,11 +55,13 @@ def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple
     if not known.any():
         return frequencies, jacobian
     if hasattr(model, "linearised"):
-        frequencies[known], jacobian[known] = model.linearised(rows[known])
+        solved, slopes = model.linearised(rows[known])
     else:
-        frequencies[known] = evaluate(model, rows[known])
+        solved = evaluate(model, rows[known])
         exact = getattr(model, "jacobian", None)
-        jacobian[known] = exact(rows[known]) if exact else central_differences(model, rows[known], step)
+        slopes = exact(rows[known]) if exact else central_differences(model, rows[known], step)
+    frequencies[known] = check_shape(solved, frequencies[known].shape, "the model's frequencies")
+    jacobian[known] = check_shape(slopes, jacobian[known].shape, "the model's derivatives")
     return frequencies, jacobian
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import RandomState, as_floats, as_random_state
+from skthermo._arrays import RandomState, as_random_state, real_array
 
 
 def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
@@ -12,7 +12,7 @@ def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     Parameters
     ----------
     noise : float or array-like of shape (n_modes,)
-        Relative standard deviation; 0.01 means 1 %.
+        Relative standard deviation, below 1; 0.01 means 1 %.
     n_modes : int
         Number of modes.
 
@@ -23,7 +23,7 @@ def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If the shape is neither () nor (n_modes,), or a value is negative or not finite.
+        If the shape is neither () nor (n_modes,), or a value is negative, 1 or more, or not a real number.
 
     Examples
     --------
@@ -31,11 +31,11 @@ def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     >>> check_noise(0.01, 3)
     array([0.01, 0.01, 0.01])
     """
-    array = np.asarray(noise, dtype=float)
-    if array.shape not in ((), (n_modes,)) or not (np.isfinite(array) & (array >= 0)).all():
+    array = real_array(noise, "noise")
+    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
         raise ValueError(
-            f"noise is {array}; expected a relative standard deviation (0.01 means 1 %), "
-            f"a number or one for each of the {n_modes} modes, none negative"
+            f"noise is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
+            f"a number or one for each of the {n_modes} modes"
         )
     return np.broadcast_to(array, (n_modes,))
 
@@ -65,7 +65,7 @@ def add_noise(
     Raises
     ------
     ValueError
-        If the noise is negative, not finite or of another length.
+        If the noise is negative, 1 or more, or of another length, or a number is not real.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def add_noise(
     >>> noisy.std(axis=0).round(2)
     array([0.  , 0.04])
     """
-    clean = as_floats(frequencies)
+    clean = real_array(frequencies, "frequencies")
     if clean.ndim != 2:
         raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
     deviation = check_noise(noise, clean.shape[1])

@@ -1,14 +1,13 @@
 """Monte Carlo sampling of FE models."""
 
-from numbers import Integral
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.stats import qmc
 
-from skthermo._arrays import Array, Bounds, RandomState, as_random_state
+from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
 from skthermo.fem._bounds import check_bounds
-from skthermo.fem._protocol import FEModel
+from skthermo.fem._protocol import FEModel, check_model
 from skthermo.fem.sampling._evaluate import evaluate
 
 if TYPE_CHECKING:
@@ -54,7 +53,8 @@ def sample(
     Raises
     ------
     ValueError
-        If the bounds are infeasible, ``n_samples`` is not positive or the method is unknown.
+        If the model is none, the bounds are infeasible, ``n_samples`` is not a positive integer, the method is
+        unknown, or ``random_state`` or ``n_jobs`` is something else.
 
     Examples
     --------
@@ -66,9 +66,9 @@ def sample(
     """
     from sklearn.utils import Bunch  # imported here because scikit-learn imports pandas
 
+    check_model(model)
     lowest, highest = check_bounds(bounds, model.parameter_names).T
-    if not isinstance(n_samples, Integral) or n_samples < 1:
-        raise ValueError(f"n_samples is {n_samples!r}; expected a positive integer")
+    n_samples = positive_integer(n_samples, "n_samples")
     theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
     theta *= highest - lowest
     theta += lowest

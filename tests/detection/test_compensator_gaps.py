@@ -1,0 +1,259 @@
+"""Gaps and lags inside a compensator."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
+from sklearn.impute import SimpleImputer
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, TimeSeriesSplit, cross_val_predict
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import TemperatureCompensator
+from skthermo.preprocessing import KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+# The chain's linear inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(2, samples_per_year=100, random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+X = T.join(F)
+MODES = list(F.columns)
+POSITIONS = [X.columns.get_loc(mode) for mode in MODES]
+
+
+def compensator(estimator=None, **options):
+    estimator = KNeighborsRegressor(3) if estimator is None else estimator
+    return TemperatureCompensator(estimator, **({"targets": MODES} | options))
+
+
+def chain(mapper=None):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    inverse = InverseSurrogate(TRUSS, quadratic, bounds=0.2, n_samples=100, random_state=0)
+    return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
+
+
+def with_gaps(columns, rows):
+    holed = X.copy()
+    holed.iloc[rows, [X.columns.get_loc(column) for column in columns]] = np.nan
+    return holed
+
+
+# What residuals are
+
+
+# What they are for
+
+
+# Frames, models and scikit-learn's machinery
+
+
+# Missing values
+
+
+TREES = HistGradientBoostingRegressor(max_iter=5)
+
+
+# Lags and gaps
+
+
+def hourly(n_rows=120):
+    """Frequencies that follow the temperature of now and of two hours ago."""
+    hours = pd.date_range("2025-01-01", periods=n_rows, freq="h")
+    T1 = pd.Series(np.random.default_rng(0).normal(10, 5, n_rows), hours)
+    return pd.DataFrame({"T1": T1, "f1": 4 - 0.01 * T1 - 0.02 * T1.shift(2).fillna(0)}).iloc[2:]
+
+
+LAGGED = make_pipeline(LagFeatures([0, 2], freq="1h", tolerance="0h", padding="nan"), LinearRegression())
+
+
+# Units, missing values by number, names
+
+
+# Errors
+
+
+@pytest.mark.parametrize(
+    ("cv", "same"), [(None, KFold(5)), (4, KFold(4)), (KFold(3, shuffle=True, random_state=0),) * 2], ids=str
+)
+def test_fit_transform_is_cross_val_predict_and_then_a_fit_on_all_rows(cv, same):
+    fitted = compensator(cv=cv)
+    residuals = fitted.fit_transform(X)
+    np.testing.assert_array_equal(residuals, F - cross_val_predict(KNeighborsRegressor(3), T, F, cv=same))
+    pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X).transform(X))
+
+
+def test_lags_within_go_by_time():
+    lagged = make_pipeline(LagFeatures(3), LinearRegression())
+    order = np.random.default_rng(0).permutation(len(X))
+    expected = compensator(lagged).fit(X).transform(X)
+    shuffled = compensator(lagged).fit(X.iloc[order]).transform(X.iloc[order])
+    np.testing.assert_allclose(shuffled.loc[X.index], expected, rtol=0, atol=1e-9)
+    assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
+
+
+@pytest.mark.parametrize(
+    "wrap", [lambda fem: fem, lambda fem: make_pipeline(StandardScaler(), fem)], ids=["bare", "pipe"]
+)
+def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(wrap):
+    holed = with_gaps(["f1"], [20, 21, 130])
+    estimator = wrap(chain(make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression()))))
+    for data, temperatures, frequencies in (
+        (holed, holed[T.columns], holed[MODES]),
+        (holed.to_numpy(), T.to_numpy(), holed[MODES].to_numpy()),
+    ):
+        fitted = compensator(estimator, targets=POSITIONS, cv=4).fit(data)
+        expected = frequencies - clone(estimator).fit(temperatures, frequencies).predict(temperatures)
+        np.testing.assert_allclose(fitted.transform(data), expected, rtol=0, atol=1e-8)
+        residuals = np.asarray(fitted.fit_transform(data))
+        np.testing.assert_array_equal(np.argwhere(np.isnan(residuals)), [[20, 0], [21, 0], [130, 0]])
+
+
+def test_a_missing_target_is_missing_in_its_own_residual_only_and_its_row_does_not_train():
+    holed, kept = with_gaps(["f2"], [3, 50]), np.delete(np.arange(len(X)), [3, 50])
+    fitted = compensator().fit(holed)
+    residuals = fitted.transform(holed)
+    np.testing.assert_array_equal(np.argwhere(residuals.isna()), [[3, 1], [50, 1]])
+    pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X.iloc[kept]).transform(X))
+    np.testing.assert_array_equal(np.argwhere(fitted.fit_transform(holed).isna()), [[3, 1], [50, 1]])
+
+
+@pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
+def test_a_missing_temperature_makes_the_row_missing_where_the_estimator_takes_none(data):
+    holed, kept = with_gaps(["T1"], [0, 7]), np.delete(np.arange(len(X)), [0, 7])
+    fitted = compensator(targets=POSITIONS).fit(data(holed))
+    for residuals in (fitted.transform(data(holed)), fitted.fit_transform(data(holed))):
+        expected = np.zeros((len(X), len(MODES)), dtype=bool)
+        expected[[0, 7]] = True
+        np.testing.assert_array_equal(np.isnan(np.asarray(residuals)), expected)
+    complete = compensator(targets=POSITIONS).fit(data(X.iloc[kept]))
+    np.testing.assert_array_equal(fitted.transform(data(X)), complete.transform(data(X)))
+
+
+def test_a_fold_without_a_complete_row_is_missing():
+    residuals = compensator().fit_transform(with_gaps(["T2"], slice(40, 80)))
+    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().all(axis=1)), np.arange(40, 80))
+    assert residuals.drop(index=residuals.index[40:80]).notna().all(axis=None)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        RandomForestRegressor(5, random_state=0),
+        MultiOutputRegressor(TREES),
+        GridSearchCV(RandomForestRegressor(random_state=0), {"n_estimators": [2, 3]}, cv=2),
+        make_pipeline(StandardScaler(), MultiOutputRegressor(TREES)),
+        make_pipeline("passthrough", SimpleImputer(), Ridge()),
+        make_pipeline(StandardScaler(), KNNGapImputer(), PolynomialFeatures(2), LinearRegression()),
+        TransformedTargetRegressor(make_pipeline(SimpleImputer(), Ridge()), transformer=StandardScaler()),
+    ],
+    ids=lambda estimator: type(estimator[-1] if hasattr(estimator, "steps") else estimator).__name__,
+)
+def test_estimators_that_take_or_fill_missing_temperatures_get_them(estimator):
+    holed = with_gaps(["T1"], [0, 7])
+    fitted = compensator(estimator).fit(holed)
+    expected = clone(estimator).fit(holed[T.columns], F).predict(holed[T.columns])
+    # memory may be laid out otherwise, and then linear algebra rounds otherwise
+    np.testing.assert_allclose(fitted.transform(holed), F - expected, rtol=0, atol=1e-9)
+    assert fitted.fit_transform(holed).notna().all(axis=None)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        make_pipeline(StandardScaler(), Ridge()),
+        make_pipeline(PolynomialFeatures(2), SimpleImputer(), Ridge()),
+        TransformedTargetRegressor(transformer=StandardScaler()),
+    ],
+    ids=["scaled", "imputed too late", "default regressor"],
+)
+def test_nothing_missing_reaches_an_estimator_that_takes_none(estimator):
+    residuals = compensator(estimator).fit_transform(with_gaps(["T1"], [0, 7]))
+    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [0, 7])
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        LAGGED,
+        make_pipeline(StandardScaler().set_output(transform="pandas"), *LAGGED),
+        make_pipeline(ColumnTransformer([("lags", LAGGED[0], ["T1"])]), LinearRegression()),
+        make_pipeline(LAGGED[0], PolynomialFeatures(1), LinearRegression()),
+        make_pipeline(LAGGED[0], TemperatureMapper(LinearRegression())),
+    ],
+    ids=["lags", "scaled", "by column", "polynomial", "mapper"],
+)
+def test_what_a_lag_does_not_find_is_missing_and_does_not_train(estimator):
+    records = hourly()
+    if isinstance(estimator[-1], TemperatureMapper):
+        records["f1"] = np.exp(records["f1"])  # it learns logarithms
+    gappy = records.drop(records.index[40:50])
+    gappy.iloc[70, 0] = np.nan
+    residuals = compensator(estimator, targets=["f1"]).fit(gappy).transform(gappy)
+    np.testing.assert_array_equal(np.flatnonzero(residuals["f1"].isna()), [0, 1, 40, 41, 70, 72])
+    np.testing.assert_allclose(residuals.dropna(), 0, atol=1e-9)
+    in_folds = compensator(estimator, targets=["f1"]).fit_transform(gappy)
+    assert in_folds["f1"].notna().sum() > 100
+    np.testing.assert_allclose(in_folds.dropna(), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
+def test_rows_without_a_target_still_are_the_history_of_lags(data):
+    records = hourly()
+    holed = records.copy()
+    holed.iloc[10:20, 1] = np.nan
+    estimator = make_pipeline(LagFeatures([0, 2], padding="nan"), LinearRegression())
+    residuals = np.asarray(compensator(estimator, targets=[1]).fit(data(holed)).transform(data(holed)))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(residuals)), [0, 1, *range(10, 20)])
+    np.testing.assert_allclose(residuals[~np.isnan(residuals)], 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["fit", "fit_transform"])
+def test_kelvin_and_numbers_for_missing_values_are_warned_of_at_the_users_line(method):
+    kelvin, marked = X.copy(), X.copy()
+    kelvin["T2"] += 273.15
+    marked.iloc[5:8, 0] = -999
+    with pytest.warns(UserWarning, match="temperature column 'T2' lies between .* kelvin.*Celsius") as caught:
+        getattr(compensator(), method)(kelvin)
+    assert [warning.filename for warning in caught] == [__file__]
+    with pytest.warns(UserWarning, match="temperature column 'T1' is -999 in 3 of 200 rows; expected .* NaN where"):
+        compensator().fit(X).transform(marked)
+
+
+@pytest.mark.parametrize(
+    ("cv", "message"),
+    [
+        (TimeSeriesSplit(4), r"tests row 0 0 times \(40 of 200 rows not exactly once\); expected a partition"),
+        (ShuffleSplit(3, random_state=0), r"cv is ShuffleSplit\(.*expected a partition of the rows"),
+        ([], "cv is .., which tests row 0 0 times"),
+        (201, "n_splits=201 greater than the number of samples: n_samples=200"),
+        (1, "'cv' parameter"),
+        ("five", "'cv' parameter"),
+    ],
+    ids=str,
+)
+def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
+    with pytest.raises(ValueError, match=message):
+        compensator(cv=cv).fit_transform(X)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "holed", "message"),
+    [
+        (Ridge(), with_gaps(["T1"], slice(None)), "every value for Ridge"),
+        (Ridge(), with_gaps(["f1"], slice(1, None)), "every value for Ridge"),
+        (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "every target for RandomForestRegressor"),
+    ],
+    ids=["temperatures", "targets of a fold", "targets"],
+)
+def test_no_row_to_learn_from_is_said(estimator, holed, message):
+    with pytest.raises(ValueError, match=f"none of [0-9]+ rows to learn from is complete; expected .* {message}"):
+        compensator(estimator).fit_transform(holed)

@@ -1,0 +1,221 @@
+"""Damaged and doubtful files of exported models."""
+
+import warnings
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from skthermo.fem import AffineModel, load_affine
+
+N = 6
+
+
+def spring(i, j, k):
+    """A spring between two masses of a row, or (i = j) to the ground."""
+    matrix = np.zeros((N, N))
+    matrix[i, i] += k
+    if i != j:
+        matrix[j, j] += k
+        matrix[i, j] = matrix[j, i] = -k
+    return matrix
+
+
+TERMS = {
+    "E_2": sum(spring(i, i + 1, 1000.0 * (i + 1)) for i in range(3)),
+    "E_10": sum(spring(i, i + 1, 3000.0) for i in range(2, 5)),
+    "k_base": spring(0, 0, 1500.5) + spring(5, 5, 1 / 3),
+}
+TOTAL = sum(TERMS.values())
+M = np.diag([1.0, 2.0, 0.0, 1.5, 0.0, 1.0])
+MATRICES = {"K0": TOTAL} | TERMS | {"M0": M}
+RNG = np.random.default_rng(0)
+
+
+def write_mat(folder, matrices, *, sparse=False, compressed=True):
+    form = scipy.sparse.csc_array if sparse else np.asarray
+    fields = {name: form(m) if np.shape(m) == (N, N) else m for name, m in matrices.items()}
+    scipy.io.savemat(folder / "model.mat", fields, do_compression=compressed)
+    return folder / "model.mat"
+
+
+def write_npz(folder, matrices):
+    np.savez(folder / "model.npz", **matrices)
+    return folder / "model.npz"
+
+
+def write_mtx(folder, matrices, *, sparse=False):
+    for name, matrix in matrices.items():
+        scipy.io.mmwrite(folder / f"{name}.mtx", scipy.sparse.coo_array(matrix) if sparse else np.asarray(matrix))
+    return folder
+
+
+def write_folder_of_npz(folder, matrices):
+    for i, (name, matrix) in enumerate(matrices.items()):
+        form = [scipy.sparse.csr_array, scipy.sparse.coo_array, scipy.sparse.bsr_array][i % 3]
+        scipy.sparse.save_npz(folder / f"{name}.npz", form(matrix))
+    return folder
+
+
+WRITERS = {
+    "mat": write_mat,
+    "mat sparse": lambda *a: write_mat(*a, sparse=True),
+    "mat sparse, not compressed": lambda *a: write_mat(*a, sparse=True, compressed=False),
+    "npz": write_npz,
+    "mtx": write_mtx,
+    "mtx sparse": lambda *a: write_mtx(*a, sparse=True),
+    "folder of npz": write_folder_of_npz,
+}
+
+
+def assert_same(model, expected):
+    """Equal matrices wherever theta is, the order of parameters apart."""
+    assert set(model.parameter_names) == set(expected.parameter_names)
+    for _ in range(3):
+        theta = dict(zip(expected.parameter_names, RNG.uniform(0.7, 1.3, 9), strict=False))
+        ours, theirs = (one.matrices([theta[name] for name in one.parameter_names]) for one in (model, expected))
+        for got, wanted in zip(ours, theirs, strict=True):
+            np.testing.assert_allclose(got.toarray(), wanted.toarray(), rtol=1e-12, atol=1e-9)
+
+
+EXPECTED = AffineModel({(name,): matrix for name, matrix in TERMS.items()}, M, n_modes=4)
+
+
+def outcome(path, n_modes=4):
+    """The model, or what the error says."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return load_affine(path, n_modes=n_modes)
+        except ValueError as error:
+            return str(error)
+
+
+FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture
+def intact(tmp_path, form):
+    """A model's path, the file that holds its total, and what is in that."""
+    path = WRITERS[form](tmp_path, MATRICES)
+    file = path if path.is_file() else next(path.glob("K0.*"))
+    return path, file, file.read_bytes()
+
+
+def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
+    rest = spring(3, 3, 500.0)
+    expected = AffineModel([((name,), matrix) for name, matrix in TERMS.items()] + [((), rest)], M, n_modes=4)
+    file = write_mat(tmp_path, MATRICES | {"K0": TOTAL + rest}, sparse=True)
+    with pytest.warns(UserWarning, match=r"model\.mat: 'K0' is more than the sum of \['E_2', 'E_10', 'k_base'\]"):
+        assert_same(load_affine(file, n_modes=4), expected)
+    assert_same(load_affine(file, n_modes=4, total="K0"), expected)
+    some = load_affine(file, stiffness=["E_2", "k_base"], total="K0", n_modes=4)
+    assert_same(
+        some,
+        AffineModel({("E_2",): TERMS["E_2"], ("k_base",): TERMS["k_base"], (): rest + TERMS["E_10"]}, M, n_modes=4),
+    )
+
+
+def test_a_total_that_is_none_is_said_so(tmp_path):
+    constant = spring(0, 0, 100.0)
+    file = write_npz(tmp_path, MATRICES | {"K0": constant})
+    with pytest.raises(ValueError, match=r"'K0' is .*less than the sum of .*total=False if none is the total"):
+        load_affine(file, stiffness=list(TERMS))
+    assert_same(load_affine(file, stiffness=list(TERMS), total=False, n_modes=4), EXPECTED)
+    everything = load_affine(file, total=False, n_modes=4)
+    assert everything.parameter_names == ("K0", *TERMS)
+
+
+def test_a_constant_part_called_k0_is_refused_until_it_is_named(tmp_path):
+    constant = spring(0, 0, 100.0)
+    file = write_npz(tmp_path, MATRICES | {"K0": constant})
+    with pytest.raises(ValueError, match=r"model\.npz: 'K0' is .*less than the sum of .*expected a total"):
+        load_affine(file)
+    keys = {"K0": (), "E_2": "E", "E_10": ("E", "A"), "k_base": "k"}
+    model = load_affine(file, stiffness=keys, parameter_names=["k", "E", "A"], n_modes=4)
+    terms = {(): constant, ("E",): TERMS["E_2"], ("E", "A"): TERMS["E_10"], ("k",): TERMS["k_base"]}
+    assert model.parameter_names == ("k", "E", "A")
+    assert_same(model, AffineModel(terms, M, n_modes=4, parameter_names=["k", "E", "A"]))
+
+
+def test_matrices_may_share_a_parameter_and_damage_groups_cut_through_it(tmp_path):
+    file = write_npz(tmp_path, MATRICES)
+    keys = {"E_2": "E", "E_10": "E", "k_base": "k"}
+    model = load_affine(file, stiffness=keys, groups={"left": [0], "base": [("k",)]}, n_modes=4)
+    assert model.parameter_names == ("E", "k")
+    damaged = model.damaged({"left": 0.4}).frequencies([[1.0, 1.0]])
+    np.testing.assert_allclose(damaged, EXPECTED.damaged({"E_2": 0.4}).frequencies([[1.0] * 3]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "matrix", "what"),
+    [
+        ("M1", M / 2, "0.5 times the mass 'M'"),
+        ("C", 0.02 * TOTAL, r"0.02 times the sum of \['E_2', 'E_10', 'k_base'\]"),
+    ],
+)
+@pytest.mark.parametrize("form", ["mat sparse", "npz"])
+def test_a_term_that_looks_like_mass_or_damping_is_said(tmp_path, form, name, matrix, what):
+    file = WRITERS[form](tmp_path, TERMS | {name: matrix, "M": M})
+    with pytest.warns(UserWarning, match=rf"model\..*'{name}' is {what}.*stiffness=\[\.\.\.\]"):
+        model = load_affine(file, n_modes=4)
+    assert model.parameter_names == (*TERMS, name)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_complex_matrices_are_real_or_refused(tmp_path, form):
+    file = WRITERS[form](tmp_path, MATRICES | {"E_2": TERMS["E_2"].astype(complex)})
+    assert_same(load_affine(file, n_modes=4), EXPECTED)
+    WRITERS[form](tmp_path, MATRICES | {"hysteretic": 0.1j * TOTAL})
+    with pytest.raises(ValueError, match=r"variable 'hysteretic' is not a matrix of real .*imaginary part is not zero"):
+        load_affine(file, n_modes=4)
+    assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the first line is ''"),
+        ("%%MatrixMarket matrix array real\n", "expected '%%MatrixMarket matrix"),
+        ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "expected array or coordinate, real"),
+        ("%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n", "would take .* MB of memory; exp"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n", "3 numbers; expected 9999"),
+        ("%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n1 1 5.0\n", "entries on its diagonal; exp"),
+        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n", "3 numbers; expected 4"),
+        ("%%MatrixMarket matrix array real symmetric\n9999999 9999999\n1\n2\n3\n", "3 numbers; expected"),
+        ("%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n", "the size is"),
+        ("%%MatrixMarket matrix array real general\n\n", "the size is"),
+        ("%%MatrixMarket matrix array real general\n1 1\n1.0x\n", "1.0x"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 3 5.0\n", r"outside 1 to \[2, 2\]"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 0 5.0\n", "outside 1 to"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "5 numbers; expected 2 times"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 5.0\n2 1 5.0\n", "both sides of its diagonal"),
+    ],
+)
+def test_bad_matrix_market_files_are_refused(tmp_path, text, message):
+    write_mtx(tmp_path, MATRICES)
+    (tmp_path / "E_2.mtx").write_text(text)
+    with pytest.raises(ValueError, match=rf"E_2\.mtx: not readable as Matrix Market .*{message}"):
+        load_affine(tmp_path)
+
+
+@FUZZ
+@given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())
+@pytest.mark.parametrize("form", ["npz", "mtx", "mtx sparse", "folder of npz"])
+def test_damaged_files_are_named_or_their_damage_is_harmless(intact, form, position, bit, cut):
+    path, file, content = intact
+    content = bytearray(content)
+    if cut:
+        content = content[: position % len(content)]
+    else:
+        content[position % len(content)] ^= 1 << bit
+    file.write_bytes(content)
+    result = outcome(path)
+    if isinstance(result, str):
+        assert file.name in result or path.name in result
+    elif "npz" in form:  # whose checksums leave no number wrong
+        assert_same(result, EXPECTED)

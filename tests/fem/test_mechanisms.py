@@ -1,0 +1,31 @@
+"""A mechanism is told from a fine mesh."""
+
+import numpy as np
+import pytest
+
+from skthermo.fem import Beam, Structure
+
+
+def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
+    """A line of beams, 10 m long."""
+    section = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
+    along = np.array(direction) / np.linalg.norm(direction)
+    nodes = {i: tuple(along * 10 * i / n_beams) for i in range(n_beams + 1)}
+    beams = {f"beam {i}": Beam(i, i + 1, **section) for i in range(n_beams)}
+    return Structure(nodes, beams, supports, {"all": list(beams)}).assemble(["all"], n_modes=2)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+def test_a_fine_mesh_is_no_mechanism(direction):
+    exact = 1.875104068711961**2 / (2 * np.pi) * np.sqrt(210e9 * 1e-5 / (7850 * 0.02)) / 10**2
+    frequencies = cantilever(2000, {0: "xyz rx ry rz"}, direction=direction).frequencies([[1.0]])
+    np.testing.assert_allclose(frequencies[0, 0], exact, rtol=2e-3)
+
+
+@pytest.mark.parametrize("n_beams", [5, 40, 400, 2000])
+@pytest.mark.parametrize("supports", [{}, {0: "xyz"}, {0: "xyz", -1: "xyz"}])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+def test_a_mechanism_is_one_in_every_mesh(n_beams, supports, direction):
+    ends = {n_beams if node < 0 else node: along for node, along in supports.items()}
+    with pytest.raises(ValueError, match="the structure is a mechanism"):
+        cantilever(n_beams, ends, direction=direction)

@@ -1,0 +1,158 @@
+"""The chain in searches, worker processes and pipelines."""
+
+import warnings
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from joblib.externals.loky import get_reusable_executor
+from sklearn.base import clone
+from sklearn.ensemble import ExtraTreesRegressor
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.fem import AffineModel
+from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+# A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+
+
+def inverse(**options):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
+
+
+def mapper(lags=2):
+    return make_pipeline(LagFeatures(lags), TemperatureMapper(LinearRegression()))
+
+
+def chain(**options):
+    defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
+    return DataInformedFEM(TRUSS, **(defaults | options))
+
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    FITTED = chain().fit(T, F)
+
+
+LOGGED_MODEL = """
+import time
+import numpy as np
+
+class Logged:
+    parameter_names = ("k",)
+    n_modes = 1
+
+    def __init__(self, log):
+        self.log = log
+
+    def frequencies(self, theta):
+        time.sleep(0.3 * (len(theta) == 77))  # long enough for the other process to come along
+        with open(self.log, "a") as file:
+            file.write(f"{len(theta)}\\n")
+        return np.sqrt(theta)
+"""
+
+
+def test_simulated_noise_is_relative_and_seeded():
+    noisy = [FITTED.simulate(T, noise=0.01, random_state=0) for _ in range(2)]
+    pd.testing.assert_frame_equal(*noisy)
+    assert np.std(noisy[0].to_numpy() / FITTED.predict(T).to_numpy() - 1) == pytest.approx(0.01, rel=0.1)
+
+
+def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
+    grid = {"mapper__lagfeatures__lags": [1, 2], "inverse__noise": [0.0, 0.01]}
+    searches = [
+        GridSearchCV(chain(inverse=inverse(memory=str(tmp_path))), grid, cv=KFold(3), n_jobs=n_jobs).fit(T, F)
+        for n_jobs in (1, 2)
+    ]
+    np.testing.assert_array_equal(*(search.cv_results_["mean_test_score"] for search in searches))
+    np.testing.assert_array_equal(*(search.predict(T) for search in searches))
+
+
+def test_processes_that_search_together_simulate_once(tmp_path, monkeypatch):
+    (tmp_path / "logged_model.py").write_text(LOGGED_MODEL.replace("\\\\n", "\\n"))
+    monkeypatch.syspath_prepend(tmp_path)
+    get_reusable_executor().shutdown()  # its workers do not know the new path
+    from logged_model import Logged
+
+    model = Logged(tmp_path / "solved.txt")
+    air = np.linspace(0, 30, 60)[:, np.newaxis]
+    measured = np.sqrt(1 - 0.005 * air)
+    simulated = InverseSurrogate(model, LinearRegression(), n_samples=77, memory=str(tmp_path / "memory"))
+    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
+    search = GridSearchCV(estimator, {"inverse__noise": [0.0, 0.001, 0.002, 0.003]}, cv=KFold(3), n_jobs=2)
+    search.fit(air, measured)
+    solved = model.log.read_text().split()
+    assert solved.count("77") == 1
+    assert len(solved) > 12  # predictions go through the model too
+
+
+def test_large_models_are_recognised_in_worker_processes(tmp_path):
+    n = 380
+    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
+    model = AffineModel({("k",): chain_of_springs}, np.eye(n), n_modes=1)
+    air = np.linspace(0, 30, 24)[:, np.newaxis]
+    measured = model.frequencies(1 - 0.005 * air)
+    simulated = InverseSurrogate(model, LinearRegression(), n_samples=20, memory=str(tmp_path))
+    estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
+    for n_jobs in (1, 2):
+        cross_val_score(estimator, air, measured, cv=2, n_jobs=n_jobs)
+    assert len(list(tmp_path.rglob("output.pkl"))) == 1
+
+
+def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
+    trees = ExtraTreesRegressor(3)
+    parts = {
+        "inverse": InverseSurrogate(TRUSS, trees, bounds=0.2, n_samples=50, random_state=1),
+        "mapper": TemperatureMapper(trees, random_state=2),
+    }
+    first, second = (chain(**parts, random_state=seed).fit(T, F).predict(T) for seed in (0, 9))
+    pd.testing.assert_frame_equal(first, second)
+
+
+def test_same_seed_same_bits():
+    model = DataInformedFEM(TRUSS, inverse=InverseSurrogate(bounds=0.2, noise=0.01, n_samples=300), random_state=0)
+    alone = clone(model).fit(T, F).predict(T)
+    with joblib.parallel_config("loky"):
+        for _ in range(2):
+            spread = clone(model).set_params(inverse__n_jobs=2).fit(T, F).predict(T)
+            np.testing.assert_array_equal(spread, alone)
+    other = clone(model).set_params(random_state=1).fit(T, F).predict(T)
+    assert not np.array_equal(other, alone)
+
+
+def test_seed_fills_only_what_has_none():
+    seeded = DataInformedFEM(TRUSS, inverse=inverse(), random_state=0).fit(T, F)
+    assert seeded.inverse_.random_state == 3
+    assert isinstance(seeded.mapper_.random_state, int)
+    assert seeded.mapper is None
+
+
+def test_large_models_work_in_worker_processes():
+    """Matrices above 1 MB reach workers as read-only memory maps."""
+    n = 380
+    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
+    model = AffineModel({("k",): 1e4 * chain_of_springs, ("g",): np.eye(n)}, np.eye(n), n_modes=2)
+    warm = pd.DataFrame({"T": np.linspace(0, 30, 40)})
+    measured = model.frequencies(np.column_stack([1 - 0.005 * warm["T"], 1 + 0 * warm["T"]]))
+    estimator = DataInformedFEM(
+        model,
+        inverse=InverseSurrogate(regressor=LinearRegression(), n_samples=30, bounds=0.2),
+        mapper=TemperatureMapper(LinearRegression()),
+        random_state=0,
+    )
+    alone, spread = (cross_val_predict(estimator, warm, measured, cv=2, n_jobs=n_jobs) for n_jobs in (1, 2))
+    np.testing.assert_array_equal(spread, alone)
+    np.testing.assert_allclose(alone, measured, rtol=0.02)
