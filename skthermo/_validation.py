@@ -43,7 +43,9 @@ __all__ = [
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data`; what is masked or missing in X is NaN."""
+    """scikit-learn's `validate_data`; what is masked or missing in X is NaN, and names of columns are different."""
+    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
+        raise ValueError(f"X has the columns {list(X.columns)}; expected each name once")
     with numbers_expected():
         return sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
 

@@ -619,6 +619,7 @@ DETECTION = [
     ("-999", lambda: compensator().fit(changed(BOTH, 0, 0, -999.0)), "warning", "-999 in 1 of 365"),
     ("kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "warning", "kelvin"),
     ("other columns later", lambda: COMPENSATOR.transform(BOTH.iloc[:, ::-1]), "error", "feature names"),
+    ("names twice", lambda: MahalanobisDetector().fit(F.iloc[:, [0, 0]]), "error", "expected each name once"),
     ("gaps in every row", lambda: compensator().fit(HOLES.join(F)), "error", "0 of 365|complete|row"),
     (
         "masked modes",
@@ -931,6 +932,12 @@ SURROGATE = [
         lambda: chain(ONE_MODE).fit(T, F[["f1"]]).simulate(T, damage={"k": 0.1}),
         "error",
         "no method 'damaged'",
+    ),
+    (
+        "a sensor twice",
+        lambda: chain().fit(T.iloc[:, [0, 0, 1]], F),
+        "error",
+        r"\['T1', 'T1', 'T2'\]; expected each name once",
     ),
     ("1.5 times too high", lambda: chain().fit(T, F * 1.5), "warning", r"differ from the model's.*\+5\d %"),
     (
