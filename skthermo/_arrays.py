@@ -36,12 +36,12 @@ def real_array(values: Any, what: str) -> Array:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
-    if np.iscomplexobj(values):
-        raise ValueError(f"{what} is complex; expected real numbers")
     try:
-        return as_floats(values)
+        if not np.iscomplexobj(values):
+            return as_floats(values)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
+    raise ValueError(f"{what} is complex; expected real numbers")
 
 
 def as_floats(values: Any) -> Array:

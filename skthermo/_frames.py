@@ -9,9 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import as_floats
 from skthermo._validation import _num_samples
+from skthermo._warnings import warn_user
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
+MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers by which loggers say that a value is missing
 
 
 def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
@@ -76,6 +78,19 @@ def check_temperatures(T: ArrayLike) -> None:
                 f"temperature column {name!r} is {values[marker][0]:g} in {counts[marker][0]} of {len(column)} rows; "
                 "expected degrees Celsius, and NaN where a value is missing"
             )
+
+
+def warn_of_markers(X: ArrayLike) -> None:
+    """Warn of numbers that stand for a missing value, such as -999, wherever columns may hold anything else."""
+    values = as_floats(X)
+    marked = np.isin(values, MARKERS)
+    if marked.any():
+        row, column = np.argwhere(marked)[0]
+        warn_user(
+            f"{marked.sum()} of {marked.size} values look as if they stood for missing ones, the first "
+            f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
+            "markers",
+        )
 
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:

@@ -1,5 +1,7 @@
 """The one import point for scikit-learn's private helpers; FE models and seeds inside estimators."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -29,8 +31,10 @@ __all__ = [
     "_num_samples",
     "check_array",
     "check_is_fitted",
+    "check_model",
     "clone_sharing_models",
     "is_model",
+    "numbers_expected",
     "seed_parts",
     "seeded",
     "validate_data",
@@ -39,13 +43,30 @@ __all__ = [
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data`; what is masked or missing in X is NaN."""
-    return sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
+    """scikit-learn's `validate_data`; what is masked or missing in X is NaN, and names of columns are different."""
+    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
+        raise ValueError(f"X has the columns {list(X.columns)}; expected each name once")
+    with numbers_expected():
+        return sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
 
 
 def check_array(values: Any, **options: Any) -> Any:
     """scikit-learn's `check_array`; what is masked or missing is NaN."""
-    return sklearn.utils.check_array(with_nan(values), **options)
+    with numbers_expected():
+        return sklearn.utils.check_array(with_nan(values), **options)
+
+
+@contextmanager
+def numbers_expected() -> Iterator[None]:
+    """Say in plain words that a table holds text or complex numbers, where NumPy fails to convert them."""
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        text, is_complex = str(error), "'complex'" in str(error)
+        if not (is_complex or text.startswith("could not convert string")):
+            raise
+        what = "complex numbers" if is_complex else f"text: {text.partition(': ')[2]}"
+        raise ValueError(f"X holds {what}; expected numbers") from error
 
 
 def with_nan(X: Any) -> Any:
@@ -61,6 +82,18 @@ def is_model(candidate: Any) -> bool:
     """Whether an object is an FE model, judged by what it can do."""
     wanted = ("parameter_names", "n_modes", "frequencies")
     return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in wanted)
+
+
+def check_model(candidate: Any) -> None:
+    """Refuse what is no FE model.
+
+    Raises
+    ------
+    ValueError
+        Says what was given.
+    """
+    if not is_model(candidate):
+        raise ValueError(f"model is {candidate!r:.200}; expected parameter_names, n_modes and frequencies")
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:

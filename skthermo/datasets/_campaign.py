@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.utils import Bunch, check_random_state
+from sklearn.utils import Bunch
 
-from skthermo._arrays import positive_integer
+from skthermo._arrays import as_random_state, positive_integer, real_array
 from skthermo.datasets._truss import PARAMETERS, ZONES, truss_structure
 from skthermo.fem import add_noise
 
@@ -15,6 +15,7 @@ SEASON = np.array([[15, 15], [15, 20], [17, 25]])  # mean and amplitude in C, eq
 DAILY = np.array([20, 16, 20])
 SCATTER = np.array([3, 2, 8])
 PHASE = np.array([0, 0, np.pi / 6])
+KELVIN = 150.0  # no structure is as hot in degrees Celsius
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
@@ -32,6 +33,11 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     ndarray
         Dimensionless, of the same shape.
 
+    Raises
+    ------
+    ValueError
+        If temperatures are not numbers, or all above 150 C, as kelvin are.
+
     References
     ----------
     Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
@@ -42,7 +48,9 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     >>> steel_modulus([-10.0, 20.0, 40.0]).round(4)
     array([1.1658, 1.    , 0.933 ])
     """
-    celsius = np.asarray(temperature, dtype=float)
+    celsius = real_array(temperature, "temperature")
+    if celsius.size and (celsius > KELVIN).all():
+        raise ValueError(f"temperature is {celsius.min():g} or more, kelvin? expected degrees Celsius")
     return 1 - (celsius - 20) / 200 * np.exp(-0.01 * celsius)
 
 
@@ -107,7 +115,7 @@ def make_truss_campaign(
     n_years = positive_integer(n_years, "n_years")
     samples_per_year = positive_integer(samples_per_year, "samples_per_year")
     samples_per_day = positive_integer(samples_per_day, "samples_per_day")
-    random = check_random_state(random_state)
+    random = as_random_state(random_state)
     index = pd.date_range(
         "2025-01-01", periods=n_years * samples_per_year, freq=pd.Timedelta(days=1) / samples_per_day, name="time"
     )

@@ -125,7 +125,7 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
     elif isinstance(parameters, str):
         names = tuple(PARAMETERS) if parameters == "all" else (parameters,)
     else:
-        names = tuple(parameters)
+        names = tuple(parameters) if isinstance(parameters, Collection) else ()
     if not names or len(set(names)) < len(names) or not set(names) <= set(PARAMETERS):
         raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(PARAMETERS)}")
     return kw51_structure().assemble({name: PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OutlierMixin
 
 from skthermo._arrays import Array
+from skthermo._frames import frame_like, warn_of_markers
 from skthermo._validation import Interval, _fit_context, check_is_fitted, validate_data
 
 
@@ -51,8 +52,14 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         ------
         ValueError
             If fewer than two rows are complete, or the detector cannot learn from them.
+
+        Warns
+        -----
+        UserWarning
+            If there are numbers that stand for a missing value, such as -999.
         """
         F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
+        warn_of_markers(frame_like(X, F))
         complete = F[_is_complete(F)]
         if len(complete) < 2:
             raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")

@@ -33,7 +33,10 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     ...
     ValueError: dofs holds 23; expected 0 to 22, the model's degrees of freedom
     """
-    array = np.asarray(dofs)
+    try:
+        array = np.asarray(dofs)
+    except ValueError as error:  # rows of different length
+        raise ValueError(f"dofs is {dofs!r:.200}; expected integers in one row") from error
     if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
     outside = array[(array < 0) | (array >= n_dof)]

@@ -89,8 +89,8 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     Raises
     ------
     ValueError
-        If lengths differ, a severity is not finite or occurs twice, severities are not all positive or all
-        negative, or a probability is not between 0 and 1.
+        If lengths differ, a severity is not finite, is 1 or more or occurs twice, severities are not all positive
+        or all negative, or a probability is not between 0 and 1.
 
     Examples
     --------
@@ -110,6 +110,8 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
             f"severities are {s.tolist()}; expected all positive (damage) or all negative (strengthening), and not 0, "
             "which is the healthy structure"
         )
+    if (s >= 1).any():
+        raise ValueError(f"severities are {s.tolist()}; expected shares of the stiffness below 1, not percent")
     for name, values in (("pod", p), ("level", reliable_pod)):
         if ((values < 0) | (values > 1)).any():
             raise ValueError(f"{name} is {values.tolist()}; expected probabilities between 0 and 1, not percent")

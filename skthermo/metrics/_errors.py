@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
 from skthermo._arrays import as_columns, real_array
-from skthermo._frames import check_same_rows, column_names
+from skthermo._frames import MARKERS, check_same_rows, column_names
 
 AVERAGE = "Average"
 
@@ -34,7 +34,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     ------
     ValueError
         If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
-        one not positive.
+        one not positive, or a predicted one stands for a missing value, such as -999.
 
     Examples
     --------
@@ -67,7 +67,8 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     ------
     ValueError
         If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
-        one not positive; if there is not one scenario for each row, or one is called "Average".
+        one not positive, or a predicted one stands for a missing value, such as -999; if there is not one
+        scenario for each row, or one is called "Average".
 
     References
     ----------
@@ -152,7 +153,7 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     Raises
     ------
     ValueError
-        As in `mape`.
+        If the estimator is none that is fitted; as in `mape`.
 
     Examples
     --------
@@ -164,6 +165,8 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     >>> {name: round(score, 2) for name, score in scores.items()}
     {'neg_mape': -15.0, 'r2': -0.01, 'share_scored': 0.75}
     """
+    if isinstance(estimator, type) or not hasattr(estimator, "predict"):
+        raise ValueError(f"estimator is {estimator!r:.200}; expected a fitted estimator with a method predict")
     measured, predicted = _paired_frequencies(y, estimator.predict(X))
     complete = _complete(measured, predicted)
     return {
@@ -193,9 +196,10 @@ def _paired(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def _paired_frequencies(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same for frequencies: measured ones are positive."""
+    """The same for frequencies: measured ones are positive, and none stands for a missing value."""
     measured, predicted = _paired(y_true, y_pred)
     _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
+    _refuse(np.isin(predicted, MARKERS), y_pred, "y_pred", "a frequency, or NaN where it is missing")
     return measured, predicted
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 
 from skthermo._arrays import as_floats, real_array
-from skthermo._frames import check_columns, frame_like
+from skthermo._frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
     HasMethods,
     StrOptions,
@@ -87,9 +87,15 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         ValueError
             If a mode is NaN in every row, the reference has another number of modes, or, with
             ``method="scale"``, a mean or a reference is zero.
+
+        Warns
+        -----
+        UserWarning
+            If there are numbers that stand for a missing value, such as -999.
         """
         F = self._validated(X, reset=True)
         check_columns(frame_like(X, F), "frequency")
+        warn_of_markers(frame_like(X, F))
         self.mean_ = np.nanmean(F, axis=0)
         self.reference_ = self._read_reference(F.shape[1])
         if self.method == "scale":

@@ -7,13 +7,14 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
-from skthermo._frames import frame_like
+from skthermo._frames import frame_like, warn_of_markers
 from skthermo._validation import (
     _check_feature_names_in,
     _get_weights,
     _num_samples,
     check_array,
     check_is_fitted,
+    numbers_expected,
     validate_data,
     with_nan,
 )
@@ -126,9 +127,15 @@ class KNNGapImputer(KNNImputer):
         ------
         ValueError
             If a column has no value, unless ``keep_empty_features=True``.
+
+        Warns
+        -----
+        UserWarning
+            If there are numbers that stand for a missing value, such as -999, while ``missing_values`` is NaN.
         """
         X = with_nan(X)
-        super().fit(X, y)
+        with numbers_expected():
+            super().fit(X, y)
         kept = set(super().get_feature_names_out())
         self.is_empty_ = np.array([name not in kept for name in _check_feature_names_in(self, None)])
         if self.is_empty_.any() and not self.keep_empty_features:
@@ -139,7 +146,9 @@ class KNNGapImputer(KNNImputer):
             )
         self.donors_ = None
         if self.metric == "nan_euclidean" and isinstance(self.missing_values, float) and np.isnan(self.missing_values):
-            self.donors_ = Donors(check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True))
+            values = check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True)
+            warn_of_markers(frame_like(X, values))
+            self.donors_ = Donors(values)
         return self
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

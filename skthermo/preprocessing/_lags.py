@@ -279,6 +279,8 @@ def _rows_per_step(stamps: NDArray[np.int64], step: int) -> int | None:
 
 
 def _read_lags(lags: Any, n_rows: int) -> list[int]:
+    if isinstance(lags, bool | np.bool_):
+        raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     count = lags if isinstance(lags, Integral) else len(lags)
     if count > max(MAX_LAGS, n_rows):
         raise ValueError(

@@ -1,5 +1,7 @@
 """Which parameters measured modes can identify, and how accurately."""
 
+from numbers import Real
+
 import numpy as np
 import pandas as pd
 import scipy.linalg
@@ -9,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
 from skthermo._arrays import Array
+from skthermo._validation import check_model
 from skthermo.fem import FEModel, check_noise, shape_jacobian
 from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
@@ -63,8 +66,9 @@ def identifiability(
     Raises
     ------
     ValueError
-        If noise is negative or zero for some modes only, just one of ``dofs`` and ``shape_noise`` is given, dofs are
-        not different degrees of freedom of the model, or it has no method ``local_modes``.
+        If the model is none, noise is negative or zero for some modes only, just one of ``dofs`` and
+        ``shape_noise`` is given, dofs are not different degrees of freedom of the model, or it has no method
+        ``local_modes``.
 
     See Also
     --------
@@ -95,6 +99,7 @@ def identifiability(
     >>> known.recommended
     ['diagonal', 'bottom', 'top']
     """
+    check_model(model)
     names = list(model.parameter_names)
     S = sensitivity(model, theta, method="exact" if hasattr(model, "jacobian") else "central")
     deviations = check_noise(noise, model.n_modes)
@@ -124,7 +129,7 @@ def identifiability(
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
-    if shape_noise is None or not 0 < shape_noise < np.inf:
+    if not isinstance(shape_noise, Real) or not 0 < shape_noise < np.inf:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
 
 NO_INFORMATION = 1e-12
 """Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
@@ -23,6 +23,11 @@ def cramer_rao(information: ArrayLike) -> Array:
         Parameters that are not determined have infinite variances and NaN covariances. All NaN if the
         information has NaN.
 
+    Raises
+    ------
+    ValueError
+        If the information is not a symmetric matrix of numbers, or has a negative diagonal.
+
     Examples
     --------
     >>> from skthermo.updating import cramer_rao
@@ -30,10 +35,17 @@ def cramer_rao(information: ArrayLike) -> Array:
     array([[0.25,  nan],
            [ nan,  inf]])
     """
-    information = np.asarray(information, dtype=float)
+    information = real_array(information, "information")
+    if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
+        raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
     if not np.isfinite(information).all():
         return np.full_like(information, np.nan)
-    scale = np.sqrt(np.diagonal(information))
+    diagonal = np.diagonal(information)
+    if (diagonal < 0).any() or not np.allclose(information, information.T, rtol=1e-6, atol=1e-6 * diagonal.max()):
+        raise ValueError(
+            f"information is {information.tolist()!s:.200}; expected a symmetric matrix, none of its diagonal negative"
+        )
+    scale = np.sqrt(diagonal)
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     known = values > NO_INFORMATION * max(values[-1], np.finfo(float).tiny)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array, real_array
 from skthermo.fem import check_dofs
 
 
@@ -131,7 +131,7 @@ def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tu
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = real_shapes(array) if np.iscomplexobj(array) else as_floats(array)
+    array = real_shapes(array) if np.iscomplexobj(array) else real_array(shapes, "shapes")
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]
@@ -155,7 +155,7 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
 
 
 def _per_mode(values: ArrayLike, n_modes: int, what: str) -> Array:
-    array = as_floats(values)
+    array = real_array(values, what)
     if array.shape not in ((), (n_modes,)):
         raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
     return np.broadcast_to(array, (n_modes,)).copy()

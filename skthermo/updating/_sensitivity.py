@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
+from skthermo._validation import check_model
 from skthermo.fem import FEModel, check_theta, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
@@ -44,7 +45,7 @@ def sensitivity(
     Raises
     ------
     ValueError
-        If the model has no ``jacobian``, has no frequencies at theta, or method, theta or step is not valid.
+        If the model is none, has no ``jacobian``, has no frequencies at theta, or method, theta or step is not valid.
 
     See Also
     --------
@@ -112,7 +113,7 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
     Raises
     ------
     ValueError
-        If S is not a frame.
+        If S is not a frame of numbers, or the threshold not a number of zero or more.
 
     Examples
     --------
@@ -123,11 +124,15 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
     """
     if not isinstance(S, pd.DataFrame):
         raise ValueError(f"S is a {type(S).__name__}; expected a DataFrame whose columns are parameters")
-    return [*S.columns[(S.abs() >= threshold).any(axis=0)]]
+    values = real_array(S, "S")
+    if not isinstance(threshold, Real) or not 0 <= threshold < np.inf:
+        raise ValueError(f"threshold is {threshold!r}; expected a number of zero or more, such as 0.1")
+    return [*S.columns[(np.abs(values) >= threshold).any(axis=0)]]
 
 
 def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
     """One checked row of multipliers, all 1 by default."""
+    check_model(model)
     names = model.parameter_names
     return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
 

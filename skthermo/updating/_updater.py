@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import Array, Bounds, as_floats, by_parameter
+from skthermo._arrays import Array, Bounds, by_parameter, real_array
 from skthermo._frames import column_names
 from skthermo._validation import (
     HasMethods,
     Interval,
     StrOptions,
     _fit_context,
+    check_model,
     clone_sharing_models,
-    is_model,
     validate_data,
 )
 from skthermo.fem import FEModel, check_bounds
@@ -142,7 +142,7 @@ class ModelUpdater(BaseEstimator):
         "method": [StrOptions({"least_squares", "lbfgs"})],
         "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
         "max_iter": [Interval(Integral, 1, None, closed="left")],
-        "n_jobs": [Integral, None],
+        "n_jobs": [Interval(Integral, None, -1, closed="right"), Interval(Integral, 1, None, closed="left"), None],
         "random_state": ["random_state"],
     }
 
@@ -253,9 +253,8 @@ class ModelUpdater(BaseEstimator):
         return self
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
-        if not is_model(self.model):
-            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
-        table = F if isinstance(F, pd.DataFrame) else np.atleast_2d(as_floats(F))
+        check_model(self.model)
+        table = F if isinstance(F, pd.DataFrame) else np.atleast_2d(real_array(F, "F"))
         values = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan")
         n_modes = self.model.n_modes
         if values.shape[1] > n_modes or (shapes is None and values.shape[1] != n_modes):
@@ -285,7 +284,8 @@ class ModelUpdater(BaseEstimator):
         if self.prior is None:
             return None
         names = list(self.model.parameter_names)
-        prior = as_floats(by_parameter(self.prior, names, "prior") if isinstance(self.prior, dict) else self.prior)
+        given = by_parameter(self.prior, names, "prior") if isinstance(self.prior, dict) else self.prior
+        prior = real_array(given, "prior")
         if prior.shape not in ((), (len(names),)) or not ((prior > 0) & np.isfinite(prior)).all():
             raise ValueError(
                 f"prior is {prior}; expected relative standard deviations above 0, a number or one for each of {names}"

@@ -85,7 +85,9 @@ class ReducedModel(AffineBase):
         tol: float = 1e-5,
         random_state: RandomState = None,
     ):
-        if not 0 < tol < 1:
+        if not isinstance(full, AffineBase):
+            raise ValueError(f"full is {full!r:.200}; expected an AffineModel, or a ReducedModel")
+        if not isinstance(tol, int | float | np.floating) or not 0 < tol < 1:
             raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
         self._parameter_names, self._groups = full.parameter_names, full._groups
         self._full = full

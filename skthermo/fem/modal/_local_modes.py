@@ -80,6 +80,7 @@ class LocalModes:
         self._theta = theta
         self._solve = solve
         self._basis = basis
+        self._n_dof = len(shapes if basis is None else basis)
 
     def shapes(self, dofs: ArrayLike) -> Array:
         """Mode shapes at some degrees of freedom.
@@ -93,8 +94,13 @@ class LocalModes:
         -------
         ndarray of shape (n_dofs, n_candidates)
             Of unit modal mass.
+
+        Raises
+        ------
+        ValueError
+            If these are not different degrees of freedom of the model.
         """
-        return self._at_dofs(np.asarray(dofs, dtype=np.intp), self._shapes)
+        return self._at_dofs(check_dofs(dofs, self._n_dof), self._shapes)
 
     def derivatives(self, columns: ArrayLike, dofs: ArrayLike) -> tuple[Array, Array]:
         """Derivatives of some modes with respect to the parameters.
@@ -113,6 +119,11 @@ class LocalModes:
         d_shapes : ndarray of shape (n_dofs, n_columns, n_parameters)
             Derivatives of the shapes with unit modal mass.
 
+        Raises
+        ------
+        ValueError
+            If these are none of the modes, or not different degrees of freedom of the model.
+
         Notes
         -----
         With b = -(dK - lambda_j dM) phi_j, the derivative of phi_j is a sum of M-orthogonal parts:
@@ -120,7 +131,10 @@ class LocalModes:
         and a remainder, the solution of (K - lambda_j M) x = b beside these modes, found by iteration. Where
         eigenvalues repeat, the parts along each other's modes are left out.
         """
-        columns, dofs = np.asarray(columns, dtype=np.intp), np.asarray(dofs, dtype=np.intp)
+        columns = np.asarray(columns, dtype=np.intp)
+        if ((columns < 0) | (columns >= len(self._eigenvalues))).any():
+            raise ValueError(f"columns holds {columns.tolist()}; expected 0 to {len(self._eigenvalues) - 1}, the modes")
+        dofs = check_dofs(dofs, self._n_dof) if np.size(dofs) else np.empty(0, dtype=np.intp)
         stiffness, mass = self._stiffness, self._mass
         phi, eigenvalues = self._shapes[:, columns], self._eigenvalues[columns]
         forces = -stiffness.derivatives(self._theta, phi)

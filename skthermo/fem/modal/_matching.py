@@ -78,12 +78,16 @@ def match_modes(
         raise ValueError(f"{len(measured)} modes were measured; expected at most {len(candidates)}, as the model has")
     cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(FAR)) ** 2
     macs = None
-    if shapes is not None:
+    if shapes is not None and dofs is not None:
         if local is None:
             raise ValueError(f"{model!r} has no method 'local_modes'; expected one where shapes are given")
+        expected = (np.size(dofs), len(measured))
+        if np.shape(shapes) != expected:
+            raise ValueError(
+                f"shapes have shape {np.shape(shapes)}; expected {expected}: a row for each of dofs and a column for "
+                "each measured mode"
+            )
         macs = mac(np.asarray(shapes), local.shapes(dofs))
-        if len(macs) != len(measured):
-            raise ValueError(f"shapes have {len(macs)} columns; expected {len(measured)}, one for each measured mode")
         cost += 1 - macs
     ranks: NDArray[np.intp] = linear_sum_assignment(cost)[1]
     table = pd.DataFrame({"mode": ranks, "measured": measured, "model": candidates[ranks]}, index=names)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
-from skthermo.fem._protocol import ModalModel
+from skthermo.fem._protocol import ModalModel, check_model
 from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._mac import mac
 from skthermo.fem.modal._tracking import pair_modes
@@ -35,7 +35,8 @@ def share_reordered(model: ModalModel, theta: ArrayLike) -> float:
     Raises
     ------
     ValueError
-        If theta has the wrong width, or a value that is not finite and positive.
+        If the model is none or has no method ``modes``, or theta has no rows, the wrong width, or a value that is
+        not finite and positive.
 
     Examples
     --------
@@ -46,7 +47,12 @@ def share_reordered(model: ModalModel, theta: ArrayLike) -> float:
     >>> share_reordered(truss, drawn.theta)
     0.065
     """
+    check_model(model)
+    if not hasattr(model, "modes"):
+        raise ValueError(f"{model!r} has no method 'modes'; expected a model with one, such as AffineModel")
     rows = check_theta(theta, model.parameter_names)
+    if not len(rows):
+        raise ValueError(f"theta has shape {rows.shape}; expected at least one row")
     pieces = range(ROWS_AT_ONCE, len(rows), ROWS_AT_ONCE)
     return float(np.concatenate([_reordered(model, piece) for piece in np.split(rows, pieces)]).mean())
 

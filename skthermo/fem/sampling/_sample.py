@@ -79,7 +79,7 @@ def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.
     if method == "uniform":
         return random_state.uniform(size=(n_samples, n_parameters))
     engines = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}
-    if method not in engines:
+    if method not in list(engines):  # a method may be something that has no hash
         raise ValueError(f"method is {method!r}; expected one of {['uniform', *engines]}")
     generator = np.random.default_rng(random_state.randint(np.iinfo(np.int32).max))
     return engines[method](n_parameters, rng=generator).random(n_samples)

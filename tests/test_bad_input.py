@@ -1,0 +1,1024 @@
+"""Bad inputs to every public name: each is a clear error or one warning, none is silent."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.sparse
+import sklearn
+from sklearn.covariance import EmpiricalCovariance
+from sklearn.dummy import DummyRegressor
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import ShuffleSplit
+from sklearn.neighbors import LocalOutlierFactor
+from sklearn.pipeline import make_pipeline
+
+import skthermo
+from skthermo.datasets import (
+    kw51_structure,
+    load_z24,
+    make_kw51,
+    make_truss,
+    make_truss_campaign,
+    make_z24,
+    steel_modulus,
+)
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.fem import (
+    AffineModel,
+    Bar,
+    Beam,
+    CallableModel,
+    Membrane,
+    PointMass,
+    ReducedModel,
+    Spring,
+    Structure,
+    add_noise,
+    check_bounds,
+    check_dofs,
+    check_noise,
+    check_theta,
+    evaluate,
+    linearise,
+    load_affine,
+    mac,
+    match_modes,
+    probe,
+    sample,
+    shape_jacobian,
+    share_reordered,
+)
+from skthermo.metrics import (
+    complete_r2,
+    error_table,
+    frequency_scorer,
+    mape,
+    minimum_detectable_damage,
+    probability_of_detection,
+    probability_of_false_alarm,
+)
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
+from skthermo.updating import ModelUpdater, cramer_rao, identifiability, select_parameters, sensitivity
+
+LINEAR = Ridge()
+GENERATOR = np.random.default_rng(0)
+NAN, INF = float("nan"), float("inf")
+TRUSS = make_truss()
+NAMES = list(TRUSS.parameter_names)
+ONES = np.ones((3, 4))
+NOMINAL = TRUSS.frequencies(ONES[:1])
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+ONE_MODE = CallableModel(lambda theta: [7.5 * theta[0] ** 0.5], ["k"], 1)
+STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
+BEAM = {"E": 210e9, "G": 80e9, "A": 0.01, "I_yy": 1e-5, "I_zz": 1e-5, "J": 1e-5, "density": 7850.0}
+NODES = {"left": (0, 0), "right": (6, 0), "apex": (3, 2)}
+BARS = {
+    "tie": Bar("left", "right", **STEEL),
+    "rafter 1": Bar("left", "apex", **STEEL),
+    "rafter 2": Bar("apex", "right", **STEEL),
+}
+SUPPORTS = {"left": "xy", "right": "y"}
+FRAME = Structure(NODES, BARS, SUPPORTS, {"rafters": ["rafter 1", "rafter 2"]})
+STIFF, EYE = [[2.0, -1.0], [-1.0, 1.0]], np.eye(2)
+HOURLY = pd.DataFrame({"T1": np.arange(50.0)}, pd.date_range("2020-01-01", periods=50, freq="h"))
+BOTH = T.join(F)
+MODES = list(F)
+
+
+def changed(frame, row, column, value):
+    """A copy of a frame with other values at some place."""
+    copy = frame.copy()
+    copy.iloc[row, column] = value
+    return copy
+
+
+def masked(frame):
+    """A frame as an array whose first value is masked."""
+    values = np.ma.array(frame.to_numpy())
+    values[0, 0] = np.ma.masked
+    return values
+
+
+def indexed(index):
+    return HOURLY.set_axis(index, axis=0)
+
+
+LAGS = LagFeatures(2).fit(HOURLY)
+OFFSETS = [stamp.tz_localize("UTC" if i % 2 else "Asia/Tokyo") for i, stamp in enumerate(HOURLY.index)]
+GAPPY = T.where(np.random.default_rng(0).random(T.shape) > 0.012)
+HOLES = T.where(np.eye(3, dtype=bool)[np.arange(365) % 3])
+SHAPES = TRUSS.modes(ONES[:1])[1][0, [0, 4, 8]]
+DETECTOR = MahalanobisDetector().fit(F)
+
+
+def compensator(estimator=LINEAR, targets=MODES, **options):
+    return TemperatureCompensator(estimator, targets=targets, **options)
+
+
+COMPENSATOR = compensator().fit(BOTH)
+
+
+def updater(model=TRUSS, **options):
+    return ModelUpdater(model, **options)
+
+
+def affine(stiffness, mass=EYE, n_modes=1, **options):
+    return AffineModel({("k",): stiffness}, mass, n_modes=n_modes, **options)
+
+
+def truss_of(members=BARS, supports=SUPPORTS, groups=None, nodes=NODES):
+    return Structure(nodes, members, supports, groups)
+
+
+INVERSE = InverseSurrogate(TRUSS, Ridge(), n_samples=50, random_state=0).fit()
+QUICK = {
+    "inverse": InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01),
+    "mapper": TemperatureMapper(Ridge()),
+}
+CHAIN = DataInformedFEM(TRUSS, **QUICK, random_state=0).fit(T, F)
+
+
+def chain(model=TRUSS, **parts):
+    return DataInformedFEM(model, **(QUICK | {"random_state": 0} | parts))
+
+
+# Each row: what is wrong, the call, "error" or "warning", and what the message says.
+
+THETA = [
+    ("a string", lambda: check_theta("stiff", NAMES), "error", "theta is 'stiff'; expected numbers"),
+    ("None", lambda: check_theta(None, NAMES), "error", "theta is None"),
+    ("a mapping", lambda: check_theta({"top": 1.0}, NAMES), "error", "theta is .*expected numbers"),
+    ("complex", lambda: check_theta(ONES + 1j, NAMES), "error", "theta is complex"),
+    ("sparse", lambda: check_theta(scipy.sparse.csr_array(ONES), NAMES), "error", "theta is a sparse"),
+    ("ragged rows", lambda: check_theta([[1, 1, 1, 1], [1, 1]], NAMES), "error", "theta is .*expected numbers"),
+    ("too few columns", lambda: check_theta(ONES[:, :3], NAMES), "error", r"shape \(3, 3\); expected \(n_samples, 4\)"),
+    ("a number", lambda: check_theta(1.0, NAMES), "error", r"shape \(\); expected"),
+    ("three axes", lambda: check_theta(ONES[np.newaxis], NAMES), "error", r"shape \(1, 3, 4\); expected"),
+    ("zero", lambda: check_theta([1, 0, 1, 1], NAMES), "error", "'top' is 0"),
+    ("negative", lambda: check_theta([1, 1, -1, 1], NAMES), "error", "'diagonal' is -1"),
+    ("infinite", lambda: check_theta([1, 1, INF, 1], NAMES), "error", "finite and positive.*'diagonal' is inf"),
+    ("NaN", lambda: check_theta([1, 1, 1, NAN], NAMES), "error", "'vertical' is nan"),
+    ("masked", lambda: TRUSS.frequencies(np.ma.masked_equal([[1, 1, 1, 2]], 2)), "error", "'vertical' is nan"),
+    (
+        "other columns",
+        lambda: TRUSS.frequencies(pd.DataFrame(ONES)),
+        "error",
+        r"columns \[0, 1, 2, 3\]; expected the par",
+    ),
+    ("columns swapped", lambda: TRUSS.frequencies(pd.DataFrame(ONES, columns=NAMES[::-1])), "error", "in this order"),
+    ("two rows for one", lambda: check_theta(ONES, NAMES, one_row=True), "error", "3 rows; expected one"),
+    ("modes of NaN", lambda: TRUSS.modes([1, 1, 1, NAN]), "error", "finite and positive"),
+    ("Jacobian at zero", lambda: TRUSS.jacobian([0, 1, 1, 1]), "error", "finite and positive"),
+    ("a string among numbers", lambda: evaluate(TRUSS, [["a", 1, 1, 1]]), "error", "theta is .*expected numbers"),
+]
+
+BOUNDS = [
+    ("None", lambda: check_bounds(None, NAMES), "error", "bounds is None"),
+    ("a string", lambda: check_bounds("wide", NAMES), "error", "bounds is 'wide'; expected"),
+    ("zero width", lambda: check_bounds(0, NAMES), "error", "half-width between 0 and 1"),
+    ("percent", lambda: check_bounds(30, NAMES), "error", "bounds is 30.*half-width between 0 and 1"),
+    ("NaN", lambda: check_bounds(NAN, NAMES), "error", "half-width between 0 and 1"),
+    ("negative", lambda: check_bounds(-0.3, NAMES), "error", "half-width between 0 and 1"),
+    ("a boolean", lambda: check_bounds(True, NAMES), "error", "half-width between 0 and 1"),
+    ("a pair", lambda: check_bounds((0.8, 1.2), NAMES), "error", r"shape \(2,\); expected a half-width or \(4, 2\)"),
+    ("transposed", lambda: check_bounds(np.ones((2, 4)), NAMES), "error", r"shape \(2, 4\); expected"),
+    ("reversed", lambda: check_bounds([[1.2, 0.8]] * 4, NAMES), "error", "0 < lowest < highest"),
+    ("lowest of zero", lambda: check_bounds([[0.0, 0.8]] * 4, NAMES), "error", "0 < lowest < highest"),
+    ("highest infinite", lambda: check_bounds([[0.5, INF]] * 4, NAMES), "error", "0 < lowest < highest"),
+    ("NaN in a row", lambda: check_bounds([[0.5, NAN]] * 4, NAMES), "error", "0 < lowest < highest"),
+    ("complex", lambda: check_bounds(0.3j, NAMES), "error", "bounds is complex"),
+    ("a parameter left out", lambda: check_bounds({"top": 0.3}, NAMES), "error", "leaves out.*'bottom'"),
+    (
+        "an unknown parameter",
+        lambda: check_bounds(dict.fromkeys([*NAMES, "deck"], 0.3), NAMES),
+        "error",
+        "names.*'deck'",
+    ),
+    ("no mapping at all", lambda: check_bounds({}, NAMES), "error", "leaves out"),
+    (
+        "three numbers",
+        lambda: check_bounds(dict.fromkeys(NAMES, (0.7, 1, 1.3)), NAMES),
+        "error",
+        "'bottom' are .*half-wid",
+    ),
+    (
+        "a string in a mapping",
+        lambda: check_bounds(dict.fromkeys(NAMES, "x"), NAMES),
+        "error",
+        "'bottom' are 'x'; expected",
+    ),
+    ("None in a mapping", lambda: check_bounds(dict.fromkeys(NAMES), NAMES), "error", "'bottom' are None; expected"),
+    (
+        "percent in a mapping",
+        lambda: check_bounds(dict.fromkeys(NAMES, 30), NAMES),
+        "error",
+        "'bottom' are 30; expected",
+    ),
+    ("text pair", lambda: check_bounds(dict.fromkeys(NAMES, ("a", "b")), NAMES), "error", "bounds.*expected"),
+    ("dofs negative", lambda: check_dofs([-1], 23), "error", "dofs holds -1; expected 0 to 22"),
+    ("dofs too high", lambda: check_dofs([23], 23), "error", "dofs holds 23; expected 0 to 22"),
+    ("dofs twice", lambda: check_dofs([1, 1], 23), "error", "dofs holds 1 more than once"),
+    ("dofs floats", lambda: check_dofs([1.0], 23), "error", "type float64; expected integers"),
+    ("dofs none", lambda: check_dofs([], 23), "error", "expected integers"),
+    ("dofs None", lambda: check_dofs(None, 23), "error", "expected integers"),
+    ("dofs a mask", lambda: check_dofs([True] * 23, 23), "error", "type bool; expected integers"),
+    ("dofs a table", lambda: check_dofs([[1, 2]], 23), "error", r"shape \(1, 2\)"),
+    ("dofs ragged", lambda: check_dofs([[1, 2], [1]], 23), "error", "dofs.*expected integers"),
+]
+
+NOISE = [
+    ("noise negative", lambda: add_noise(NOMINAL, -0.01), "error", "noise"),
+    ("noise NaN", lambda: add_noise(NOMINAL, NAN), "error", "noise"),
+    (
+        "noise of other modes",
+        lambda: check_noise([0.01, 0.01], 6),
+        "error",
+        r"noise is \[0.01 0.01\].*each of the 6 modes",
+    ),
+    ("noise None", lambda: check_noise(None, 6), "error", "noise.*expected"),
+    ("frequencies None", lambda: add_noise(None, 0.01), "error", "frequencies.*expected"),
+    ("frequencies complex", lambda: add_noise(NOMINAL + 1j, 0.01), "error", "complex"),
+    ("a generator", lambda: add_noise(NOMINAL, 0.01, random_state=GENERATOR), "error", "random_state is"),
+    ("noise in percent", lambda: add_noise(NOMINAL, 1), "error", "noise is 1"),
+    ("noise a string", lambda: check_noise("low", 6), "error", "noise.*expected"),
+    ("noise complex", lambda: check_noise(0.01j, 6), "error", "complex"),
+]
+
+AFFINE = [
+    ("no terms", lambda: AffineModel({}, EYE, n_modes=1), "error", "stiffness"),
+    ("stiffness None", lambda: AffineModel(None, EYE, n_modes=1), "error", "stiffness"),
+    ("a bare matrix", lambda: AffineModel(EYE, EYE, n_modes=1), "error", "no term names a parameter; expected"),
+    ("not square", lambda: affine(np.ones((2, 3))), "error", r"shape \(2, 3\)"),
+    ("not symmetric", lambda: affine([[2.0, 1.0], [0.0, 2.0]]), "error", "symmetric"),
+    ("NaN", lambda: affine([[NAN, 0], [0, 1]]), "error", "finite"),
+    ("complex", lambda: affine(1j * EYE), "error", "complex"),
+    ("a mechanism", lambda: affine([[1.0, -1.0], [-1.0, 1.0]]), "error", "mechanism"),
+    ("other mass", lambda: affine(STIFF, np.eye(3)), "error", "mass.*shape"),
+    ("mass None", lambda: affine(STIFF, None), "error", "mass"),
+    ("mass negative", lambda: affine(STIFF, -EYE), "error", "negative eigenvalue"),
+    ("too many modes", lambda: affine(STIFF, n_modes=3), "error", "n_modes is 3"),
+    ("no modes", lambda: affine(STIFF, n_modes=0), "error", "n_modes is 0"),
+    ("half a mode", lambda: affine(STIFF, n_modes=1.5), "error", "n_modes is 1.5"),
+    ("modes as text", lambda: make_truss("6"), "error", "n_modes is '6'"),
+    ("unknown parameter", lambda: affine(STIFF, parameter_names=["E"]), "error", "'k'"),
+    ("a name twice", lambda: affine(STIFF, parameter_names=["k", "k"]), "error", "k"),
+    ("unknown key", lambda: affine(STIFF, groups={"g": ["E"]}), "error", "group"),
+    ("term too high", lambda: affine(STIFF, groups={"g": [3]}), "error", "group.*3"),
+    ("unknown group", lambda: TRUSS.damaged({"deck": 0.1}), "error", "'deck'.*expected"),
+    ("severity in percent", lambda: TRUSS.damaged({"top": 30}), "error", "30"),
+    ("severity of one", lambda: TRUSS.damaged({"top": 1.0}), "error", "1.0"),
+    ("severity NaN", lambda: TRUSS.damaged({"top": NAN}), "error", "nan"),
+    ("severity text", lambda: TRUSS.damaged({"top": "10 %"}), "error", "'10 %'.*expected"),
+    ("severity None", lambda: TRUSS.damaged({"top": None}), "error", "None.*expected"),
+    ("severity complex", lambda: TRUSS.damaged({"top": 0.1j}), "error", "expected"),
+    ("damage a string", lambda: TRUSS.damaged("top"), "error", "damage is 'top'; expected"),
+    ("damage a number", lambda: TRUSS.damaged(0.3), "error", "damage is 0.3; expected"),
+    ("damage a list", lambda: TRUSS.damaged([("top", 0.3)]), "error", "damage is .*; expected"),
+    ("rescaled by two rows", lambda: TRUSS.rescaled(ONES), "error", "3 rows; expected one"),
+    ("unknown mode", lambda: TRUSS.with_modes([0, 60]), "error", "60"),
+    ("negative mode", lambda: TRUSS.with_modes([-1]), "error", "-1"),
+    ("a mode twice", lambda: TRUSS.with_modes([0, 0]), "error", "repeat; expected each once"),
+    ("no modes", lambda: TRUSS.with_modes([]), "error", "modes"),
+    ("modes of floats", lambda: TRUSS.with_modes([0.0]), "error", "modes"),
+    ("modes a number", lambda: TRUSS.with_modes(2), "error", "modes"),
+    ("modes None", lambda: TRUSS.with_modes(None), "error", "modes"),
+    ("unknown parameter", lambda: TRUSS.with_parameters(["deck"]), "error", "'deck'"),
+    ("no parameters", lambda: TRUSS.with_parameters([]), "error", "expected"),
+    ("a parameter twice", lambda: TRUSS.with_parameters(["top", "top"]), "error", "expected"),
+    ("bounds in percent", lambda: TRUSS.reduced(30), "error", "half-width between 0 and 1"),
+    ("tol of zero", lambda: TRUSS.reduced(tol=0), "error", "tol is 0"),
+    ("tol text", lambda: TRUSS.reduced(tol="fine"), "error", "tol is 'fine'"),
+    ("tol NaN", lambda: TRUSS.reduced(tol=NAN), "error", "tol is nan"),
+    ("tol None", lambda: TRUSS.reduced(tol=None), "error", "tol is None"),
+    ("not a model", lambda: ReducedModel("truss"), "error", "'truss'.*expected"),
+    ("a class", lambda: ReducedModel(AffineModel), "error", "expected"),
+    (
+        "outside the box",
+        lambda: TRUSS.reduced(0.2, tol=1e-3, random_state=0).frequencies(2 * ONES),
+        "warning",
+        "3 of 3",
+    ),
+    ("few names of dofs", lambda: affine(STIFF, dof_names=["x"]), "error", "dof_names"),
+]
+
+STRUCTURE = [
+    ("no nodes", lambda: Structure({}, BARS, SUPPORTS), "error", "nodes is empty"),
+    ("nodes None", lambda: Structure(None, BARS, SUPPORTS), "error", "expected a mapping"),
+    ("text for coordinates", lambda: truss_of(nodes=NODES | {"apex": "high"}), "error", "'apex'.*'high'"),
+    ("other dimension", lambda: truss_of(nodes=NODES | {"apex": (3, 2, 0)}), "error", "'apex'"),
+    ("NaN for coordinates", lambda: truss_of(nodes=NODES | {"apex": (3, NAN)}), "error", "'apex'"),
+    ("two nodes at one place", lambda: truss_of(nodes=NODES | {"b": (3, 2)}), "error", "duplicates"),
+    ("a node without member", lambda: truss_of(nodes=NODES | {"b": (9, 9)}), "error", "'b' is disconnected"),
+    ("no members", lambda: Structure(NODES, {}, SUPPORTS), "error", "expected|disconnected"),
+    ("a member of text", lambda: truss_of(BARS | {"tie": "bar"}), "error", "'tie'"),
+    ("a member to nowhere", lambda: truss_of(BARS | {"b": Bar("left", "x", **STEEL)}), "error", "'x'"),
+    ("length zero", lambda: truss_of(BARS | {"b": Bar("left", "left", **STEEL)}), "error", "'b'"),
+    ("unknown support", lambda: Structure(NODES, BARS, {"pier": "xy"}), "error", "'pier'"),
+    ("unknown direction", lambda: Structure(NODES, BARS, {"left": "xw"}), "error", "'xw'|'w'"),
+    ("nothing free", lambda: Structure(NODES, BARS, dict.fromkeys(NODES, "xy")), "error", "fix every node"),
+    ("unknown member", lambda: truss_of(groups={"g": ["post"]}), "error", "group 'g' holds.*'post'"),
+    ("an empty group", lambda: truss_of(groups={"g": []}), "error", "group 'g' holds no member"),
+    ("negative E", lambda: truss_of(BARS | {"tie": Bar("left", "right", -1, 1)}), "error", "'tie'.*E"),
+    ("A of NaN", lambda: truss_of(BARS | {"tie": Bar("left", "right", 1, NAN)}), "error", "'tie'.*A"),
+    ("E of text", lambda: truss_of(BARS | {"tie": Bar("left", "right", "s", 1)}), "error", "'tie'.*E"),
+    ("a spring of zero", lambda: truss_of(BARS | {"s": Spring("apex", "y", 0)}), "error", "'s'.*k"),
+    ("a spring along w", lambda: truss_of(BARS | {"s": Spring("apex", "w", 1)}), "error", "'s'.*'w'"),
+    ("a negative mass", lambda: truss_of(BARS | {"m": PointMass("apex", -1)}), "error", "'m'"),
+    (
+        "a beam in the plane",
+        lambda: Structure(NODES, BARS | {"b": Beam("left", "apex", **BEAM)}, {}),
+        "error",
+        "beam.*expected three coordinates",
+    ),
+    (
+        "three corners",
+        lambda: Structure(NODES, {"m": Membrane(tuple(NODES), 1, 1)}, {}),
+        "error",
+        "expected four nodes",
+    ),
+    ("an unknown parameter", lambda: FRAME.assemble(["posts"]), "error", "unknown group 'posts'"),
+    ("a parameter twice", lambda: FRAME.assemble(["rafters", "rafters"]), "error", "each group once"),
+    ("an unknown property", lambda: FRAME.assemble({"p": ("nu", "rafters")}), "error", "property 'nu'"),
+    (
+        "an unknown matrix",
+        lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}),
+        "error",
+        "expected stiffness or mass",
+    ),
+    ("four entries", lambda: FRAME.assemble({"p": ("E", "rafters", "mass", 1)}), "error", "parameter 'p' is"),
+    ("an unknown damage group", lambda: FRAME.assemble(["rafters"], groups=["deck"]), "error", "unknown group 'deck'"),
+    (
+        "damage to density",
+        lambda: FRAME.assemble(["rafters"], groups={"d": ("density", "rafters")}, n_modes=1),
+        "error",
+        "'d'",
+    ),
+    (
+        "a mechanism",
+        lambda: Structure(NODES, BARS, {"left": "y"}, {"g": BARS}).assemble(["g"], n_modes=1),
+        "error",
+        "mechanism",
+    ),
+    ("too many modes", lambda: FRAME.assemble(["rafters"], n_modes=50), "error", "n_modes is 50"),
+    ("nodes a list", lambda: Structure([(0, 0)], BARS, SUPPORTS), "error", "nodes is .*expected a mapping"),
+    ("members a list", lambda: Structure(NODES, list(BARS.values()), SUPPORTS), "error", "members is .*expected a map"),
+    ("members None", lambda: Structure(NODES, None, SUPPORTS), "error", "members is None; expected a mapping"),
+    ("supports None", lambda: Structure(NODES, BARS, None), "error", "supports is None"),
+    ("supports a list", lambda: Structure(NODES, BARS, ["left"]), "error", "supports is .*expected a mapping"),
+    ("groups a list", lambda: truss_of(groups=["tie"]), "error", "groups is .*expected a mapping"),
+]
+
+EXTERNAL = [
+    ("no modes", lambda: CallableModel(lambda theta: [1.0], ["k"], 0), "error", "n_modes is 0"),
+    (
+        "other number of modes",
+        lambda: CallableModel(lambda t: [1.0], ["k"], 2).frequencies([[1.0]]),
+        "error",
+        "expected",
+    ),
+    (
+        "a program that fails",
+        lambda: CallableModel(lambda t: 1 / 0, ["k"], 1).frequencies([[1.0]]),
+        "warning",
+        "1 of 1 rows.*ZeroDiv",
+    ),
+    ("no matrices", lambda: probe(lambda t: None, ["k"]), "error", "expected"),
+    ("negative n_checks", lambda: probe(lambda t: (t[0] * EYE, EYE), ["k"], n_checks=-1), "error", "n_checks is -1"),
+    ("not affine", lambda: probe(lambda t: (t[0] ** 2 * EYE, EYE), ["k"], n_modes=1), "error", "affine"),
+    ("no effect", lambda: probe(lambda t: (EYE, EYE), ["k"], n_modes=1), "error", "changes neither"),
+    ("no file", lambda: load_affine("no_such_file.npz"), "error", "no_such_file"),
+    ("a text file", lambda: load_affine(__file__), "error", "test_bad_input"),
+    ("text", lambda: CallableModel(lambda t: "no", ["k"], 1).frequencies([[1.0]]), "error", "expected"),
+]
+
+MODAL = [
+    ("n_samples negative", lambda: sample(TRUSS, n_samples=-5), "error", "n_samples is -5"),
+    ("n_samples a float", lambda: sample(TRUSS, n_samples=10.0), "error", "n_samples is 10.0"),
+    ("an unknown method", lambda: sample(TRUSS, method="halton"), "error", "method is 'halton'"),
+    ("method None", lambda: sample(TRUSS, method=None), "error", "method is None"),
+    ("method a list", lambda: sample(TRUSS, method=["lhs"]), "error", "method is"),
+    ("a generator", lambda: sample(TRUSS, random_state=GENERATOR), "error", "random_state is Generator"),
+    ("a seed of text", lambda: sample(TRUSS, random_state="7"), "error", "random_state is '7'"),
+    ("a negative seed", lambda: sample(TRUSS, random_state=-1), "error", "random_state is -1"),
+    ("step zero", lambda: linearise(ONE_MODE, [[1.0]], step=0), "error", "step is 0"),
+    ("mac of None", lambda: mac(None, EYE), "error", "expected"),
+    ("mac of text", lambda: mac([["a"]], EYE), "error", "expected"),
+    ("mac of other rows", lambda: mac(np.ones((3, 1)), EYE), "error", "3 degrees of freedom and phi_b 2"),
+    ("mac of a number", lambda: mac(1.0, 1.0), "error", "shape"),
+    ("shapes of a program", lambda: shape_jacobian(ONE_MODE, [1.0]), "error", "no method 'local_modes'"),
+    ("shapes of None", lambda: shape_jacobian(None, [1.0]), "error", "None"),
+    ("shapes at no dof", lambda: shape_jacobian(TRUSS, ONES[0], [99]), "error", "dofs holds 99"),
+    ("local modes at no dof", lambda: TRUSS.local_modes(ONES[0]).shapes([99]), "error", "dofs holds 99"),
+    ("local modes at dof -1", lambda: TRUSS.local_modes(ONES[0]).shapes([-1]), "error", "dofs holds -1"),
+    ("derivatives at no dof", lambda: TRUSS.local_modes(ONES[0]).derivatives([0], [99]), "error", "dofs holds 99"),
+    (
+        "derivatives of no mode",
+        lambda: TRUSS.local_modes(ONES[0]).derivatives([99], [0]),
+        "error",
+        r"columns holds \[99\]; expected 0 to 9",
+    ),
+    ("order of None", lambda: share_reordered(None, ONES), "error", "None"),
+    ("order in a program", lambda: share_reordered(ONE_MODE, [[1.0]]), "error", "no method 'modes'"),
+    ("order of no rows", lambda: share_reordered(TRUSS, np.ones((0, 4))), "error", "theta"),
+    ("match with None", lambda: match_modes(TRUSS, None), "error", "frequencies is None|expected"),
+    (
+        "match with too many",
+        lambda: match_modes(TRUSS, np.ones((1, 50))),
+        "error",
+        "50 modes were measured; expected at most",
+    ),
+    ("match with negative", lambda: match_modes(TRUSS, -NOMINAL), "error", "expected"),
+    ("match with text", lambda: match_modes(TRUSS, ["a"] * 6), "error", "expected"),
+    ("match shapes, no dofs", lambda: match_modes(TRUSS, NOMINAL, shapes=np.ones((2, 6))), "error", "dofs"),
+    (
+        "match wrong shapes",
+        lambda: match_modes(TRUSS, NOMINAL, shapes=np.ones((3, 6)), dofs=[0, 1]),
+        "error",
+        r"shape \(3, 6\); expected \(2, 6\)",
+    ),
+    ("no model", lambda: evaluate(None, ONES), "error", "model is None; expected"),
+    ("a class", lambda: evaluate(AffineModel, ONES), "error", "model is .*; expected"),
+    ("a regressor", lambda: evaluate(Ridge(), ONES), "error", r"model is Ridge\(\); expected"),
+    ("sample of None", lambda: sample(None), "error", "model is None; expected"),
+    ("linearise None", lambda: linearise(None, ONES), "error", "model is None; expected"),
+    ("n_jobs text", lambda: evaluate(TRUSS, ONES, n_jobs="2"), "error", "n_jobs is '2'"),
+    ("n_jobs zero", lambda: evaluate(TRUSS, ONES, n_jobs=0), "error", "n_jobs"),
+    ("mac of a sparse matrix", lambda: mac(scipy.sparse.eye_array(2), EYE), "error", "sparse"),
+    ("match with no model", lambda: match_modes(None, NOMINAL), "error", "model is None; expected"),
+]
+
+PREPROCESSING = [
+    ("no lags", lambda: LagFeatures(0).fit(HOURLY), "error", "'lags'.*Got 0"),
+    ("negative lags", lambda: LagFeatures([0, -1]).fit(HOURLY), "error", r"lags is \[0, -1\]"),
+    ("an empty list of lags", lambda: LagFeatures([]).fit(HOURLY), "error", r"lags is \[\]"),
+    ("lags of floats", lambda: LagFeatures([0.5]).fit(HOURLY), "error", r"lags is \[0.5\]"),
+    ("a lag twice", lambda: LagFeatures([1, 1]).fit(HOURLY), "error", "lags is"),
+    ("lags of text", lambda: LagFeatures("24").fit(HOURLY), "error", "'lags'.*Got '24'"),
+    ("lags None", lambda: LagFeatures(None).fit(HOURLY), "error", "'lags'.*Got None"),
+    ("lags of booleans", lambda: LagFeatures([True]).fit(HOURLY), "error", "lags is"),
+    ("lags a boolean", lambda: LagFeatures(True).fit(HOURLY), "error", "lags"),
+    ("lags in a table", lambda: LagFeatures([[1, 2]]).fit(HOURLY), "error", "lags is"),
+    ("a billion lags", lambda: LagFeatures(10**9).fit(HOURLY), "error", "lags are 1000000000"),
+    ("one huge lag", lambda: LagFeatures([10**30]).fit(HOURLY), "error", "lag"),
+    ("freq of months", lambda: LagFeatures(2, freq="MS").fit(HOURLY), "error", "freq is 'MS'"),
+    ("freq of months, M", lambda: LagFeatures(2, freq="1M").fit(HOURLY), "error", "freq is '1M'"),
+    ("freq without unit", lambda: LagFeatures(2, freq="10").fit(HOURLY), "error", "freq is '10'"),
+    ("freq negative", lambda: LagFeatures(2, freq="-1h").fit(HOURLY), "error", "freq is '-1h'"),
+    ("freq of text", lambda: LagFeatures(2, freq="hourly").fit(HOURLY), "error", "freq is 'hourly'"),
+    ("freq a number", lambda: LagFeatures(2, freq=3600).fit(HOURLY), "error", "'freq'.*Got 3600"),
+    ("freq of an array", lambda: LagFeatures(2, freq="1h").fit(HOURLY.to_numpy()), "error", "freq"),
+    ("freq missing", lambda: LagFeatures(2, freq=pd.NaT).fit(HOURLY), "error", "freq"),
+    ("tolerance negative", lambda: LagFeatures(2, tolerance="-1h").fit(HOURLY), "error", "tolerance is '-1h'"),
+    ("padding unknown", lambda: LagFeatures(2, padding="zero").fit(HOURLY), "error", "'padding'.*Got 'zero'"),
+    ("stamps twice", lambda: LagFeatures(2).fit(indexed(HOURLY.index[[0, *range(49)]])), "error", "1 duplicate stamps"),
+    ("a missing stamp", lambda: LagFeatures(2).fit(indexed([pd.NaT, *HOURLY.index[1:]])), "error", "missing stamp"),
+    ("stamps as text", lambda: LagFeatures(2).fit(indexed(HOURLY.index.astype(str))), "error", "stamps as text"),
+    ("durations", lambda: LagFeatures(2).fit(indexed(HOURLY.index - HOURLY.index[0])), "error", "durations"),
+    (
+        "stamps on a level",
+        lambda: LagFeatures(2).fit(indexed(pd.MultiIndex.from_product([HOURLY.index, ["a"]]))),
+        "error",
+        "index levels",
+    ),
+    ("another time zone", lambda: LAGS.transform(HOURLY.tz_localize("UTC")), "error", "time zone UTC; expected None"),
+    ("stamps lost", lambda: LAGS.transform(HOURLY.reset_index(drop=True)), "error", "stamp|Datetime"),
+    ("one stamp", lambda: LagFeatures(2).fit(HOURLY[:1]), "error", "expected freq"),
+    ("no rows", lambda: LagFeatures(2).fit(HOURLY[:0]), "error", "0 sample"),
+    ("text in X", lambda: LagFeatures(2).fit([["cold"], ["warm"]]), "error", "'cold'.*expected numbers"),
+    ("complex X", lambda: LagFeatures(2).fit([[1j], [2j]]), "error", "X holds complex numbers; expected"),
+    ("sparse X", lambda: LagFeatures(2).fit(scipy.sparse.eye_array(3)), "error", "[Ss]parse"),
+    ("infinite X", lambda: LagFeatures(2).fit([[1.0], [INF]]), "error", "infinity"),
+    ("X None", lambda: LagFeatures(2).fit(None), "error", "Expected 2D array"),
+    ("a vector", lambda: LagFeatures(2).fit([1.0, 2.0]), "error", "2D array"),
+    ("other sensors", lambda: LAGS.transform(HOURLY.rename(columns={"T1": "T2"})), "error", "feature names"),
+    ("before fit", lambda: LagFeatures(2).transform(HOURLY), "error", "not fitted"),
+    ("neighbours none", lambda: KNNGapImputer(n_neighbors=0).fit(F), "error", "'n_neighbors'"),
+    ("neighbours text", lambda: KNNGapImputer(n_neighbors="10").fit(F), "error", "'n_neighbors'"),
+    ("weights unknown", lambda: KNNGapImputer(weights="near").fit(F), "error", "'weights'"),
+    ("imputer, other width", lambda: KNNGapImputer().fit(F).transform(F.iloc[:, :3]), "error", "feature"),
+    ("imputer, infinite", lambda: KNNGapImputer().fit([[1.0], [INF]]), "error", "infinity"),
+    ("imputer, text", lambda: KNNGapImputer().fit([["a"], ["b"]]), "error", "'a'.*expected numbers"),
+    ("imputer, empty", lambda: KNNGapImputer().fit(F[:0]), "error", "0 sample"),
+    ("imputer, -999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "warning", "-999"),
+    ("reference of other modes", lambda: BiasAligner([1.0, 2.0]).fit(F), "error", r"shape \(2,\)"),
+    ("reference of text", lambda: BiasAligner(["a"] * 6).fit(F), "error", "reference is .*expected numbers"),
+    ("reference a string", lambda: BiasAligner("model").fit(F), "error", "'reference'"),
+    ("reference of NaN", lambda: BiasAligner([NAN] * 6).fit(F), "error", "reference"),
+    ("reference a class", lambda: BiasAligner(AffineModel).fit(F), "error", "reference"),
+    ("method unknown", lambda: BiasAligner(method="move").fit(F), "error", "'method'"),
+    ("a mode of NaN", lambda: BiasAligner().fit(changed(F, slice(None), 0, NAN)), "error", "'f1' is NaN in all 365"),
+    ("scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "error", "mean of mode 'x0' is zero"),
+    ("aligned, other modes", lambda: BiasAligner().fit(F).transform(F.iloc[:, :2]), "error", "feature"),
+    (
+        "back, other modes",
+        lambda: BiasAligner().fit(F).inverse_transform(NOMINAL[:, :2]),
+        "error",
+        "2 features; expected 6",
+    ),
+    ("before fit", lambda: BiasAligner().transform(F), "error", "not fitted"),
+    (
+        "a tz-aware index later",
+        lambda: LAGS.transform(HOURLY.tz_localize("Europe/Brussels")),
+        "error",
+        "time zone Europe/Brussels",
+    ),
+    ("offsets of two zones", lambda: LagFeatures(2).fit(indexed(OFFSETS)), "error", "several offsets from UTC"),
+    (
+        "an index out of order, twice a stamp",
+        lambda: LagFeatures(2).fit(pd.concat([HOURLY[::-1], HOURLY[:1]])),
+        "error",
+        "1 duplicate stamps",
+    ),
+    (
+        "aligner, -999",
+        lambda: BiasAligner().fit(changed(F, 3, 1, -999.0)),
+        "warning",
+        "1 of 2190 values.*-999 in row 3 of column 'f2'",
+    ),
+    (
+        "imputer, a column of NaN",
+        lambda: KNNGapImputer().fit(changed(F, slice(None), 0, NAN)),
+        "error",
+        r"\['f1'\] are missing in all 365",
+    ),
+    ("aligner, text", lambda: BiasAligner().fit([["a"], ["b"]]), "error", "'a'.*expected numbers"),
+    ("aligner, infinite", lambda: BiasAligner().fit([[1.0], [INF]]), "error", "infinity"),
+    ("freq of business days", lambda: LagFeatures(2, freq=pd.offsets.BDay()).fit(HOURLY), "error", "freq is"),
+    ("tolerance of months", lambda: LagFeatures(2, tolerance="1M").fit(HOURLY), "error", "tolerance is '1M'"),
+]
+
+DETECTION = [
+    ("contamination zero", lambda: MahalanobisDetector(0).fit(F), "error", "'contamination'.*Got 0"),
+    ("contamination in percent", lambda: MahalanobisDetector(2).fit(F), "error", "'contamination'.*Got 2"),
+    ("contamination NaN", lambda: MahalanobisDetector(NAN).fit(F), "error", "'contamination'.*nan"),
+    ("contamination text", lambda: MahalanobisDetector("auto").fit(F), "error", "'contamination'.*'auto'"),
+    (
+        "covariance a class",
+        lambda: MahalanobisDetector(covariance=EmpiricalCovariance).fit(F),
+        "error",
+        "instance of scikit-learn",
+    ),
+    ("covariance of text", lambda: MahalanobisDetector(covariance="robust").fit(F), "error", "'covariance'"),
+    ("a regressor as covariance", lambda: MahalanobisDetector(covariance=Ridge()).fit(F), "error", "'covariance'"),
+    ("one row", lambda: MahalanobisDetector().fit(F[:1]), "error", "1 sample"),
+    ("fewer rows than modes", lambda: MahalanobisDetector().fit(F[:4]), "error", "expected"),
+    ("a column of NaN", lambda: MahalanobisDetector().fit(changed(F, slice(None), 0, NAN)), "error", "0 of 365"),
+    (
+        "a constant mode",
+        lambda: MahalanobisDetector().fit(changed(F, slice(None), 0, 7.0)),
+        "error",
+        "'f1'|constant|rank",
+    ),
+    ("a mode twice", lambda: MahalanobisDetector().fit(F.join(F["f1"].rename("f7"))), "error", "expected"),
+    ("an infinite value", lambda: MahalanobisDetector().fit(changed(F, 0, 0, INF)), "error", "infinity"),
+    ("text", lambda: MahalanobisDetector().fit([["a"], ["b"]]), "error", "numeric|expected numbers"),
+    ("complex", lambda: MahalanobisDetector().fit(F.to_numpy() + 1j), "error", "[Cc]omplex"),
+    ("sparse", lambda: MahalanobisDetector().fit(scipy.sparse.csr_array(F)), "error", "[Ss]parse"),
+    ("None", lambda: MahalanobisDetector().fit(None), "error", "None"),
+    ("other modes", lambda: DETECTOR.predict(F.iloc[:, ::-1]), "error", "feature names"),
+    ("fewer modes", lambda: DETECTOR.damage_index(F.iloc[:, :5]), "error", "feature names"),
+    ("no rows", lambda: DETECTOR.predict(F[:0]), "error", "0 sample"),
+    (
+        "missing modes",
+        lambda: DETECTOR.predict(changed(F, slice(7), 0, NAN)),
+        "warning",
+        "7 of 365 rows have a missing mode",
+    ),
+    ("a mode lost", lambda: DETECTOR.predict(changed(F, slice(None), 0, NAN)), "warning", "365 of 365 rows"),
+    ("before fit", lambda: MahalanobisDetector().predict(F), "error", "not fitted"),
+    ("frequencies of -999", lambda: MahalanobisDetector().fit(changed(F, 3, 1, -999.0)), "warning", "-999"),
+    ("no score_samples", lambda: OutlierDetector(LocalOutlierFactor()).fit(F), "error", "no score_samples"),
+    ("a class", lambda: OutlierDetector(IsolationForest).fit(F), "error", "estimator"),
+    ("None", lambda: OutlierDetector(None).fit(F), "error", "'estimator'"),
+    ("contamination of 0.6", lambda: OutlierDetector(IsolationForest(), 0.6).fit(F), "error", "'contamination'"),
+    ("unknown targets", lambda: compensator(targets=["f9"]).fit(BOTH), "error", "'f9'"),
+    ("a target twice", lambda: compensator(targets=["f1", "f1"]).fit(BOTH), "error", "targets"),
+    ("no targets", lambda: compensator(targets=[]).fit(BOTH), "error", "targets"),
+    ("targets a string", lambda: compensator(targets="f1").fit(BOTH), "error", "'targets'"),
+    ("targets None", lambda: compensator(targets=None).fit(BOTH), "error", "'targets'"),
+    ("targets too high", lambda: compensator(targets=[9]).fit(BOTH), "error", "9"),
+    ("targets of floats", lambda: compensator(targets=[1.5]).fit(BOTH), "error", "targets"),
+    ("targets booleans", lambda: compensator(targets=[True] * 9).fit(BOTH), "error", "targets"),
+    ("all targets", lambda: compensator().fit(F), "error", "targets"),
+    ("names for an array", lambda: compensator().fit(BOTH.to_numpy()), "error", "targets"),
+    ("a class", lambda: compensator(Ridge).fit(BOTH), "error", "estimator"),
+    ("no regressor", lambda: compensator("ridge").fit(BOTH), "error", "'estimator'"),
+    ("cv tests twice", lambda: compensator(cv=ShuffleSplit(3)).fit_transform(BOTH), "error", "cv|fold"),
+    ("one fold", lambda: compensator(cv=1).fit_transform(BOTH), "error", "n_splits=1|cv"),
+    ("cv of text", lambda: compensator(cv="5").fit(BOTH), "error", "'cv'"),
+    ("more folds than rows", lambda: compensator(cv=9).fit_transform(BOTH[:5]), "error", "9"),
+    ("a target of NaN", lambda: compensator().fit(changed(BOTH, slice(None), 3, NAN)), "error", "'f1'"),
+    ("kelvin", lambda: compensator().fit((T + 273.15).join(F)), "warning", "kelvin"),
+    ("-999", lambda: compensator().fit(changed(BOTH, 0, 0, -999.0)), "warning", "-999 in 1 of 365"),
+    ("kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "warning", "kelvin"),
+    ("other columns later", lambda: COMPENSATOR.transform(BOTH.iloc[:, ::-1]), "error", "feature names"),
+    ("names twice", lambda: MahalanobisDetector().fit(F.iloc[:, [0, 0]]), "error", "expected each name once"),
+    ("gaps in every row", lambda: compensator().fit(HOLES.join(F)), "error", "0 of 365|complete|row"),
+    (
+        "masked modes",
+        lambda: MahalanobisDetector().fit(F.to_numpy()).predict(masked(F)),
+        "warning",
+        "1 of 365 rows have a missing mode",
+    ),
+    ("a table of booleans", lambda: MahalanobisDetector().fit(F > 10), "error", "expected"),
+    ("an infinite record", lambda: DETECTOR.predict(changed(F, 0, 0, INF)), "error", "infinity"),
+    (
+        "a text record",
+        lambda: DETECTOR.predict(changed(F.astype(object), 0, 0, "a")),
+        "error",
+        "numeric|expected numbers",
+    ),
+]
+
+METRICS = [
+    ("damage index None", lambda: probability_of_false_alarm(None, 3.0), "error", "damage_index is None"),
+    ("damage index a table", lambda: probability_of_false_alarm([[1.0]], 3.0), "error", r"shape \(1, 1\)"),
+    ("damage index text", lambda: probability_of_detection(["a"], 3.0), "error", "damage_index is .*expected numbers"),
+    ("damage index complex", lambda: probability_of_detection([1j], 3.0), "error", "damage_index is complex"),
+    ("damage index sparse", lambda: probability_of_detection(scipy.sparse.eye_array(2), 3.0), "error", "sparse"),
+    ("threshold None", lambda: probability_of_false_alarm([1.0], None), "error", "threshold is None"),
+    ("threshold NaN", lambda: probability_of_false_alarm([1.0], NAN), "error", "threshold is nan"),
+    ("threshold infinite", lambda: probability_of_detection([1.0], INF), "error", "threshold is inf"),
+    ("thresholds", lambda: probability_of_detection([1.0], [1.0, 2.0]), "error", "threshold is"),
+    ("other lengths", lambda: minimum_detectable_damage([0.1], [0.1, 0.2]), "error", r"\(1,\) and pod \(2,\)"),
+    ("pod in percent", lambda: minimum_detectable_damage([0.1, 0.2], [26, 95]), "error", "pod is.*not percent"),
+    ("level in percent", lambda: minimum_detectable_damage([0.1], [0.9], 90), "error", "level is 90"),
+    ("level NaN", lambda: minimum_detectable_damage([0.1], [0.9], NAN), "error", "level is nan"),
+    ("level None", lambda: minimum_detectable_damage([0.1], [0.9], None), "error", "level is None"),
+    ("severities of both signs", lambda: minimum_detectable_damage([-0.1, 0.1], [0.5, 1]), "error", "all positive"),
+    ("severity zero", lambda: minimum_detectable_damage([0.0, 0.1], [0.5, 1]), "error", "not 0"),
+    ("severity twice", lambda: minimum_detectable_damage([0.1, 0.1], [0.5, 1]), "error", "expected different"),
+    ("severity in percent", lambda: minimum_detectable_damage([10, 20], [0.5, 1]), "error", "severities are"),
+    ("severity NaN", lambda: minimum_detectable_damage([NAN], [0.5]), "error", "severities are"),
+    ("severities none", lambda: minimum_detectable_damage([], []), "error", "expected two vectors"),
+    ("severities text", lambda: minimum_detectable_damage(["a"], [1.0]), "error", "severities is .*expected numbers"),
+    ("other width", lambda: mape(F, F.to_numpy()[:, :5]), "error", r"y_pred \(365, 5\)"),
+    ("other rows", lambda: mape(F.to_numpy(), F.to_numpy()[1:]), "error", r"\(364, 6\)"),
+    ("other index", lambda: mape(F, F.shift(freq="1D")), "error", "different indices"),
+    ("other names", lambda: mape(F, F.add_prefix("x")), "error", "expected the same"),
+    ("infinite", lambda: mape(F, changed(F, 2, 1, INF)), "error", "row 2 of 'f2' in y_pred is inf"),
+    ("frequency zero", lambda: mape(changed(F, 0, 0, 0.0), F), "error", "'f1' in y_true is 0"),
+    ("frequency -999", lambda: mape(changed(F, 0, 0, -999.0), F), "error", "'f1' in y_true is -999"),
+    ("predicted -999", lambda: mape(F, changed(F, 0, 0, -999.0)), "error", "'f1' in y_pred is -999"),
+    ("text", lambda: mape([["a"]], [[1.0]]), "error", "y_true is .*expected numbers"),
+    ("None", lambda: mape(None, F), "error", "y_true is None"),
+    ("complex", lambda: mape(NOMINAL + 1j, NOMINAL), "error", "y_true is complex"),
+    ("sparse", lambda: mape(scipy.sparse.csr_array(NOMINAL), NOMINAL), "error", "y_true is a sparse"),
+    ("three axes", lambda: mape(NOMINAL[np.newaxis], NOMINAL[np.newaxis]), "error", "shape"),
+    ("few scenarios", lambda: error_table(F, F, scenarios=["a"]), "error", r"scenarios has shape \(1,\)"),
+    ("a missing scenario", lambda: error_table(F, F, scenarios=[None] * 365), "error", "scenario of row 0 is missing"),
+    ("scenario Average", lambda: error_table(F, F, scenarios=["Average"] * 365), "error", "'Average'"),
+    ("scenarios a string", lambda: error_table(F, F, scenarios="all"), "error", "scenarios has shape"),
+    ("r2 of other shapes", lambda: complete_r2(F, NOMINAL), "error", "shape"),
+    ("r2 infinite", lambda: complete_r2([[1.0], [INF]], [[1.0], [2.0]]), "error", "inf"),
+    ("r2 None", lambda: complete_r2(F, None), "error", "y_pred is None"),
+    ("scored, no estimator", lambda: frequency_scorer(None, T, F), "error", "estimator is None; expected"),
+    ("scored, a class", lambda: frequency_scorer(Ridge, T, F), "error", "estimator is .*; expected"),
+    ("scored, other modes", lambda: frequency_scorer(DummyRegressor().fit(T, F), T, F.iloc[:, :2]), "error", "shape"),
+    (
+        "a mode predicted twice",
+        lambda: mape(F, F.set_axis(["f1", "f1", *MODES[2:]], axis=1)),
+        "error",
+        "expected the same, each once",
+    ),
+    ("masked, all", lambda: mape(np.ma.masked_all((2, 2)), np.ones((2, 3))), "error", "shape"),
+    (
+        "scenarios for other rows",
+        lambda: error_table(F, F, scenarios=["a"] * 364),
+        "error",
+        r"\(364,\); expected \(365,\)",
+    ),
+    ("a table of severities", lambda: minimum_detectable_damage([[0.1]], [[1.0]]), "error", "expected two vectors"),
+    ("pod negative", lambda: minimum_detectable_damage([0.1], [-0.1]), "error", "expected probabilities"),
+]
+
+UPDATING = [
+    ("no model", lambda: sensitivity(None), "error", "model is None; expected"),
+    ("a class", lambda: sensitivity(AffineModel), "error", "model is .*expected"),
+    ("no Jacobian", lambda: sensitivity(ONE_MODE), "error", "no method 'jacobian'"),
+    ("an unknown method", lambda: sensitivity(TRUSS, method="forward"), "error", "method is 'forward'"),
+    ("step of zero", lambda: sensitivity(TRUSS, method="central", step=0), "error", "step is 0"),
+    ("step of rounding", lambda: sensitivity(TRUSS, method="central", step=1e-17), "error", "step is 1e-17"),
+    ("step of text", lambda: sensitivity(TRUSS, method="central", step="1 %"), "error", "step is '1 %'"),
+    ("two rows of theta", lambda: sensitivity(TRUSS, ONES), "error", "3 rows; expected one"),
+    ("S an array", lambda: select_parameters(np.ones((6, 4))), "error", "S is a ndarray"),
+    ("threshold None", lambda: select_parameters(sensitivity(TRUSS), None), "error", "threshold is None"),
+    ("threshold text", lambda: select_parameters(sensitivity(TRUSS), "0.1"), "error", "threshold is '0.1'"),
+    ("threshold NaN", lambda: select_parameters(sensitivity(TRUSS), NAN), "error", "threshold is nan"),
+    ("S of text", lambda: select_parameters(pd.DataFrame({"top": ["a"]})), "error", "S"),
+    ("noise None", lambda: identifiability(TRUSS, noise=None), "error", "noise"),
+    (
+        "noise for some modes",
+        lambda: identifiability(TRUSS, noise=[0, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]),
+        "error",
+        "noise is",
+    ),
+    ("dofs without noise", lambda: identifiability(TRUSS, noise=0.01, dofs=[0]), "error", "shape_noise"),
+    (
+        "shape noise text",
+        lambda: identifiability(TRUSS, noise=0.01, dofs=[0, 1], shape_noise="1 %"),
+        "error",
+        "shape_noise is",
+    ),
+    ("unknown dofs", lambda: identifiability(TRUSS, noise=0.01, dofs=[99], shape_noise=0.1), "error", "dofs holds 99"),
+    ("no model", lambda: identifiability(None, noise=0.01), "error", "model is None; expected"),
+    ("not square", lambda: cramer_rao([[1.0, 0.0]]), "error", r"shape \(1, 2\)"),
+    ("a number", lambda: cramer_rao(1.0), "error", r"shape \(\)"),
+    ("None", lambda: cramer_rao(None), "error", "information is None"),
+    ("text", lambda: cramer_rao([["a"]]), "error", "information is .*expected numbers"),
+    ("complex", lambda: cramer_rao([[1j]]), "error", "information is complex"),
+    ("not symmetric", lambda: cramer_rao([[1.0, 0.5], [0.0, 1.0]]), "error", "symmetric"),
+    ("negative information", lambda: cramer_rao([[-1.0]]), "error", "negative"),
+    ("model None", lambda: updater(None).fit(NOMINAL), "error", "'model'"),
+    ("model a class", lambda: updater(AffineModel).fit(NOMINAL), "error", "model is"),
+    ("model of text", lambda: updater("truss").fit(NOMINAL), "error", "'model'"),
+    ("bounds without one", lambda: updater(bounds=[[1.1, 1.3]] * 4).fit(NOMINAL), "error", "contain 1"),
+    ("bounds of other names", lambda: updater(bounds={"E": 0.3}).fit(NOMINAL), "error", r"names \['E'\]"),
+    ("bounds text", lambda: updater(bounds="wide").fit(NOMINAL), "error", "'bounds'"),
+    ("bounds in percent", lambda: updater(bounds=30).fit(NOMINAL), "error", "half-width between 0 and 1"),
+    ("starts none", lambda: updater(n_starts=0).fit(NOMINAL), "error", "'n_starts'"),
+    ("method unknown", lambda: updater(method="newton").fit(NOMINAL), "error", "'method'"),
+    ("prior zero", lambda: updater(prior=0).fit(NOMINAL), "error", "'prior'"),
+    ("prior of other width", lambda: updater(prior=[0.1, 0.1]).fit(NOMINAL), "error", "prior is"),
+    ("prior of text", lambda: updater(prior=["a"] * 4).fit(NOMINAL), "error", "prior is"),
+    ("n_jobs text", lambda: updater(n_jobs="2").fit(NOMINAL), "error", "'n_jobs'"),
+    ("n_jobs zero", lambda: updater(n_jobs=0).fit(NOMINAL), "error", "n_jobs"),
+    ("a generator", lambda: updater(random_state=GENERATOR).fit(NOMINAL), "error", "'random_state'"),
+    ("F None", lambda: updater().fit(None), "error", "F is None; expected numbers"),
+    ("F of text", lambda: updater().fit(["a"] * 6), "error", "expected numbers"),
+    ("F complex", lambda: updater().fit(NOMINAL + 1j), "error", "complex"),
+    ("F sparse", lambda: updater().fit(scipy.sparse.csr_array(NOMINAL)), "error", "[Ss]parse"),
+    ("F of other modes", lambda: updater().fit(NOMINAL[:, :5]), "error", "5 columns; expected the 6 modes"),
+    ("F negative", lambda: updater().fit(-NOMINAL), "error", "expected Hz above 0"),
+    ("F -999", lambda: updater().fit(changed(F, 2, 0, -999.0)), "error", "'f1' of record 2 is -999"),
+    ("F NaN", lambda: updater().fit(NOMINAL * NAN), "error", "F is NaN in all"),
+    ("F infinite", lambda: updater().fit(NOMINAL * INF), "error", "inf"),
+    ("F in rad/s", lambda: updater().fit(NOMINAL * 2 * np.pi), "warning", "rad/s"),
+    ("F far off", lambda: updater().fit(NOMINAL * 1.5), "warning", "misses.*f6.*more than 15 %: expected"),
+    ("frequency_std zero", lambda: updater().fit(NOMINAL, frequency_std=0), "error", "frequency_std of 'f1' is 0"),
+    ("frequency_std width", lambda: updater().fit(NOMINAL, frequency_std=[1, 1]), "error", "frequency_std has shape"),
+    ("shapes without dofs", lambda: updater().fit(NOMINAL, shapes=np.ones((2, 6))), "error", "without dofs"),
+    ("dofs without shapes", lambda: updater().fit(NOMINAL, dofs=[0]), "error", "without shapes"),
+    ("shapes transposed", lambda: updater().fit(NOMINAL, shapes=np.ones((6, 2)), dofs=[0, 1]), "error", r"\(6, 2\)"),
+    (
+        "shapes of zeros",
+        lambda: updater().fit(NOMINAL, shapes=np.zeros((2, 6)), dofs=[0, 1]),
+        "error",
+        "zero throughout",
+    ),
+    (
+        "shapes of text",
+        lambda: updater().fit(NOMINAL, shapes=[["a"] * 6] * 2, dofs=[0, 1]),
+        "error",
+        "shapes is .*expected numbers",
+    ),
+    ("weight without shapes", lambda: updater(shape_weight=1.0).fit(NOMINAL), "error", "no shapes were given"),
+    ("weight NaN", lambda: updater(shape_weight=NAN).fit(NOMINAL), "error", "shape_weight"),
+    ("one mode, four parameters", lambda: updater(make_truss(1)).fit([[7.4]]), "warning", "4 parameters.*1 residual"),
+    (
+        "two modes swapped",
+        lambda: updater().fit(NOMINAL[:, [0, 1, 3, 2, 4, 5]]),
+        "warning",
+        "expected frequencies in Hz, in the order",
+    ),
+    (
+        "an optimum at the bounds",
+        lambda: updater(bounds=0.1).fit(NOMINAL * 1.1),
+        "warning",
+        "lies at the bounds of 'bottom'",
+    ),
+    (
+        "noise that explains little",
+        lambda: updater(bounds=0.1).fit(NOMINAL * 1.04 + 1, frequency_std=1e-4),
+        "warning",
+        "standard deviations of frequency_std",
+    ),
+    ("prior of other names", lambda: updater(prior={"E": 0.1}).fit(NOMINAL), "error", r"prior names \['E'\]"),
+    ("F of three axes", lambda: updater().fit(NOMINAL[np.newaxis]), "error", "dim 3|3 dim"),
+    (
+        "shapes of NaN",
+        lambda: updater().fit(NOMINAL, shapes=[[NAN] * 6, [1] * 6], dofs=[0, 1]),
+        "error",
+        "is NaN in row 0 but not in all",
+    ),
+    (
+        "complex shapes",
+        lambda: updater().fit(NOMINAL, shapes=SHAPES * 1j, dofs=[0, 4, 8]),
+        "warning",
+        "shapes are complex",
+    ),
+    (
+        "unknown dofs",
+        lambda: updater().fit(NOMINAL, shapes=SHAPES, dofs=[0, 4, 99]),
+        "error",
+        "dofs holds 99; expected 0 to 22",
+    ),
+    (
+        "shapes of a program",
+        lambda: ModelUpdater(ONE_MODE).fit([[1.0]], shapes=[[1.0]], dofs=[0]),
+        "error",
+        "has no 'local_modes'",
+    ),
+    ("a masked theta", lambda: sensitivity(TRUSS, np.ma.masked_equal([1, 1, 1, 2], 2)), "error", "'vertical' is nan"),
+    ("theta of NaN", lambda: identifiability(TRUSS, [1, 1, 1, NAN], noise=0.01), "error", "'vertical' is nan"),
+    ("noise in percent", lambda: identifiability(TRUSS, noise=1), "error", "noise is 1"),
+]
+
+DATASETS = [
+    ("no modes", lambda: make_truss(0), "error", "n_modes is 0"),
+    ("too many modes", lambda: make_truss(24), "error", "n_modes is 24"),
+    ("modes None", lambda: make_truss(None), "error", "n_modes is None"),
+    ("an unknown parameter", lambda: make_kw51(["cables"]), "error", "cables"),
+    ("years negative", lambda: make_truss_campaign(-1), "error", "n_years is -1"),
+    ("years a float", lambda: make_truss_campaign(1.5), "error", "n_years is 1.5"),
+    ("samples zero", lambda: make_truss_campaign(samples_per_year=0), "error", "samples_per_year is 0"),
+    ("samples text", lambda: make_truss_campaign(samples_per_day="1"), "error", "samples_per_day is '1'"),
+    ("noise None", lambda: make_truss_campaign(noise=None), "error", "noise"),
+    ("damage unknown", lambda: make_truss_campaign(damage={"deck": 0.1}), "error", "'deck'"),
+    ("damage in percent", lambda: make_truss_campaign(damage={"top": 30}), "error", "30"),
+    ("damage a number", lambda: make_truss_campaign(damage=0.3), "error", "damage is 0.3; expected"),
+    ("a generator", lambda: make_truss_campaign(random_state=GENERATOR), "error", "random_state is Generator"),
+    ("kelvin", lambda: steel_modulus([293.15, 300.0]), "error", "kelvin|temperature"),
+    ("text", lambda: steel_modulus("cold"), "error", "temperature is 'cold'; expected numbers"),
+    ("None", lambda: steel_modulus(None), "error", "temperature is None"),
+    ("complex", lambda: steel_modulus(1j), "error", "temperature is complex"),
+    ("no file", lambda: load_z24("no_such_file.csv"), "error", "no_such_file.csv is not a file"),
+    ("a folder", lambda: load_z24(Path(__file__).parent), "error", "is not a file"),
+    ("not that data", lambda: load_z24(__file__), "error", "header"),
+    ("parameters a number", lambda: make_kw51(3), "error", "parameters"),
+    ("parameters none", lambda: make_kw51([]), "error", "parameters"),
+    ("modes of text", lambda: make_z24("4"), "error", "n_modes is '4'"),
+    ("an unknown group", lambda: kw51_structure().assemble(["cables"]), "error", "unknown group 'cables'"),
+    ("noise in percent", lambda: make_truss_campaign(noise=1), "error", "noise is 1"),
+]
+
+SURROGATE = [
+    ("no model, no theta", lambda: InverseSurrogate().fit(), "error", "expected theta"),
+    ("model a class", lambda: InverseSurrogate(AffineModel).fit(), "error", "model is"),
+    ("model of text", lambda: InverseSurrogate("truss").fit(), "error", "'model'"),
+    ("regressor of text", lambda: InverseSurrogate(TRUSS, "mlp").fit(), "error", "'regressor'"),
+    ("regressor a class", lambda: InverseSurrogate(TRUSS, Ridge).fit(), "error", "instance of scikit-learn"),
+    ("bounds in percent", lambda: InverseSurrogate(TRUSS, bounds=30).fit(), "error", "half-width between 0 and 1"),
+    ("bounds None", lambda: InverseSurrogate(TRUSS, bounds=None).fit(), "error", "'bounds'"),
+    ("bounds of other names", lambda: InverseSurrogate(TRUSS, bounds={"E": 0.2}).fit(), "error", r"names \['E'\]"),
+    ("one sample", lambda: InverseSurrogate(TRUSS, n_samples=1).fit(), "error", "'n_samples'"),
+    ("noise negative", lambda: InverseSurrogate(TRUSS, noise=-0.1).fit(), "error", "'noise'"),
+    ("noise of other modes", lambda: InverseSurrogate(TRUSS, noise=[0.1, 0.1], n_samples=10).fit(), "error", "noise"),
+    ("n_jobs text", lambda: InverseSurrogate(TRUSS, n_jobs="2").fit(), "error", "'n_jobs'"),
+    ("a generator", lambda: InverseSurrogate(TRUSS, random_state=GENERATOR).fit(), "error", "random_state"),
+    ("memory a number", lambda: InverseSurrogate(TRUSS, memory=3).fit(), "error", "'memory'"),
+    ("other modes", lambda: INVERSE.transform(NOMINAL[:, :5]), "error", "5 features"),
+    ("frequencies negative", lambda: INVERSE.transform(-NOMINAL), "error", "expected"),
+    ("frequencies in rad/s", lambda: INVERSE.transform(F * 2 * np.pi), "warning", "365 of 365 rows.*far outside"),
+    ("before fit", lambda: InverseSurrogate(TRUSS).transform(F), "error", "not fitted"),
+    ("theta of other width", lambda: INVERSE.inverse_transform([[1.0, 1.0]]), "error", r"shape \(1, 2\)"),
+    ("fewer theta than F", lambda: InverseSurrogate().fit(F.to_numpy(), ONES), "error", "365|inconsistent"),
+    ("mapper, no theta", lambda: TemperatureMapper(Ridge()).fit(T, None), "error", "y"),
+    ("mapper, text", lambda: TemperatureMapper("ridge").fit(T, np.ones((365, 4))), "error", "'regressor'"),
+    (
+        "mapper, a class",
+        lambda: TemperatureMapper(Ridge).fit(T, np.ones((365, 4))),
+        "error",
+        "instance of scikit-learn",
+    ),
+    ("mapper, few rows", lambda: TemperatureMapper(Ridge()).fit(T, ONES), "error", "365|inconsistent"),
+    ("mapper, all NaN", lambda: TemperatureMapper(Ridge()).fit(T * NAN, np.ones((365, 4))), "error", "NaN|complete"),
+    (
+        "mapper, other sensors",
+        lambda: TemperatureMapper(Ridge()).fit(T, YEAR.frequencies).predict(F),
+        "error",
+        "feature names",
+    ),
+    ("a network of text", lambda: paper_network("big"), "error", "'big'"),
+    ("no model", lambda: chain(None).fit(T, F), "error", "'model'"),
+    ("a class", lambda: chain(AffineModel).fit(T, F), "error", "model is"),
+    ("no frequencies", lambda: chain().fit(T, None), "error", "y"),
+    ("no temperatures", lambda: chain().fit(None, F), "error", "Expected 2D array"),
+    ("other lengths", lambda: chain().fit(T, F[1:]), "error", "365 rows and frequencies 364"),
+    ("other index", lambda: chain().fit(T, F.shift(freq="1D")), "error", "different indices"),
+    ("other number of modes", lambda: chain().fit(T, F.iloc[:, :5]), "error", "5 columns; expected the 6 modes"),
+    ("a sensor of NaN", lambda: chain().fit(changed(T, slice(None), 0, NAN), F), "error", "'T1' is NaN in all"),
+    ("a constant sensor", lambda: chain().fit(changed(T, slice(None), 0, 5.0), F), "error", "'T1' is constant"),
+    ("a mode of NaN", lambda: chain().fit(T, changed(F, slice(None), 1, NAN)), "error", "'f2' is NaN in all"),
+    ("text", lambda: chain().fit([["cold"]] * 365, F), "error", "'cold'.*expected numbers"),
+    ("complex", lambda: chain().fit(T, F.to_numpy() + 1j), "error", "[Cc]omplex"),
+    ("sparse", lambda: chain().fit(scipy.sparse.csr_array(T), F), "error", "[Ss]parse"),
+    ("infinite", lambda: chain().fit(changed(T, 0, 0, INF), F), "error", "infinity"),
+    ("one row", lambda: chain().fit(T[:1], F[:1]), "error", "1 sample"),
+    ("rad/s", lambda: chain().fit(T, F * 2 * np.pi), "warning", "rad/s"),
+    ("kelvin", lambda: CHAIN.predict(T + 273.15), "warning", "kelvin|far outside"),
+    ("Fahrenheit", lambda: CHAIN.predict(T * 1.8 + 32), "warning", "rows have temperatures far outside"),
+    ("temperature of -999", lambda: chain().fit(changed(T, 0, 0, -999.0), F), "error", "-999"),
+    ("inverse of text", lambda: chain(inverse="mlp").fit(T, F), "error", "'inverse'"),
+    ("mapper a class", lambda: chain(mapper=TemperatureMapper).fit(T, F), "error", "mapper|class"),
+    ("aligner of text", lambda: chain(aligner="shift").fit(T, F), "error", "'aligner'"),
+    ("imputer of text", lambda: chain(imputer="knn").fit(T, F), "error", "'imputer'"),
+    ("reduce of 2", lambda: chain(reduce=2).fit(T, F), "error", "'reduce'"),
+    ("a generator", lambda: chain(random_state=GENERATOR).fit(T, F), "error", "random_state"),
+    ("before fit", lambda: DataInformedFEM(TRUSS).predict(T), "error", "not fitted"),
+    ("other sensors", lambda: CHAIN.predict(T.iloc[:, :2]), "error", "feature names"),
+    ("text later", lambda: CHAIN.predict(changed(T.astype(object), 0, 0, "cold")), "error", "'cold'.*expected numbers"),
+    ("unknown damage", lambda: CHAIN.simulate(T, damage={"deck": 0.1}), "error", "'deck'"),
+    ("damage in percent", lambda: CHAIN.simulate(T, damage={"top": 30}), "error", "30"),
+    (
+        "no damage there",
+        lambda: chain(ONE_MODE).fit(T, F[["f1"]]).simulate(T, damage={"k": 0.1}),
+        "error",
+        "no method 'damaged'",
+    ),
+    (
+        "a sensor twice",
+        lambda: chain().fit(T.iloc[:, [0, 0, 1]], F),
+        "error",
+        r"\['T1', 'T1', 'T2'\]; expected each name once",
+    ),
+    ("1.5 times too high", lambda: chain().fit(T, F * 1.5), "warning", r"differ from the model's.*\+5\d %"),
+    (
+        "two modes swapped",
+        lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]),
+        "warning",
+        r"look like other modes.*0, 1, 3, 2",
+    ),
+    ("kelvin in fit", lambda: chain().fit(T + 273.15, F), "error", "kelvin"),
+    (
+        "fewer rows than parameters ask",
+        lambda: chain().fit(T[:20], F[:20]),
+        "warning",
+        "20 complete rows train 4 parameters",
+    ),
+    (
+        "gaps and lags",
+        lambda: chain(mapper=make_pipeline(LagFeatures(24, padding="nan"), TemperatureMapper(Ridge()))).fit(GAPPY, F),
+        "warning",
+        "only .* of 365 rows trained",
+    ),
+    ("all rows have gaps", lambda: chain(mapper=TemperatureMapper(Ridge())).fit(HOLES, F), "error", "complete|NaN|row"),
+    ("scored on other rows", lambda: CHAIN.score(T, F[1:]), "error", "365 rows and .* 364"),
+    ("scored on another index", lambda: CHAIN.score(T, F.shift(freq="1D")), "error", "different indices"),
+    ("scored without F", lambda: CHAIN.score(T, None), "error", "None|y"),
+    ("noise as text", lambda: CHAIN.simulate(T, noise=[0.01]), "error", "noise is"),
+    ("applicability of others", lambda: CHAIN.applicability(F), "error", "feature names"),
+    ("parameters of no rows", lambda: CHAIN.predict(T[:0]), "error", "0 sample"),
+    ("predicted kelvin", lambda: CHAIN.predict_parameters(T + 273.15), "warning", "365 of 365 rows have temperatures"),
+    (
+        "simulated with severities in percent",
+        lambda: CHAIN.simulate(T, damage={"top": 10}),
+        "error",
+        "severity 10; expected",
+    ),
+    ("seed of text", lambda: CHAIN.simulate(T, noise=0.01, random_state="7"), "error", "random_state is '7'"),
+    ("noise in percent", lambda: InverseSurrogate(TRUSS, Ridge(), noise=1, n_samples=10).fit(), "error", "noise is 1"),
+    ("memory a file", lambda: InverseSurrogate(TRUSS, Ridge(), memory=__file__, n_samples=10).fit(), "error", "memory"),
+    ("noise in percent", lambda: CHAIN.simulate(T, noise=5), "error", "noise is 5"),
+    ("noise of text", lambda: CHAIN.simulate(T, noise="much"), "error", "noise.*expected"),
+]
+
+ROWS = {
+    "theta": THETA,
+    "bounds": BOUNDS,
+    "noise": NOISE,
+    "affine": AFFINE,
+    "structure": STRUCTURE,
+    "external": EXTERNAL,
+    "modal": MODAL,
+    "preprocessing": PREPROCESSING,
+    "detection": DETECTION,
+    "metrics": METRICS,
+    "updating": UPDATING,
+    "datasets": DATASETS,
+    "surrogate": SURROGATE,
+}
+EXPECTED_ERRORS = (ValueError, TypeError, FileNotFoundError, RuntimeError)
+CHECKED_BY = tuple(str(Path(package.__file__).parent) for package in (skthermo, sklearn))
+FROM_THE_DEPTHS = re.compile(
+    "broadcast|setting an array element|object has no attribute|out of bounds|not supported between"
+    "|is not (subscriptable|iterable|callable)|has no len|^could not convert|unsupported operand|ufunc|unhashable"
+    "|cannot be interpreted|must be real number|not aligned|argument must be a string or a real number"
+)
+"""Messages of numpy, SciPy, pandas and Python about what a wrong input led to."""
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [pytest.param(*row[1:], id=f"{room}: {row[0]}") for room, rows in ROWS.items() for row in rows],
+)
+def test_bad_input_is_named(call, kind, message):
+    if kind == "error":
+        with pytest.raises(EXPECTED_ERRORS, match=message) as caught:
+            call()
+        got = str(caught.value).partition("expected")[0]
+        assert not FROM_THE_DEPTHS.search(got)
+        assert str(caught.traceback[-1].path).startswith(CHECKED_BY)
+    else:
+        with warnings.catch_warnings(record=True) as given:
+            warnings.simplefilter("always")
+            call()
+        assert {(warning.category, warning.filename) for warning in given} == {(UserWarning, __file__)}
+        assert sum(bool(re.search(message, str(warning.message))) for warning in given) == 1
