@@ -252,6 +252,9 @@ NOISE = [
 ]
 
 AFFINE = [
+    ("parameters None", lambda: TRUSS.with_parameters(None), "error", "expected"),
+    ("strengthened in percent", lambda: TRUSS.damaged({"top": -15}), "error", "-15"),
+    ("text", lambda: affine([["a"]], [[1.0]]), "error", "stiffness.*expected"),
     ("no terms", lambda: AffineModel({}, EYE, n_modes=1), "error", "stiffness"),
     ("stiffness None", lambda: AffineModel(None, EYE, n_modes=1), "error", "stiffness"),
     ("a bare matrix", lambda: AffineModel(EYE, EYE, n_modes=1), "error", "no term names a parameter; expected"),
@@ -309,6 +312,12 @@ AFFINE = [
 ]
 
 STRUCTURE = [
+    ("a number as target", lambda: FRAME.assemble({"E": 1}), "error", "'E' is 1; expected"),
+    ("a number as parameter", lambda: FRAME.assemble([1]), "error", "1.*expected"),
+    ("parameters None", lambda: FRAME.assemble(None), "error", "parameters is None; expected"),
+    ("a group None", lambda: truss_of(groups={"g": None}), "error", "group 'g'"),
+    ("direction a number", lambda: Structure(NODES, BARS, {"left": 1}), "error", "'left'"),
+    ("a class as member", lambda: truss_of(BARS | {"b": Bar}), "error", "'b'"),
     ("no nodes", lambda: Structure({}, BARS, SUPPORTS), "error", "nodes is empty"),
     ("nodes None", lambda: Structure(None, BARS, SUPPORTS), "error", "expected a mapping"),
     ("text for coordinates", lambda: truss_of(nodes=NODES | {"apex": "high"}), "error", "'apex'.*'high'"),
@@ -376,6 +385,9 @@ STRUCTURE = [
 ]
 
 EXTERNAL = [
+    ("no program", lambda: probe(None, ["k"]), "error", "assemble|program"),
+    ("names None", lambda: CallableModel(lambda theta: [1.0], None, 1), "error", "parameter_names"),
+    ("no function", lambda: CallableModel(None, ["k"], 1), "error", "function|callable"),
     ("no modes", lambda: CallableModel(lambda theta: [1.0], ["k"], 0), "error", "n_modes is 0"),
     (
         "other number of modes",
@@ -860,6 +872,9 @@ DATASETS = [
 ]
 
 SURROGATE = [
+    ("scored on other modes", lambda: CHAIN.score(T, F.iloc[:, :5]), "error", "5 columns; expected|shape"),
+    ("a frequency of -999", lambda: chain().fit(T, changed(F, 0, 0, -999.0)), "error", "-999"),
+    ("frequencies text", lambda: INVERSE.transform([["a"] * 6]), "error", "'a'.*expected numbers"),
     ("no model, no theta", lambda: InverseSurrogate().fit(), "error", "expected theta"),
     ("model a class", lambda: InverseSurrogate(AffineModel).fit(), "error", "model is"),
     ("model of text", lambda: InverseSurrogate("truss").fit(), "error", "'model'"),

@@ -49,7 +49,7 @@ class Box:
         return (
             f"{rows.sum()} of {rows.size} rows give parameters far outside the bounds that the inverse was trained in: "
             f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, trained in "
-            f"{lowest:.3g} to {highest:.3g}; expected frequencies in Hz in the order of the model's modes, or wider "
+            f"{lowest:.6g} to {highest:.6g}; expected frequencies in Hz in the order of the model's modes, or wider "
             "bounds"
         )
 

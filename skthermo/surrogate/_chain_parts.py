@@ -6,7 +6,8 @@ import numpy as np
 from sklearn.base import BaseEstimator, clone
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._frames import check_columns, check_same_rows, check_temperatures, frame_like
+from skthermo._arrays import as_floats
+from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, is_model, seed_parts, seeded, validate_data
 from skthermo.fem import check_bounds
 from skthermo.surrogate._box import Box
@@ -35,10 +36,29 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
     check_same_rows(X, y, ("temperatures", "frequencies"))
     if F.shape[1] != model.n_modes:
         raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
+    check_frequencies(F)
     check_temperatures(T)
     check_columns(T, "temperature", varying=True)
     check_columns(F, "frequency")
     return T, F
+
+
+def check_frequencies(F: Any) -> None:
+    """Refuse what is neither a frequency in Hz nor NaN.
+
+    Raises
+    ------
+    ValueError
+        Names the column and the row.
+    """
+    values = as_floats(F)
+    wrong = ~np.isnan(values) & ~(values > 0)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"frequency {column_names(F, 'f')[column]!r} in row {row} is {values[row, column]:g}; expected positive "
+            "numbers in Hz, and NaN where a mode is missing"
+        )
 
 
 def clone_parts(chain: Any) -> Parts:

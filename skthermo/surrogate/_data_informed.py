@@ -289,7 +289,12 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
             `skthermo.metrics.frequency_scorer` always reports their share.
         """
+        check_is_fitted(self)
         check_same_rows(X, y, ("temperatures", "frequencies"))
+        if np.ndim(y) != 2 or np.shape(y)[1] != len(self.mode_names_):
+            raise ValueError(
+                f"frequencies have shape {np.shape(y)}; expected a column for each of {self.mode_names_}, as in fit"
+            )
         predicted = self.predict(X)
         scored = int((~np.isnan(as_floats(y) + as_floats(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):

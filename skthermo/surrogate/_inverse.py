@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arrays import Bounds, as_floats
+from skthermo._arrays import Bounds, real_array
 from skthermo._frames import column_names, frame_like
 from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
 from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, add_noise, check_bounds, check_theta, evaluate
+from skthermo.fem import FEModel, add_noise, check_bounds, check_noise, check_theta, evaluate
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._regression import MultiplierRegressor
@@ -270,6 +270,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
         if n_modes != model.n_modes:
             raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
+        check_noise(self.noise, n_modes)
         n_parameters = len(model.parameter_names)
         if n_parameters > model.n_modes:
             warn_user(
@@ -296,7 +297,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
 
     def _read_inputs(self, X: ArrayLike) -> NDArray[np.float64]:
         has_names = hasattr(self, "feature_names_in_")
-        frequencies = super()._read_inputs(X if has_names else as_floats(X))
+        frequencies = super()._read_inputs(X if has_names else real_array(X, "X"))
         if self.inputs_.log and (frequencies <= 0).any():
             row, column = np.argwhere(frequencies <= 0)[0]
             raise ValueError(

@@ -1,18 +1,21 @@
 """Reads and checks the arguments of an affine model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arrays import Matrix, positive_integer
+from skthermo._arrays import Matrix, positive_integer, real_array
 
 Key = tuple[str, ...]
 
 DENSE_DOFS = 200
 """Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
+
+STRONGEST = -10.0
+"""Severity of a strengthening below which percent are taken for a fraction."""
 
 DENSE_SHARE = 0.3
 """Share of nonzero entries above which a matrix counts as dense."""
@@ -48,9 +51,9 @@ def _read_key(key, what: str) -> Key:
 
 
 def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
-    array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+    array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else real_array(matrix, what)
     if np.iscomplexobj(array):
-        raise ValueError(f"{what} is complex; expected a real matrix")
+        raise ValueError(f"{what} is complex; expected real numbers")
     if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.shape[0]:
         raise ValueError(f"{what} has shape {array.shape}; expected a square matrix")
     if n_dof is not None and array.shape[0] != n_dof:
@@ -95,6 +98,8 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
 
 def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
     """Names of parameters, all different."""
+    if not isinstance(parameter_names, Iterable):
+        raise ValueError(f"parameter_names is {parameter_names!r}; expected one or more different names")
     names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
     if not names or len(set(names)) < len(names):
         raise ValueError(f"parameter_names is {names}; expected one or more different names")
@@ -127,10 +132,10 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (isinstance(severity, Real) and -np.inf < severity < 1):
+        if not (isinstance(severity, Real) and STRONGEST <= float(severity) < 1):
             raise ValueError(
-                f"damage of group {group!r} has severity {severity!r}; expected a number below 1 "
-                "(0.5 halves the stiffness, -0.15 adds 15 %)"
+                f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
+                f"{STRONGEST:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
             )
     return damage
 

@@ -1,6 +1,7 @@
 """Structures of nodes and members."""
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -81,9 +82,7 @@ class Structure:
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
-        self._groups = {
-            group: frozenset([names] if isinstance(names, str) else names) for group, names in (groups or {}).items()
-        }
+        self._groups = {group: _read_group(group, names) for group, names in (groups or {}).items()}
         self._check_groups()
         self.dofs = self._free_dofs(supports)
 
@@ -174,12 +173,14 @@ class Structure:
         if isinstance(targets, str):
             targets = [targets]
         if not isinstance(targets, Mapping):
+            if not isinstance(targets, Iterable) or not all(isinstance(target, str) for target in targets):
+                raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
             if len(set(targets)) < len(targets):
                 raise ValueError(f"{what}s are {list(targets)}; expected each group once")
             targets = {group: group for group in targets}
         bindings = {}
         for name, target in targets.items():
-            if not isinstance(target, str) and len(target) not in (2, 3):
+            if not isinstance(target, str) and not (isinstance(target, Sequence) and len(target) in (2, 3)):
                 expected = "a group, (property, group) or (property, group, matrix)"
                 raise ValueError(f"{what} {name!r} is {target!r}; expected {expected}")
             prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
@@ -225,7 +226,7 @@ class Structure:
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
-            for direction in _read_directions(along):
+            for direction in _read_directions(along, node):
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
                 fixed.add((node, direction))
@@ -242,8 +243,16 @@ class Structure:
         )
 
 
-def _read_directions(along: Collection[str]) -> list[str]:
+def _read_group(group: str, names: Any) -> frozenset:
+    if not isinstance(names, Collection):
+        raise ValueError(f"group {group!r} is {names!r}; expected names of members")
+    return frozenset([names] if isinstance(names, str) else names)
+
+
+def _read_directions(along: Any, node: Hashable) -> list[str]:
     """Directions one by one: ("x", "ry") is such a list; "xyz rx ry" names five."""
+    if not isinstance(along, Collection | None):
+        raise ValueError(f"support of node {node!r} is {along!r}; expected directions such as 'xy' or ('x', 'ry')")
     if not isinstance(along, str):
         return list(along or ())
     words = along.split()

@@ -76,7 +76,7 @@ class PhysicalElement:
 
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
     """Refuse an element with unknown nodes, hardly any length, or a property that is not positive."""
-    if not hasattr(element, "nodes"):
+    if isinstance(element, type) or not hasattr(element, "nodes"):
         raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
     for node in element.nodes:
         if node not in coordinates:

@@ -85,6 +85,8 @@ class CallableModel:
         vectorized: bool = False,
         cache: str | PathLike | None = None,
     ):
+        if not callable(function):
+            raise ValueError(f"function is {function!r}; expected a callable")
         self.function = function
         self.parameter_names = check_different(parameter_names)
         self.n_modes = check_n_modes(n_modes)

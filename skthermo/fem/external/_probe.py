@@ -85,6 +85,8 @@ def probe(
     """
     if not isinstance(n_checks, Integral) or isinstance(n_checks, bool) or n_checks < 0:
         raise ValueError(f"n_checks is {n_checks!r}; expected zero or a positive integer")
+    if not callable(assemble):
+        raise ValueError(f"assemble is {assemble!r}; expected a callable that returns stiffness and mass")
     names = check_different(parameter_names)
     program = Program(assemble, names)
     base = program(np.ones(len(names)))
