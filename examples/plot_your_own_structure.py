@@ -5,7 +5,7 @@ Your own structure: from a logger's file to a fitted chain
 A tower is logged every half hour for a month: two temperatures and seven frequencies, with stamps that are not round,
 one that goes back, and gaps of hours and days. Here the log becomes tidy frames, a tower of beams on rocking springs
 is updated to the mean frequencies and learns the weather, and what can be wrong with records is provoked on purpose.
-Which measured mode is which is not known: they are paired by frequency alone, and one with a vertical mode of the tower.
+Which measured mode is which is not known: they are paired by frequency alone, one of them with a vertical mode.
 
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``, or set ``SKTHERMO_DATA`` to
 the folder that holds ``tower/tower.csv``. Without either it makes a synthetic log with the same defects. The log has
@@ -88,7 +88,7 @@ def write_synthetic_log(path, n_days=25):
 
 
 def update(F):
-    """The tower with the measured modes as its columns, paired by frequency alone, its stiffnesses fitted to their means."""
+    """The tower with the measured modes as its columns, paired by frequency alone, and updated to their means."""
     nominal = tower()
     pairs = match_modes(nominal, F)
     print(f"\nMeasured modes among those of the nominal tower (offset in %)\n{pairs.round(2)}")
@@ -228,7 +228,9 @@ def main():
     print(f"\nThe fit on the first {n_train} records\n{fem.report_}")
     beyond = fem.applicability(T[n_train:]).drop(columns="outside_bounds").max(axis=1)
     print(f"\n{(beyond > 0.25).mean():.0%} of the last fifth lie a quarter of the training range or more outside it")
-    print(f"\nMAPE on the last {len(T) - n_train} records, in %\n{hold_out_table(fem, T, F, n_train)}\n")
+    print(
+        f"\nMAPE on the last {len(T) - n_train} records where lags are known, in %\n{hold_out_table(fem, T, F, n_train)}\n"
+    )
     for mistake, messages in provoked(model, fem, T[:n_train], F[:n_train]).items():
         print(f"{mistake}:", *(messages or ["no warning"]), sep="\n  ")
 
