@@ -228,9 +228,8 @@ def main():
     print(f"\nThe fit on the first {n_train} records\n{fem.report_}")
     beyond = fem.applicability(T[n_train:]).drop(columns="outside_bounds").max(axis=1)
     print(f"\n{(beyond > 0.25).mean():.0%} of the last fifth lie a quarter of the training range or more outside it")
-    print(
-        f"\nMAPE on the last {len(T) - n_train} records where lags are known, in %\n{hold_out_table(fem, T, F, n_train)}\n"
-    )
+    print(f"\nMAPE on the last {len(T) - n_train} records, where lags are known, in %")
+    print(hold_out_table(fem, T, F, n_train), end="\n\n")
     for mistake, messages in provoked(model, fem, T[:n_train], F[:n_train]).items():
         print(f"{mistake}:", *(messages or ["no warning"]), sep="\n  ")
 
