@@ -33,8 +33,7 @@ from skthermo.updating import ModelUpdater, identifiability
 
 HEIGHT, N_BEAMS = 25.0, 12
 PARAMETERS = {"E": ("E", "walls"), "G": ("G", "walls"), "rocking_x": "rocking_x", "rocking_y": "rocking_y"}
-LAGS = [0, 2, 6, 12, 24]  # half hours
-SCATTER = 0.003  # of one record, relative
+LAGS, SCATTER = [0, 2, 6, 12, 24], 0.003  # half hours; of one record, relative
 BLUE, ORANGE = "#0072B2", "#D55E00"
 
 
