@@ -1,10 +1,10 @@
 """Large frames, reduced and not, against a loop of scipy.sparse.linalg.eigsh.
 
-    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
+    OMP_NUM_THREADS=1 PYTHONPATH=. SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
 
-On the exported building frame, if SKTHERMO_DATA names the folder that has it, and on a tied-arch bridge. The loop
-solves ready-made matrices, some of the samples only, and is scaled up; making the basis and checking it counts as
-part of every reduced sample. Medians of several rounds in one run.
+On three smaller models, on the exported building frame, if SKTHERMO_DATA names the folder that has it, and on a
+tied-arch bridge. The loop solves ready-made matrices, some of the samples only, and is scaled up; making the basis and
+checking it counts as part of every reduced sample. Medians of several rounds in one run.
 """
 
 import argparse
@@ -17,7 +17,9 @@ import scipy.sparse.linalg
 from bridges import frame_bridge
 from measure import median_seconds, peak_megabytes
 
+from skthermo.datasets import make_kw51, make_z24
 from skthermo.fem import AffineModel, sample
+from tests.fem.frames import FRAME
 
 BOUNDS = 0.3
 
@@ -42,13 +44,32 @@ def central_differences(model, theta, step=1e-4):
     return np.stack(differences, axis=2)
 
 
+def print_errors(model, reduced, options):
+    uniform = draw(model, options.fresh, seed=1)
+    corners = np.where(draw(model, options.fresh, seed=4) < 1, 1 - BOUNDS, 1 + BOUNDS)
+    for kind, theta in {"fresh points": uniform, "random corners": corners}.items():
+        error = np.abs(reduced.frequencies(theta) / model.frequencies(theta) - 1).max()
+        print(f"largest relative error at {options.fresh} {kind}: {error:.1e}")
+
+
+def compare_small(model, options):
+    """Accuracy of a reduced model, and what it takes."""
+    reduced, theta = model.reduced(BOUNDS, random_state=0), draw(model, 1000, seed=2)
+    print(f"{reduced.basis_size_} basis vectors, {len(reduced.snapshot_points_)} snapshots")
+    print_errors(model, reduced, options)
+    ways = {
+        "making the basis": lambda: model.reduced(BOUNDS, random_state=0),
+        "1000 reduced samples": lambda: reduced.frequencies(theta),
+    }
+    for name, seconds in median_seconds(ways, options.rounds).items():
+        print(f"{name}: {seconds:.2f} s")
+
+
 def compare(model, options):
     """Accuracy and speed of one frame."""
     reduced = model.reduced(BOUNDS, random_state=0)
     print(f"{reduced}, {len(reduced.snapshot_points_)} snapshots")
-    fresh = draw(model, options.fresh, seed=1)
-    error = np.abs(reduced.frequencies(fresh) / model.frequencies(fresh) - 1).max()
-    print(f"largest relative error at {options.fresh} fresh points: {error:.1e}")
+    print_errors(model, reduced, options)
 
     theta, inner = draw(model, 1000, seed=2), draw(model, 100, seed=3, inside=0.99)
     matrices = [model.matrices(row) for row in theta[: options.loop]]
@@ -91,12 +112,15 @@ def compare_workers(model, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bridge", type=int, nargs=3, default=[40, 4, 9], help="bays, elements a member, stringers")
-    parser.add_argument("--fresh", type=int, default=500, help="points at which the error is measured")
+    parser.add_argument("--fresh", type=int, default=500, help="points, and corners, where the error is measured")
     parser.add_argument("--loop", type=int, default=100, help="samples of the loop")
     parser.add_argument("--workers", type=int, default=400, help="full samples of two workers")
     parser.add_argument("--memory", type=int, default=1_000_000, help="samples whose memory is measured")
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
+    for name, model in {"portal frame": FRAME, "Z24": make_z24(), "KW51": make_kw51()}.items():
+        print(f"\n{name}")
+        compare_small(model, options)
     frames = {"tied-arch bridge": frame_bridge(*options.bridge)}
     if os.environ.get("SKTHERMO_DATA"):
         frames = {"building frame": building_frame()} | frames

@@ -2,12 +2,13 @@
 
 import pickle
 import warnings
+from itertools import product
 
 import numpy as np
 import pytest
 from sklearn.base import clone
 
-from skthermo.datasets import make_truss
+from skthermo.datasets import make_truss, make_z24
 from skthermo.fem import AffineModel, FEModel, ReducedModel, mac, sample
 from tests.fem.frames import FRAME, portal
 
@@ -31,11 +32,27 @@ def test_frequencies_agree_within_tolerance_and_never_fall_below():
 
 
 def test_the_stated_error_is_that_at_the_check_points():
-    assert REDUCED.check_points_.shape == (20, 4)
+    at_corners = np.isin(REDUCED.check_points_, [0.7, 1.3]).all(axis=1)
+    assert (~at_corners).sum() == 10
+    assert 0 < at_corners.sum() <= 10
     error = np.abs(REDUCED.frequencies(REDUCED.check_points_) / FRAME.frequencies(REDUCED.check_points_) - 1)
     assert REDUCED.error_ == pytest.approx(error.max(), rel=1e-3)
     assert REDUCED.error_ < 5e-6
     assert not (REDUCED.check_points_[:, np.newaxis] == REDUCED.snapshot_points_).all(axis=2).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("model", [FRAME, make_z24()], ids=["frame", "Z24"])
+def test_the_tolerance_holds_at_every_corner_of_the_box(model, seed):
+    corners = np.array([*product([0.7, 1.3], repeat=4)])
+    reduced = model.reduced(0.3, random_state=seed)
+    assert np.abs(reduced.frequencies(corners) / model.frequencies(corners) - 1).max() < 1e-5
+
+
+def test_no_point_is_one_of_a_sample_with_the_same_seed():
+    drawn = sample(FRAME, 0.3, 128, random_state=0).theta
+    for points in (REDUCED.check_points_, REDUCED.snapshot_points_, REDUCED.damaged({"soil": 0.99}).check_points_):
+        assert not np.isclose(points[:, np.newaxis], drawn).all(axis=2).any()
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-7])

@@ -1,5 +1,6 @@
 """A basis of mode shapes that represents a model within a box, grown to a stated error."""
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -7,13 +8,14 @@ import scipy.linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, RandomState, as_random_state
 from skthermo._threads import map_on_blas_threads
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.modal import factorise, may_be_missed, pair_modes
 
-SNAPSHOTS_PER_ROUND = 8
+FIRST_SNAPSHOTS = 16
+SNAPSHOTS_PER_ROUND = 12
 CANDIDATES_PER_ROUND = 96
 CHECKS = 20
 MAX_ROUNDS = 40
@@ -36,7 +38,7 @@ class Basis(NamedTuple):
 
 
 def grow_basis(
-    full: AffineCore, bounds: Array, tol: float, random: np.random.RandomState, start: Array | None = None
+    full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
     """Add modes where the estimated error is largest until it is small, and the true error at fresh points too.
 
@@ -45,23 +47,24 @@ def grow_basis(
     RuntimeError
         If no basis reaches ``tol``.
     """
+    random = own_stream(random_state)
     nominal = nominal_theta(len(bounds))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     factors = factorise(stiffness)
     if start is None:
         snapshots = np.empty((full.stiffness.n_dof, 0))
-        points = np.vstack([nominal, draw(bounds, random, SNAPSHOTS_PER_ROUND)])
+        points = np.vstack([nominal, draw(bounds, random, FIRST_SNAPSHOTS)])
     else:
         snapshots, points = start, nominal[:0]
     used = [points]
     for _ in range(MAX_ROUNDS):
         snapshots = np.hstack([snapshots, snapshots_at(full, points)])
-        vectors = orthonormal(snapshots, stiffness, drop=max(tol / 100, LEAST_ENERGY))
+        vectors = orthonormal(snapshots, stiffness, drop=tol)
         core = projected_core(full, vectors, tol)
         candidates = draw(bounds, random, CANDIDATES_PER_ROUND)
         errors = estimated_errors(full, core, vectors, candidates, factors)
-        if errors.max() < tol / 4:
-            candidates = draw(bounds, random, CHECKS)
+        if errors.max() < tol / 2:
+            candidates = without(draw(bounds, random, CHECKS), np.vstack(used))
             errors = true_errors(full, core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
@@ -78,10 +81,24 @@ def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
     return full.projected(vectors, widest_spectrum=tol * WIDEST_SPECTRUM)
 
 
+def own_stream(seed: RandomState) -> np.random.RandomState:
+    """Random numbers that are not those of a sample drawn with the same seed."""
+    return np.random.RandomState(as_random_state(seed).randint(2**32, size=8, dtype=np.uint32))
+
+
 def draw(bounds: Array, random: np.random.RandomState, n_points: int) -> Array:
-    """Uniform random points of a box."""
+    """Uniform random points of a box, and as many of its corners, or all of these where they are fewer."""
     lowest, highest = bounds.T
-    return random.uniform(lowest, highest, size=(n_points, len(bounds)))
+    if 2 ** len(bounds) <= n_points // 2:
+        corners = np.array([*product(*bounds)])
+    else:
+        corners = np.where(random.randint(2, size=(n_points // 2, len(bounds))), highest, lowest)
+    return np.vstack([random.uniform(lowest, highest, size=(n_points - len(corners), len(bounds))), corners])
+
+
+def without(points: Array, others: Array) -> Array:
+    """The points that are not among others."""
+    return points[~(points[:, np.newaxis] == others).all(axis=2).any(axis=1)]
 
 
 def snapshots_at(full: AffineCore, theta: Array) -> Array:
@@ -122,8 +139,11 @@ def true_errors(full: AffineCore, core: AffineCore, theta: Array) -> Array:
 
 
 def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:
-    """The directions of vectors of equal strain energy, orthonormal in a stiffness, without the share ``drop``."""
+    """Directions orthonormal in a stiffness, without those that hold less than ``drop`` of the strain energy.
+
+    Every vector counts with an energy of one, so none loses more than ``drop`` with any direction.
+    """
     scaled = vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
     energies, directions = scipy.linalg.eigh(scaled.T @ (stiffness @ scaled))
-    kept = energies > drop * energies[-1]
+    kept = energies > max(drop, LEAST_ENERGY * energies[-1])
     return scaled @ (directions[:, kept] / np.sqrt(energies[kept]))

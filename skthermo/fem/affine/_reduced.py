@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, Bounds, RandomState, as_random_state
+from skthermo._arrays import Array, Bounds, RandomState
 from skthermo.fem._bounds import check_bounds
 from skthermo.fem._theta import check_theta
 from skthermo.fem.affine._base import AffineBase
@@ -16,7 +16,7 @@ from skthermo.fem.affine._core import AffineCore
 class ReducedModel(AffineBase):
     """An affine FE model on a small basis of its own mode shapes, to a stated error.
 
-    Modes at random points of the box, and then where an error estimate is largest, span a basis V;
+    Modes at random points and corners of the box, and then where an error estimate is largest, span a basis V;
     every term is projected once, V' K_t V, so that a solve is a small dense eigenproblem. Made by
     `AffineModel.reduced`.
 
@@ -27,10 +27,10 @@ class ReducedModel(AffineBase):
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
         Box of multipliers in which the error is controlled. Outside it a warning is given.
     tol : float, default=1e-5
-        Largest relative error of a frequency. The basis grows until the errors at fresh
-        random points of the box are below tol / 2.
+        Largest relative error of a frequency. The basis grows until the errors at fresh random
+        points and corners of the box are below tol / 2.
     random_state : int, RandomState or None, default=None
-        Seed of those points.
+        Seed of those points, which are never those of a sample drawn with the same seed.
 
     Attributes
     ----------
@@ -38,8 +38,9 @@ class ReducedModel(AffineBase):
         Number of basis vectors.
     error_ : float
         Largest relative error of a frequency at the check points.
-    check_points_ : ndarray of shape (20, n_parameters)
-        Uniform random theta at which the full model was solved for ``error_``.
+    check_points_ : ndarray of shape (n_checks, n_parameters)
+        Theta at which the full model was solved for ``error_``: ten or more uniform in the box, and up to
+        ten of its corners, none of them a snapshot point.
     snapshot_points_ : ndarray of shape (n_snapshots, n_parameters)
         Theta whose modes span the basis.
 
@@ -54,7 +55,8 @@ class ReducedModel(AffineBase):
     -----
     A frequency of rank j is never below the full model's of that rank (Rayleigh-Ritz). The
     estimate of a relative error is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi
-    of a mode of unit modal mass and the nominal stiffness K_0. Shapes are given at all degrees of
+    of a mode of unit modal mass and the nominal stiffness K_0. Within 30 % of K_0 it was found to be 0.64 to
+    1.3 times the error. Shapes are given at all degrees of
     freedom. A damaged model is checked anew, and its basis grows if it must.
 
     References
@@ -93,7 +95,7 @@ class ReducedModel(AffineBase):
         self._full = full
         self._bounds = check_bounds(bounds, full.parameter_names)
         self._tol = tol
-        self._use(grow_basis(full._core, self._bounds, tol, as_random_state(random_state)))
+        self._use(grow_basis(full._core, self._bounds, tol, random_state))
 
     @property
     def basis_size_(self) -> int:
@@ -178,7 +180,7 @@ class ReducedModel(AffineBase):
         """A reduced model of another full one, whose basis begins with this one's."""
         twin = self._twin(self._core)
         twin._full, twin._bounds, twin._parameter_names = full, bounds, full.parameter_names
-        twin._use(grow_basis(full._core, bounds, self._tol, as_random_state(0), start=self._basis))
+        twin._use(grow_basis(full._core, bounds, self._tol, 0, start=self._basis))
         return twin
 
     def _use(self, basis: Basis) -> None:
