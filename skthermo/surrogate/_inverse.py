@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arrays import Bounds, real_array
+from skthermo._arrays import Bounds, as_floats
 from skthermo._frames import column_names, frame_like
 from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
 from skthermo._warnings import warn_user
@@ -296,8 +296,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
 
     def _read_inputs(self, X: ArrayLike) -> NDArray[np.float64]:
-        has_names = hasattr(self, "feature_names_in_")
-        frequencies = super()._read_inputs(X if has_names else real_array(X, "X"))
+        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
+        frequencies = super()._read_inputs(X if has_names else as_floats(X))
         if self.inputs_.log and (frequencies <= 0).any():
             row, column = np.argwhere(frequencies <= 0)[0]
             raise ValueError(
