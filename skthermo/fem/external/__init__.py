@@ -1,4 +1,5 @@
-"""FE models from elsewhere: exported matrices, programs that assemble them, programs that solve."""
+"""FE models from other programs: exported matrices, programs that return matrices, programs that return
+frequencies."""
 
 from skthermo.fem.external._callable import CallableModel
 from skthermo.fem.external._exported import load_affine
