@@ -132,8 +132,7 @@ def hold_out_table(fem, T, F, n_train):
 
 
 def quietly(function, *arguments):
-    """Call a function without the warning of weather outside the training range, which the example has already
-    counted."""
+    """Call a function without its warning of unknown weather, which the example has already counted."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
         return function(*arguments)

@@ -31,8 +31,7 @@ def column_names(X: Any, default: str) -> list[Hashable]:
 
 
 def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Raise an error for columns without any value or, with ``varying``, with the same value in all of two or more
-    rows.
+    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal.
 
     Raises
     ------

@@ -17,7 +17,7 @@ MODES = ["f1", "f2", "f3", "f4"]
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 STATES = ("undamaged", "damaged")
 UNKNOWN = "unknown"
-BYTES_FOR_EACH_CHARACTER = 20  # memory of a table of short texts
+BYTES_FOR_EACH_CHARACTER = 20  # of a table of short texts in memory
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
@@ -51,8 +51,8 @@ def load_z24(path: str | PathLike) -> Bunch:
     Raises
     ------
     ValueError
-        If a value is missing, repeated, not a number, or impossible
-        (frequencies outside 0.1 to 100 Hz, temperatures outside -60 to 80 C). The error names the file, field and row.
+        If a field is missing, or a value is repeated, not a number, or impossible (frequencies outside 0.1 to 100 Hz,
+        temperatures outside -60 to 80 C). The error names the file, field and row.
 
     Notes
     -----

@@ -136,8 +136,7 @@ class LocalModel(FEModel, Protocol):
         """Whether a column follows its mode rather than its rank."""
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
-        """`LocalModes`: the lowest modes at one theta; with ``follow``, enough of them to contain every nominal
-        mode."""
+        """`LocalModes` at one theta: the lowest modes; with ``follow``, enough to contain every nominal mode."""
 
 
 class BatchModel(FEModel, Protocol):

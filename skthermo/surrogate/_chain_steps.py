@@ -41,7 +41,7 @@ class ChainSteps:
         return theta
 
     def _possible(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Parameters, with NaN in rows that are physically impossible, and a mask of those rows."""
+        """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
         theta = as_columns(theta).copy()
         impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
         theta[impossible] = np.nan
@@ -55,8 +55,7 @@ class ChainSteps:
         return as_floats(self.aligner_.inverse_transform(frequencies))
 
     def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
-        """The model and, with ``reduce``, its reduced model for a box around the parameters of the training
-        weather."""
+        """The model and, with ``reduce``, its reduced model for a box around the training parameters."""
         tol = tolerance(self.model, self.reduce)
         if tol is None:
             return Simulator(self.model)

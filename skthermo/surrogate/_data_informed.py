@@ -302,7 +302,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         return complete_r2(y, predicted)
 
     def applicability(self, X: ArrayLike) -> pd.DataFrame:
-        """How far the weather and its parameters are outside the training data, row by row.
+        """How far inputs and parameters are outside the training range, row by row.
 
         Parameters
         ----------

@@ -19,8 +19,7 @@ ORDER_CHECKS = 256
 def remembered_simulations(
     memory: str | Memory | None, model: FEModel, bounds: Bounds, n_samples: int, tol: float | None, *, n_jobs, seed
 ) -> tuple[Bunch, float]:
-    """`simulations`, read from the memory if stored there; if several processes need the same ones, only one makes
-    them.
+    """`simulations`, read from the memory if stored there; of several processes only one makes them.
 
     Raises
     ------
@@ -52,8 +51,7 @@ def remembered_simulations(
 def simulations(
     identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, n_jobs: int | None, seed: int
 ) -> tuple[Bunch, float]:
-    """Random samples (of the reduced model if there is a tolerance), and the share of them with modes in another
-    order."""
+    """Random samples (of the reduced model if ``tol`` is given), and the share with modes in another order."""
     if tol is not None:
         model = model.reduced(bounds, tol=tol, random_state=seed)
     drawn = sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)

@@ -106,8 +106,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets)
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
-        """Multipliers and their standard deviations, (n_samples, n_parameters) each; NaN where unknown or not
-        requested."""
+        """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""
         check_is_fitted(self)
         inputs = self._read_inputs(X)
         complete = ~np.isnan(inputs).any(axis=1)

@@ -208,7 +208,7 @@ class AffineBase(ABC):
         Raises
         ------
         ValueError
-            If a mode is named twice, is not an integer, or is higher than the number of modes that the model has.
+            If a mode is named twice, is not an integer, or does not exist in the model.
 
         Examples
         --------

@@ -39,8 +39,7 @@ class Basis(NamedTuple):
 def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random: np.random.RandomState, start: Array | None = None
 ) -> Basis:
-    """Add modes at the point of largest estimated error until both the estimate and the true error at new points are
-    small.
+    """Add modes at the point of largest estimated error until estimate and true error at new points are small.
 
     Raises
     ------

@@ -1,5 +1,4 @@
-"""FE models from other programs: exported matrices, programs that return matrices, programs that return
-frequencies."""
+"""FE models from other programs, through exported matrices or functions that return matrices or frequencies."""
 
 from skthermo.fem.external._callable import CallableModel
 from skthermo.fem.external._exported import load_affine

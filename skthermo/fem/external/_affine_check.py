@@ -101,8 +101,7 @@ def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> Dif
 
 
 def _power(multiplier: float, found: Difference, terms: Terms, name: str) -> float | None:
-    """The power p of a parameter that explains an entry: its change at t, divided by its change at 2, is (t^p - 1) /
-    (2^p - 1)."""
+    """The power p of a parameter that explains an entry: (t^p - 1) / (2^p - 1) is its change at t over that at 2."""
     entries: dict[tuple[str, ...], float] = {key: matrix[found.row, found.column] for key, matrix in terms}
     doubling = entries.get((name,), 0.0)
     if not doubling:
