@@ -2,10 +2,10 @@
 A Gauss-Newton step between the stages
 ======================================
 
-The stages of the method are open: each gives its result, and takes what you make of it. Here the inverse
+Each stage of the method can be used alone, and you may change its result before the next stage. Here the inverse
 surrogate's estimates are improved by one Gauss-Newton step on the FE model's own frequencies and derivatives, and
-the temperature mapper learns from the improved parameters. What misfit is left after a second step no parameters
-can take away: six modes carry noise, and temperature acts on zones that cut across the model's four parameters.
+the temperature mapper learns from the improved parameters. No parameters can remove the misfit that is left after a
+second step: the six modes are noisy, and temperature acts on zones that cut across the model's four parameters.
 
 Run it with ``python examples/plot_gauss_newton_step.py``; the figure goes to the folder ``figures``.
 """
@@ -28,11 +28,11 @@ BLUE, ORANGE = "#0072B2", "#D55E00"
 
 
 def gauss_newton_step(model, theta: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
-    r"""Parameters whose frequencies are nearer to the measured ones, row by row.
+    r"""Parameters improved by one Gauss-Newton step, row by row.
 
     ln f is nearly linear in ln theta: ln f_measured = ln f(theta) + S d, with the normalised sensitivities
     S = theta / f df/dtheta. The step d minimises \|ln f_measured - ln f - S d\|^2 / NOISE^2 +
-    \|ln theta + d\|^2 / WIDTH^2: the second sum holds back parameters that frequencies hardly tell.
+    \|ln theta + d\|^2 / WIDTH^2: the second sum limits the step of parameters that hardly affect the frequencies.
     """
     frequencies, jacobian = linearise(model, theta)
     S = jacobian * theta.to_numpy()[:, np.newaxis] / frequencies[:, :, np.newaxis]

@@ -6,14 +6,14 @@ Every stage is a scikit-learn estimator, so one ``GridSearchCV`` chooses lags, n
 networks together. The FE simulations do not change with any of these: ``memory`` keeps them,
 and the whole search solves the FE model's Monte Carlo once.
 
-Two months of hourly data. The truss follows the air with thermal inertia (an exponential mean of
-eight hours), which only lagged temperatures can tell, and something that no sensor sees, such as
-moisture or traffic, makes its frequencies drift slowly.
+The data are two months of hourly records. The truss follows the air with thermal inertia (an exponential mean of
+eight hours), which only lagged temperatures can describe, and an effect that no sensor measures, such as moisture or
+traffic, makes its frequencies drift slowly.
 
 **Why random folds flatter lagged features.** Neighbouring hours share 23 of their 24 lagged values and
 almost the same drift. With random folds, every tested hour has such neighbours among
-the training rows, and a model that is flexible enough recognises the hour instead of learning
-what temperature does. Contiguous folds test what the model is for: weather that it has not seen.
+the training rows, and a model that is flexible enough memorises the hour instead of learning the effect of
+temperature. Contiguous folds test the model on weather that it has not seen, which is its purpose.
 
 Run it with ``python examples/plot_grid_search.py``; the figure goes to the folder ``figures``.
 """

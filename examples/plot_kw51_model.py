@@ -48,7 +48,7 @@ def displacements(structure, shape):
 
 
 def kind(moved):
-    """What moves most: arches or deck, and in which direction."""
+    """Name of a mode by the part that moves most, arches or deck, and its direction."""
     shares = {
         (part, direction): sum(u[axis] ** 2 for node, u in moved.items() if node[0] == part)
         for part in ("arch", "deck")

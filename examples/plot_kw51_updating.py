@@ -2,17 +2,17 @@
 KW51: sensitivities and model updating
 ======================================
 
-Appendix A of Kamali, Ceravolo & Marzani (2026) on our own model of the bridge,
+Appendix A of Kamali, Ceravolo & Marzani (2026) for our own model of the bridge,
 :func:`~skthermo.datasets.make_kw51`, with its Tables A.3, A.4 and A.5 beside ours and a counterpart of Fig. A.2;
 ``plot_kw51_model.py`` draws that of Fig. A.1.
 
-Eleven properties are fitted to six measured frequencies, within 10 % of the moduli and 50 % of all else. Six numbers
-cannot tell eleven: most multipliers end at their bounds, and the last columns of Table A.4 say how little they mean.
-Three fits are compared:
+Eleven properties are fitted to six measured frequencies, within 10 % of the moduli and 50 % of all else. Six
+frequencies cannot determine eleven properties: most multipliers end at their bounds, and the last columns of Table A.4
+show how uncertain they are. Three fits are compared:
 
 - *modes followed* by their shapes, within the paper's bounds;
-- *modes sorted*: what looks like a better fit is a false one, as modes have swapped places, and the updater says so;
-- *modes followed, E_bot within 30 %*: the third mode, lateral bending of the deck, wants a stiffer deck than the
+- *modes sorted*: the fit looks better but is false, because modes have swapped places, and the updater warns of it;
+- *modes followed, E_bot within 30 %*: the third mode, lateral bending of the deck, needs a stiffer deck than the
   paper's bounds allow.
 
 Run it with ``python examples/plot_kw51_updating.py``; the figure goes to the folder ``figures``.

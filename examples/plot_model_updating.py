@@ -1,15 +1,15 @@
 """
-Model updating: what can be known, and what was found
-=====================================================
+Model updating: identifiability, and estimates with error bars
+==============================================================
 
 A frame of three storeys on soft soil: the stiffness of its columns, beams and soil is up to 35 % off. Frequencies,
 and mode shapes at eight accelerometers, are simulated with noise, so that the truth is known, and
 :class:`~skthermo.updating.ModelUpdater` looks for it from thirty starts:
 
 - :func:`~skthermo.updating.identifiability` says *before* anything is measured how accurate each parameter can become;
-- the updater's own error bars, from one set of measurements, say it again at the optimum;
+- the updater's error bars, from one set of measurements, give the same accuracy at the optimum;
 - frequencies alone have many optima, and many parameters fit them: where modes swap places, a frequency is
-  compared with another mode's. Mode shapes tell which mode is which, and where the structure is soft.
+  compared with another mode's. Mode shapes show which mode is which and where the structure is soft.
 
 Run it with ``python examples/plot_model_updating.py``; figures go to the folder ``figures``.
 """
@@ -135,7 +135,7 @@ def plot_parameters(updaters):
 
 
 def plot_starts(updaters):
-    """Objectives that the starts have ended with, over the best."""
+    """Final objective of every start, relative to the best."""
     fig, axes = plt.subplots(1, 2, figsize=(7.5, 3.4), layout="constrained")
     for ax, colour, (name, updater) in zip(axes, (ORANGE, BLUE), updaters.items(), strict=True):
         starts = updater.starts_.sort_values("objective", ignore_index=True)

@@ -2,11 +2,10 @@
 Truss: does simulated weather keep damage as detectable as it is?
 =================================================================
 
-The numerical study of Kamali, Ceravolo & Marzani (2026), Section 3. A 28-bar truss warms and cools
-by a thermo-mechanical law that nobody tells the method: it sees temperatures and frequencies of
-one healthy year, and learns from them how temperature moves four stiffness parameters of its FE
-model. Then it simulates healthy and damaged years, and a detector judges these as it
-judges the true ones.
+The numerical study of Kamali, Ceravolo & Marzani (2026), Section 3. The stiffness of a 28-bar truss follows
+temperature by a thermo-mechanical law that the method does not know. From temperatures and frequencies of one healthy
+year it learns how temperature changes four stiffness parameters of its FE model. Then it simulates healthy and damaged
+years, and a detector is applied to these and to the true ones.
 
 Run it with ``python examples/plot_truss_study.py``; figures go to the folder ``figures``.
 """
@@ -81,7 +80,7 @@ class Study:
         return make_truss_campaign(n_years, noise=NOISE, random_state=self.random)
 
     def sources(self, campaign):
-        """(model, theta) by the thermo-mechanical law, by what was learned, and by the oracle."""
+        """(model, theta) by the thermo-mechanical law, by the fitted chain, and by the oracle."""
         return {
             "thermo": (campaign.model, campaign.theta),
             "informed": (self.model, self.fem.predict_parameters(campaign.temperatures)),
@@ -146,7 +145,7 @@ def best_theta(model, frequencies, steps=20, damping=1e-4):
     """Damped Gauss-Newton fit of ln theta to noise-free frequencies, row by row.
 
     The zones of temperature cut across the parameters' groups, so that no theta is exact and no
-    theta(T) does better. The damping holds the vertical members, which the modes hardly feel.
+    theta(T) does better. The damping limits the stiffness of the vertical members, which hardly affects the modes.
     """
     theta = np.ones((len(frequencies), len(model.parameter_names)))
     for _ in range(steps):
@@ -230,7 +229,7 @@ def plot_baseline(study):
 
 
 def plot_parameters(study):
-    """Counterpart of Fig. 6: parameters that M1 finds in the baseline, and what M2 learns of them."""
+    """Counterpart of Fig. 6: parameters that M1 estimates for the baseline, and those that M2 predicts."""
     fig, axes = plt.subplots(2, 2, figsize=(11, 5.5), sharex=True, layout="constrained")
     days = np.arange(1, 366)
     learned = study.fem.predict_parameters(study.baseline.temperatures)

@@ -2,10 +2,11 @@
 Your own structure: from a logger's file to a fitted chain
 ==========================================================
 
-A tower is logged every half hour for a month: two temperatures and seven frequencies, with stamps that are not round,
-one that goes back, and gaps of hours and days. Here the log becomes tidy frames, a tower of beams on rocking springs
-is updated to the mean frequencies and learns the weather, and what can be wrong with records is provoked on purpose.
-Which measured mode is which is not known: they are paired by frequency alone, one of them with a vertical mode.
+A tower is logged every half hour for a month: two temperatures and seven frequencies, with time stamps that are not
+round, one stamp that goes back, and gaps of hours and days. Here the log becomes tidy frames, a tower of beams on
+rocking springs is updated to the mean frequencies and learns the effect of temperature, and typical defects of records
+are introduced on purpose. The measured modes are not identified: they are paired with those of the model by frequency
+alone, one of them with a vertical mode.
 
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``, or set ``SKTHERMO_DATA`` to
 the folder that holds ``tower/tower.csv``. Without either it makes a synthetic log with the same defects. The log has
@@ -131,7 +132,7 @@ def hold_out_table(fem, T, F, n_train):
 
 
 def quietly(function, *arguments):
-    """Call without the warning of foreign weather, which is counted before."""
+    """Call a function without its warning of unknown weather, which the example has already counted."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
         return function(*arguments)
@@ -149,7 +150,7 @@ def said(function, *arguments):
 
 
 def provoked(model, fem, T, F):
-    """What is said of each mistake, by its name."""
+    """Warning or error for each mistake, by the name of the mistake."""
     swapped = F.rename(columns={"f2": "f3", "f3": "f2"})[list(F)]
     gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
     return {
@@ -182,7 +183,7 @@ def plot_over_temperature(T, F, predicted):
 
 
 def plot_hold_out(F, predicted, n_train):
-    """Three frequencies over time, before and after the last record that was learned from."""
+    """Three frequencies over time, before and after the last training record."""
     fig, axes = plt.subplots(3, 1, figsize=(11, 7), sharex=True, layout="constrained")
     for ax, mode in zip(axes, ("f1", "f4", "f6"), strict=True):
         ax.plot(F[mode], ".", ms=3, color=BLUE, label="measured")
@@ -195,7 +196,7 @@ def plot_hold_out(F, predicted, n_train):
 
 
 def plot_parameters(T, fem, n_train):
-    """Parameters over T2: found in the frequencies, and learned from the temperatures."""
+    """Parameters over T2: estimated from frequencies, and predicted from temperatures."""
     fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
     learned = quietly(fem.predict_parameters, T)
     for ax, name in zip(axes, learned, strict=True):

@@ -4,11 +4,11 @@ Z24: a real bridge, its weather and its damage
 
 The Z24 bridge was monitored for a year and then damaged step by step. Below 0 °C its frequencies rise by
 some 2 % a degree, because asphalt and soil freeze; damage lowers them by less than a frosty week raises
-them. Here an FE model learns that weather from the first four fifths of the healthy records, is tested on
-the last fifth, and then simulates the damage that the bridge was given.
+them. Here an FE model learns that effect from the first four fifths of the healthy records, is tested on
+the last fifth, and then simulates the damage that was done to the bridge.
 
-Boosted trees map temperatures here, because polynomials run away where the test is warmer than anything
-learned from; trees stay at the last value, which the figures show above 13 °C.
+Boosted trees map temperatures to parameters here, because polynomials extrapolate badly where the test is warmer than
+all training records. Trees stay at their last value, as the figures show above 13 °C.
 
 The data belong to KU Leuven and are not part of this package. Run the example with the folder or the file
 that holds them: ``python examples/plot_z24_bridge.py path/to/z24_monitoring.csv``, or set
@@ -54,12 +54,12 @@ MODES = [f"$f_{i}$ ({kind})" for i, kind in enumerate(KINDS, 1)]
 
 
 def boosting():
-    """The same regression wherever temperatures are an input."""
+    """The regressor for every input of temperatures."""
     return MultiOutputRegressor(GradientBoostingRegressor(random_state=0))
 
 
 def bridge_model(track=True):
-    """The bridge's FE model, reduced for every multiplier that frost or damage may ask for."""
+    """The bridge's FE model, reduced for all multipliers that frost or damage may need."""
     return make_z24(track=track).reduced([[0.4, 4.0]] * 4, random_state=0)
 
 
@@ -79,7 +79,7 @@ def chain(model, bounds):
 
 
 def find(path):
-    """The data file that a path means, or an exit that says what is missing."""
+    """The data file at a path; exits with a message if it is missing."""
     if path is None:
         sys.exit(NO_DATA.format("SKTHERMO_DATA, which is not set"))
     for file in (path, *(path / name for name in FILES)):
@@ -105,7 +105,7 @@ class Bridge:
 
 
 def report_model():
-    """What the inverse problem looks like before any data are seen."""
+    """Properties of the inverse problem, before any data are used."""
     model = bridge_model()
     slopes = sensitivity(model)
     print("d ln f / d ln theta", slopes.round(3), sep="\n")
@@ -159,7 +159,7 @@ class Damage:
         return 100 * (frequencies / self.expected - 1).mean()
 
     def with_noise(self, frequencies, seed):
-        """With what the chain cannot explain: its out-of-fold residuals, all modes of a record drawn together."""
+        """Add the out-of-fold residuals of the chain, drawn record by record for all modes together."""
         drawn = self.residuals.sample(len(frequencies), replace=True, random_state=seed)
         return frequencies * (1 + drawn.to_numpy())
 
@@ -193,7 +193,7 @@ def damage_table(indices):
 
 
 def plot_over_time(bridge, fem):
-    """Measured and predicted frequencies over the monitored year; the last fifth was not learned from."""
+    """Measured and predicted frequencies over the monitored year; the last fifth is hold-out data."""
     fig, axes = plt.subplots(5, 1, figsize=(11, 9), sharex=True, layout="constrained")
     predicted = fem.predict(bridge.T)
     for ax, mode, name in zip(axes, bridge.F, MODES, strict=False):
@@ -211,7 +211,7 @@ def plot_over_time(bridge, fem):
 
 
 def plot_over_temperature(bridge, fem):
-    """The knee at 0 °C, measured and predicted, in the records that were not learned from and in all others."""
+    """The knee at 0 °C, measured and predicted, in the hold-out records and in all others."""
     fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
     predicted = fem.predict(bridge.T)
     for ax, mode, name in zip(axes, bridge.F, MODES, strict=True):
@@ -225,7 +225,7 @@ def plot_over_temperature(bridge, fem):
 
 
 def plot_parameters(bridge, fem):
-    """Parameters over temperature: what M1 finds in the frequencies, and what M2 makes of the temperatures."""
+    """Parameters over temperature: M1 estimates them from frequencies, M2 predicts them from temperatures."""
     fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
     learned = fem.predict_parameters(bridge.T)
     for ax, name in zip(axes, learned, strict=True):
@@ -254,7 +254,7 @@ def plot_indices(bridge, indices):
 
 
 def plot_drops(damage):
-    """What damage does to each mode; only f2 was fitted."""
+    """Effect of damage on each mode; only f2 was fitted."""
     fig, ax = plt.subplots(figsize=(6.5, 3.8), layout="constrained")
     places = np.arange(4)
     ax.bar(places - 0.2, damage.measured_drop, width=0.4, color=BLUE, label="measured")

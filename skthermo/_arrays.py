@@ -15,7 +15,7 @@ RandomState: TypeAlias = int | np.random.RandomState | None
 
 
 def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
-    """Values of a mapping in the order of the parameters; each parameter must be there, and no other."""
+    """Values of a mapping in the order of the parameters; its keys must be exactly the parameters."""
     unknown = [name for name in values if name not in parameter_names]
     missing = [name for name in parameter_names if name not in values]
     if unknown or missing:
@@ -25,7 +25,7 @@ def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what
 
 
 def real_array(values: Any, what: str) -> Array:
-    """An array of floats; complex numbers, sparse matrices and what is not a number are errors.
+    """An array of floats; complex numbers, sparse matrices and values that are not numbers are errors.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def as_floats(values: Any) -> Array:
     Raises
     ------
     ValueError
-        If they are complex.
+        If values are complex.
     """
     values = without_mask(values)
     is_pandas = hasattr(values, "iloc")
@@ -59,12 +59,12 @@ def as_floats(values: Any) -> Array:
         raise ValueError("the values are complex; expected real numbers")
     try:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
-    except TypeError:  # pandas' NA among objects is no float
+    except TypeError:  # pandas' NA in an object array is not a float
         return without_missing(np.asarray(array, dtype=object)).astype(float)
 
 
 def without_mask(values: Any) -> Any:
-    """A masked array as an array with NaN where it is masked; anything else as it is."""
+    """A masked array becomes an array with NaN at masked values; anything else is returned unchanged."""
     if not isinstance(values, np.ma.MaskedArray):
         return values
     floats: Any = values if values.dtype.kind in "fc" else values.astype(float)
@@ -79,7 +79,7 @@ def without_missing(objects: NDArray[np.object_]) -> NDArray[np.object_]:
 
 
 def as_columns(values: ArrayLike) -> Array:
-    """A table of floats; a vector becomes its only column."""
+    """A 2-D array of floats; a vector becomes a single column."""
     array = as_floats(values)
     return array[:, np.newaxis] if array.ndim == 1 else array
 
@@ -90,9 +90,9 @@ def as_dense(matrix: Matrix) -> Array:
 
 
 def positive_integer(value: Any, what: str) -> int:
-    """Python's integer of an integer of any kind; what is none, or not positive, is an error.
+    """A positive integer of any type as Python's ``int``; anything else is an error.
 
-    NumPy's small integers overflow where they are multiplied.
+    NumPy's small integer types would overflow in products.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{what} is {value!r}; expected a positive integer")
@@ -105,7 +105,7 @@ def as_random_state(seed: Any) -> np.random.RandomState:
     Raises
     ------
     ValueError
-        If the seed is something else, such as a numpy Generator.
+        If the seed is of another type, such as a numpy Generator.
     """
     from sklearn.utils import check_random_state
 

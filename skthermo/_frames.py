@@ -13,11 +13,11 @@ from skthermo._warnings import warn_user
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
-MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers by which loggers say that a value is missing
+MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
 
 
 def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
-    """Values as a frame with X's index where X is a frame, else as they are; by default with X's columns too."""
+    """Values as a frame with X's index (and by default X's columns) if X is a frame, else unchanged."""
     if not isinstance(X, pd.DataFrame):
         return values
     return pd.DataFrame(values, index=X.index, columns=X.columns if columns is None else list(columns), copy=False)
@@ -31,7 +31,7 @@ def column_names(X: Any, default: str) -> list[Hashable]:
 
 
 def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Refuse columns that hold no value, or (``varying``) only one value in two or more rows.
+    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
 
 
 def check_temperatures(T: ArrayLike) -> None:
-    """Refuse what is not degrees Celsius: kelvin, and numbers that stand for a missing value, such as -999.
+    """Raise an error for temperatures in kelvin, and for numbers that stand for a missing value, such as -999.
 
-    Numbers above 100 or below -80 stand for missing values if they are more than 100 away from the rest of their
+    Numbers above 100 or below -80 count as missing values if they differ by more than 100 from the rest of their
     column; so does any number below absolute zero.
 
     Raises
@@ -81,7 +81,7 @@ def check_temperatures(T: ArrayLike) -> None:
 
 
 def warn_of_markers(X: ArrayLike) -> None:
-    """Warn of numbers that stand for a missing value, such as -999, wherever columns may hold anything else."""
+    """Warn of numbers that probably stand for a missing value, such as -999, in columns of any quantity."""
     values = as_floats(X)
     marked = np.isin(values, MARKERS)
     if marked.any():
@@ -94,7 +94,7 @@ def warn_of_markers(X: ArrayLike) -> None:
 
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
-    """Refuse two tables of different length or, where both are frames, of different index.
+    """Raise an error if two tables differ in length or, where both are frames, in index.
 
     Raises
     ------

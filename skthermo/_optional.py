@@ -5,7 +5,7 @@ from types import ModuleType
 
 
 def import_optional(module: str, *, extra: str) -> ModuleType:
-    """Import ``module``, or say which extra of skthermo brings it.
+    """Import ``module``; if it is missing, the error names the extra of skthermo that installs it.
 
     Raises
     ------

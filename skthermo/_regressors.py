@@ -1,4 +1,4 @@
-"""Regressors of one output or several, with or without standard deviations."""
+"""Fit and predict with regressors of one or several outputs, with or without standard deviations."""
 
 from typing import Any
 
@@ -11,9 +11,10 @@ from skthermo._validation import InvalidParameterError
 
 
 def fit_outputs(regressor: BaseEstimator, X: Any, y: Any) -> BaseEstimator:
-    """A clone of the regressor fitted to all outputs, or one clone for each where it takes one output only.
+    """A clone of the regressor fitted to all outputs, or one clone for each output if it takes only one.
 
-    It is tried, because scikit-learn's tag of multiple outputs does not tell: it is False for ``MLPRegressor``.
+    Several outputs are simply tried, because scikit-learn's tag for them is not reliable: it is False for
+    ``MLPRegressor``.
     """
     try:
         return clone(regressor).fit(X, y)
@@ -34,7 +35,7 @@ def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
     Raises
     ------
     ValueError
-        If the regressor has no standard deviations.
+        If the regressor gives no standard deviations.
     """
     if isinstance(regressor, MultiOutputRegressor):
         parts = [predict_with_std(part, X) for part in regressor.estimators_]

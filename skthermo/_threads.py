@@ -1,4 +1,4 @@
-"""One BLAS thread for small matrices and small networks, which more threads make slower."""
+"""Limits BLAS to one thread for small matrices and small networks, which more threads would slow down."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +14,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _lock = Lock()
-_inside: list[int] = []  # one entry for each context that is open, the thread that opened it
+_inside: list[int] = []  # for each open context, the thread that opened it
 _limits: Any = None
 
 
@@ -25,7 +25,7 @@ def _controller() -> threadpoolctl.ThreadpoolController:
 
 @contextmanager
 def _in_control() -> Iterator[None]:
-    """Let this thread set limits: since threadpoolctl 3.8 only the first thread that did so can."""
+    """Let this thread set limits: since threadpoolctl 3.8 only the first thread to set limits may do so."""
     openblas = getattr(threadpoolctl, "OpenBLASController", None)
     let_go = getattr(openblas, "clear_controlling_thread", lambda force: None)
     let_go(force=True)
@@ -35,11 +35,11 @@ def _in_control() -> Iterator[None]:
 
 @contextmanager
 def single_blas_thread() -> Iterator[None]:
-    """Hold every BLAS of this process to one thread.
+    """Limit every BLAS library of this process to one thread.
 
     The limit is global to the process. Contexts that overlap in several Python threads are therefore
-    counted: the first to enter sets the limit, the last to leave lifts it. A process forked meanwhile keeps only
-    the contexts of the thread that forked it.
+    counted: the first to enter sets the limit, and the last to leave lifts it. A process forked in the meantime keeps
+    only the contexts of the thread that forked it.
     """
     global _limits
     thread = get_ident()
@@ -66,7 +66,7 @@ def _lift_limit_after_last() -> None:
 
 
 def _forget_other_threads() -> None:
-    """In a forked process, where only the thread that forked goes on."""
+    """Called in a forked process, in which only the thread that forked continues."""
     _inside[:] = [thread for thread in _inside if thread == get_ident()]
     _lift_limit_after_last()
     _lock.release()
@@ -77,10 +77,10 @@ if hasattr(os, "register_at_fork"):  # not on Windows
 
 
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-    """Map with as many Python threads as BLAS has, one BLAS thread in each.
+    """Map with as many Python threads as BLAS has threads, each limited to one BLAS thread.
 
-    Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) limit these threads too. Closing the
-    iterator waits for the items that are running and skips the rest.
+    Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) apply to these Python threads too. Closing
+    the iterator waits for the items that are running and skips the rest.
     """
     n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
     with single_blas_thread():

@@ -1,4 +1,5 @@
-"""The one import point for scikit-learn's private helpers; FE models and seeds inside estimators."""
+"""Wrappers of scikit-learn's private functions, which are imported only here; FE models and seeds inside
+estimators."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,7 +44,8 @@ __all__ = [
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data`; what is masked or missing in X is NaN, and names of columns are different."""
+    """scikit-learn's `validate_data`; masked or missing values in X become NaN, and repeated column names are an
+    error."""
     if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
         raise ValueError(f"X has the columns {list(X.columns)}; expected each name once")
     with numbers_expected():
@@ -51,14 +53,14 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
 
 def check_array(values: Any, **options: Any) -> Any:
-    """scikit-learn's `check_array`; what is masked or missing is NaN."""
+    """scikit-learn's `check_array`; masked or missing values become NaN."""
     with numbers_expected():
         return sklearn.utils.check_array(with_nan(values), **options)
 
 
 @contextmanager
 def numbers_expected() -> Iterator[None]:
-    """Say in plain words that a table holds text or complex numbers, where NumPy fails to convert them."""
+    """Replace NumPy's conversion error by one that says that a table holds text or complex numbers."""
     try:
         yield
     except (ValueError, TypeError) as error:
@@ -70,7 +72,7 @@ def numbers_expected() -> Iterator[None]:
 
 
 def with_nan(X: Any) -> Any:
-    """NaN in place of masked values, and of None and pandas' NA among objects; anything else as it is."""
+    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged."""
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
     if isinstance(X, np.ndarray) and X.dtype == object:
@@ -79,13 +81,13 @@ def with_nan(X: Any) -> Any:
 
 
 def is_model(candidate: Any) -> bool:
-    """Whether an object is an FE model, judged by what it can do."""
+    """Whether an object has the attributes of an FE model."""
     wanted = ("parameter_names", "n_modes", "frequencies")
     return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in wanted)
 
 
 def check_model(candidate: Any) -> None:
-    """Refuse what is no FE model.
+    """Raise an error for an object that is not an FE model.
 
     Raises
     ------
@@ -97,15 +99,15 @@ def check_model(candidate: Any) -> None:
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:
-    """A RandomState, or None, with which parts draw from numpy's global state."""
+    """A RandomState, or None; with None, parts draw from numpy's global state."""
     return None if random_state is None else check_random_state(random_state)
 
 
 def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | None) -> None:
     """Seed every ``random_state`` of an estimator and its parts that is None; None seeds nothing.
 
-    Parts inside a part with a seed of its own, and FE models, are left alone. A seed is drawn for every other part,
-    so that seeding one leaves the rest as they were.
+    FE models, and the parts of a part that has its own seed, are not seeded. A seed is drawn for every other part, so
+    that giving one part its own seed does not change the seeds of the others.
     """
     if random_state is None:
         return
@@ -124,7 +126,7 @@ def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | N
 
 
 def clone_sharing_models(estimator: BaseEstimator) -> BaseEstimator:
-    """scikit-learn's clone, but FE models are shared and never copied."""
+    """scikit-learn's clone, except that FE models are shared, never copied."""
     parameters = estimator.get_params(deep=False)
     twin = type(estimator)(
         **{name: value if is_model(value) else clone(value, safe=False) for name, value in parameters.items()}

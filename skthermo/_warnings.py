@@ -1,4 +1,4 @@
-"""Warnings that point at the user's line, once each."""
+"""Warnings that point at the user's line, each given once."""
 
 import os
 import sys
@@ -27,7 +27,7 @@ def warn_user(message: str, kind: str) -> None:
     Parameters
     ----------
     message : str
-        What is to be said.
+        Text of the warning.
     kind : str
         One cross-validation or search gives one warning of each kind, not one for each fold.
     """
@@ -46,6 +46,6 @@ def warn_user(message: str, kind: str) -> None:
 
 
 def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
-    """Give warnings by kind and text."""
+    """Give each warning, a pair of kind and text."""
     for kind, message in warnings_by_kind:
         warn_user(message, kind)

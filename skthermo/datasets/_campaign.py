@@ -15,7 +15,7 @@ SEASON = np.array([[15, 15], [15, 20], [17, 25]])  # mean and amplitude in C, eq
 DAILY = np.array([20, 16, 20])
 SCATTER = np.array([3, 2, 8])
 PHASE = np.array([0, 0, np.pi / 6])
-KELVIN = 150.0  # no structure is as hot in degrees Celsius
+KELVIN = 150.0  # no structure gets this hot in degrees Celsius
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
@@ -63,11 +63,11 @@ def make_truss_campaign(
     damage: Mapping[str, float] | None = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> Bunch:
-    """Temperatures and frequencies of the 28-bar truss by its thermo-mechanical law.
+    """Synthetic monitoring of the 28-bar truss: temperatures, and frequencies by its thermo-mechanical law.
 
-    The ground truth of Kamali et al. (2026), Section 3: three thermocouples follow season, day
-    and chance (eqs. (11)-(13)), each sets Young's modulus (eq. (10)) of the members in its zone,
-    and an eigenvalue analysis gives the frequencies.
+    The ground truth of Kamali et al. (2026), Section 3: the temperatures at three thermocouples vary with season, time
+    of day and at random (eqs. (11)-(13)), each sets Young's modulus (eq. (10)) of the members in its zone, and an
+    eigenvalue analysis gives the frequencies.
 
     Parameters
     ----------

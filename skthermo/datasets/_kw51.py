@@ -35,13 +35,13 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
     """FE model of the railway bridge KW51 in Leuven before its retrofit, not updated.
 
     A steel tied arch of 115 m with an orthotropic deck, as Kamali et al. (2026), Appendix A,
-    describe it: a frame in space with 1760 degrees of freedom.
+    describe it: a space frame with 1760 degrees of freedom.
 
     Parameters
     ----------
     parameters : str or collection of str, optional
-        Some of the 21 names of Table A.2, in the wished order, or "all". By default the five that vary
-        with temperature, eq. (21): E_bot, E_arc, E_br, E_con, E_pip.
+        Some of the 21 names of Table A.2, in the order of the columns of theta, or "all". By default the five that
+        vary with temperature, eq. (21): E_bot, E_arc, E_br, E_con, E_pip.
     n_modes : int, default=6
         Number of modes.
 
@@ -69,8 +69,8 @@ def make_kw51(parameters: str | Collection[str] | None = None, n_modes: int = 6)
     (girders), and of lateral bending, I_22p, I_22a, I_22g and I_22s (stiffeners), and the torsion constant J_a.
     M_a and M_g multiply the masses of arch and girders.
 
-    Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. What they leave
-    open is assumed here, once and before any updating:
+    Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. Values that they do not give
+    are assumed here, before any updating:
 
     ===================  ================================  =====================================================
     quantity             value                             reason

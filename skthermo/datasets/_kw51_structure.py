@@ -1,4 +1,4 @@
-"""Geometry and members of the railway bridge KW51; `make_kw51` gives the reasons."""
+"""Geometry and members of the railway bridge KW51; `make_kw51` explains the assumptions."""
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
@@ -120,7 +120,7 @@ def hanger(foot: int, head: int, line: int) -> list[Node]:
 
 
 def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffness: float = 1.0) -> dict[Node, Beam]:
-    """Beams along chains of nodes, of steel or something stiffer."""
+    """Steel beams along chains of nodes; ``stiffness`` multiplies the modulus."""
     material = STEEL | {modulus: stiffness * STEEL[modulus] for modulus in ("E", "G")}
     return {
         (part, start, end): Beam(start, end, **material, **section)
@@ -138,7 +138,7 @@ def transverse_beams() -> dict[Node, Beam]:
 
 
 def stiffeners() -> dict[Node, Beam]:
-    """All stiffeners, gathered along the lines of the mesh by the width that belongs to each."""
+    """All stiffeners, lumped at the lines of the mesh in proportion to the tributary width of each."""
     gathered = {}
     for line in LINES:
         width = WIDTH / N_PANELS / (2 if line in SIDES else 1)

@@ -58,5 +58,5 @@ def of_rectangles(*rectangles: tuple[float, float, float, float]) -> Section:
 
 
 def times(number: float, section: Section) -> Section:
-    """Several members side by side, each bending on its own."""
+    """Several members side by side that bend independently."""
     return {name: number * value for name, value in section.items()}

@@ -25,11 +25,11 @@ def make_truss(n_modes: int = 6) -> AffineModel:
     AffineModel
         With 4 parameters, the stiffness of the ``bottom``, ``top``, ``diagonal`` and
         ``vertical`` members (E_l, E_t, E_d, E_v in eq. (16)), which are also its damage groups;
-        23 degrees of freedom. Modes keep their order, so that columns are sorted.
+        23 degrees of freedom. Columns are sorted by frequency (no tracking).
 
     Notes
     -----
-    The paper gives the members' groups and the material; its dimensions stand in a figure. This
+    The paper gives the members' groups and the material; its dimensions are given in a figure only. This
     geometry is a reconstruction found by fitting the published Table 3. Three members belong
     to no group: 11 and 12, which carry the apex, and 28, the last end post.
 

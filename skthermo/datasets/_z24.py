@@ -17,7 +17,7 @@ MODES = ["f1", "f2", "f3", "f4"]
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 STATES = ("undamaged", "damaged")
 UNKNOWN = "unknown"
-BYTES_FOR_EACH_CHARACTER = 20  # that a table of short texts takes
+BYTES_FOR_EACH_CHARACTER = 20  # of a table of short texts in memory
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
@@ -32,9 +32,9 @@ def load_z24(path: str | PathLike) -> Bunch:
     ----------
     path : str or path-like
         A CSV file with the columns ``record``, ``f1``..``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
-        ``TS``, ``Tair`` and ``state`` ("undamaged" or "damaged"), or the MATLAB v5 file in which the data
-        circulate: ``data`` (n x 4), ``Z24_TP``, ``Z24_TWN``, ... (n x 1) and, optionally, ``idx``
-        (mask over the hours) and ``nc`` (number of undamaged rows).
+        ``TS``, ``Tair`` and ``state`` ("undamaged" or "damaged"), or the MATLAB v5 file in which the data are usually
+        shared: ``data`` (n x 4), ``Z24_TP``, ``Z24_TWN``, ... (n x 1) and, optionally, ``idx`` (mask over the hours)
+        and ``nc`` (number of undamaged rows).
 
     Returns
     -------
@@ -46,20 +46,20 @@ def load_z24(path: str | PathLike) -> Bunch:
         state : Series of shape (n_records,)
             "undamaged", "damaged", or "unknown" where a MATLAB file has no ``nc``.
 
-        All in file order, no row dropped, on one DatetimeIndex.
+        All three have the rows of the file in their order and the same DatetimeIndex.
 
     Raises
     ------
     ValueError
-        Names the file, and the field and row, of what is missing, repeated, not a number, or impossible
-        (frequencies outside 0.1 to 100 Hz, temperatures outside -60 to 80 C).
+        If a field is missing, or a value is repeated, not a number, or impossible (frequencies outside 0.1 to 100 Hz,
+        temperatures outside -60 to 80 C). The error names the file, field and row.
 
     Notes
     -----
-    Records are counted by hours; hours without an identified record are missing. Stamps are the counter
-    added to 1997-11-11 00:00, the day on which monitoring began; the hour of the first record is not
-    documented, so that times of day are nominal. What exactly the letters of a sensor's name mean is not
-    documented either. Without ``idx``, rows of a MATLAB file are taken as consecutive hours.
+    Records are numbered by hours; hours without an identified record are missing. The time stamp is this number of
+    hours added to 1997-11-11 00:00, the day on which monitoring began; the hour of the first record is not documented,
+    so that times of day are nominal. The meaning of the letters in a sensor's name is not documented either.
+    Without ``idx``, rows of a MATLAB file are taken as consecutive hours.
 
     References
     ----------
@@ -123,7 +123,7 @@ def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
 
 
 def _numbers(texts: tuple[str, ...], what: str) -> NDArray[np.float64]:
-    """Floats, an empty text being a gap."""
+    """Texts as floats; an empty text becomes NaN."""
     values = np.full(len(texts), np.nan)
     for row, text in enumerate(texts):
         try:

@@ -40,7 +40,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     n_modes : int, default=4
         Number of modes.
     track : bool, default=True
-        Whether a column follows its mode; False sorts, to see what that costs.
+        Whether a column follows its mode by shape; False sorts columns by frequency.
 
     Returns
     -------
@@ -56,8 +56,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
 
     Notes
     -----
-    Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0. This is
-    all that the model assumes:
+    Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0. The model assumes:
 
     ================  ==========  =======  =================================================================
     quantity          value       unit     reason
@@ -92,11 +91,11 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     ================  ==========  =======  =================================================================
 
     ``tools/fit_z24_constants.py`` found the four fitted constants by `skthermo.updating.ModelUpdater`, with a
-    mild prior about where they start, from the mean frequencies of the healthy records in which all seven
+    weak prior centred on the start values, from the mean frequencies of the healthy records in which all seven
     sensors are above 5 C, so that nothing is frozen.
 
-    Torsion (f4) has vertical modes close below and above it, so that modes change places in most of the
-    box of +-30 %: columns follow shapes. What separates f1 from f3 is the abutments, and weakly: the smallest
+    Torsion (f4) has vertical modes close below and above it, so that modes change their order in most of the box of
+    +-30 %; columns therefore follow shapes. Only the abutments affect f1 and f3 differently, and weakly: the smallest
     singular value of d ln f / d ln theta is 0.06, a tenth of the largest.
 
     References
@@ -121,7 +120,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
 def z24_structure(
     constants: Mapping[str, Mapping[str, float]] = CONSTANTS, *, element_length: float = 1.0
 ) -> Structure:
-    """Girder, piers, soil and abutments; nodes are called by their coordinates."""
+    """Girder, piers, soil and abutments; nodes are named by their coordinates."""
     axes = [0.0, *np.cumsum(SPANS).tolist()]
     spans = [divided(start, end, element_length) for start, end in pairwise(axes)]
     girder: list[Place] = [(x, 0.0, 0.0) for x in dict.fromkeys(x for span in spans for x in span)]
@@ -146,5 +145,5 @@ def z24_structure(
 
 
 def divided(start: float, end: float, element_length: float) -> list[float]:
-    """Ends of equal elements no longer than asked."""
+    """Ends of equal elements of at most the given length."""
     return np.linspace(start, end, 1 + ceil((end - start) / element_length)).tolist()

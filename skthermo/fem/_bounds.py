@@ -15,8 +15,8 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     Parameters
     ----------
     bounds : float, array-like of shape (n_parameters, 2), or mapping of str to float or pair of floats
-        A half-width (0.2 means 1 +- 20 %), lowest and highest multipliers, or a mapping that gives
-        one or the other for every parameter.
+        A half-width (0.2 means 1 +- 20 %), lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to its half-width or to (lowest, highest).
     parameter_names : sequence of str
         The parameters.
 
@@ -27,7 +27,7 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     Raises
     ------
     ValueError
-        If a half-width is not between 0 and 1, the shape is another, a lowest multiplier is
+        If a half-width is not between 0 and 1, the shape is wrong, a lowest multiplier is
         not positive or not below the highest, or a mapping leaves out a parameter or names an unknown one.
 
     Examples

@@ -1,4 +1,4 @@
-"""Degrees of freedom as users give them."""
+"""Checks of degrees of freedom given by users."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     Raises
     ------
     ValueError
-        If these are not integers in one row, one of them is negative or not below ``n_dof``, or repeats.
+        If ``dofs`` is not a vector of integers, or a value is negative, not below ``n_dof``, or repeated.
 
     Examples
     --------

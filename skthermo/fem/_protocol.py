@@ -1,4 +1,4 @@
-"""What an FE model must offer, and what it may offer beyond that."""
+"""The interface of FE models: required and optional methods."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
@@ -10,7 +10,7 @@ from skthermo._arrays import Array
 
 @runtime_checkable
 class FEModel(Protocol):
-    """The duck type of every FE model: anything with these three members will do.
+    """The interface of every FE model: any object with these two attributes and ``frequencies`` is one.
 
     Attributes
     ----------
@@ -25,12 +25,12 @@ class FEModel(Protocol):
     DifferentiableModel : Gives derivatives of its frequencies.
     DamageableModel : Takes damage.
     LocalModel : Gives everything about its modes at one theta.
-    BatchModel : Says how many rows are best solved together.
+    BatchModel : States how many rows are best solved together.
 
     Notes
     -----
-    A model that offers more is used for more. Each stage looks for the method that it needs, not for a class, and an
-    error names the method that is missing. Beside the protocols above, these are looked for:
+    Each stage looks for the methods that it needs, not for a class, and an error names a missing method. Besides the
+    protocols above, these are optional:
 
     - ``track``, whether a column follows its mode (True) or its rank (False);
     - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box;
@@ -53,7 +53,7 @@ class FEModel(Protocol):
 
 
 def check_model(model: Any) -> None:
-    """Refuse what is not an FE model."""
+    """Raise an error for an object that is not an FE model."""
     missing = [name for name in ("parameter_names", "n_modes", "frequencies") if not hasattr(model, name)]
     if missing or isinstance(model, type):
         raise ValueError(
@@ -92,7 +92,7 @@ class DifferentiableModel(FEModel, Protocol):
 
 
 class DamageableModel(FEModel, Protocol):
-    """An FE model that damage can be put into.
+    """An FE model that can be damaged.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class LocalModel(FEModel, Protocol):
         """Whether a column follows its mode rather than its rank."""
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
-        """A `LocalModes` of the lowest modes at one theta; with ``follow``, of enough to hold every nominal mode."""
+        """`LocalModes` at one theta: the lowest modes; with ``follow``, enough to contain every nominal mode."""
 
 
 class BatchModel(FEModel, Protocol):

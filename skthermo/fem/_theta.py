@@ -31,7 +31,7 @@ def check_theta(
     parameter_names : sequence of str
         The parameters.
     allow_nan : bool, default=False
-        Whether NaN may stand for what is not known.
+        Whether NaN is allowed for unknown values.
     one_row : bool, default=False
         Whether exactly one row is expected.
 
@@ -78,7 +78,7 @@ def check_theta(
 
 
 def warn_of_failures(theta: Array, solved: Array, *, stacklevel: int = 4) -> None:
-    """Say how many known rows have no solution, and at which theta the first of them is."""
+    """Warn of rows without NaN that have no solution: their number and the theta of the first."""
     failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
     if failed.any():
         first = np.flatnonzero(failed)[0]
@@ -91,7 +91,7 @@ def warn_of_failures(theta: Array, solved: Array, *, stacklevel: int = 4) -> Non
 
 
 def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:
-    """Multipliers as they are shown in messages."""
+    """Multipliers by parameter name, for messages."""
     return dict(zip(parameter_names, row.tolist(), strict=True))
 
 

@@ -1,4 +1,4 @@
-"""How far inputs leave what a mapper was trained on."""
+"""How far inputs lie outside the range that a mapper was trained on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
 
 FAR = 0.25
-"""Training ranges beyond which an input counts as foreign weather."""
+"""An input farther outside the training range than this many times its width counts as unknown weather."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class TrainingRange:
         return beyond / np.where(width > 0, width, 1.0) + np.where(np.isnan(values), np.nan, 0.0)
 
     def warning(self, inputs: Any) -> str:
-        """What is to be said if rows are far outside, else nothing."""
+        """Text of the warning if rows are far outside the range, else an empty string."""
         excess, values = np.nan_to_num(self.excess(inputs)), as_floats(inputs)
         rows = (excess > FAR).any(axis=1)
         if not rows.any():
@@ -51,6 +51,6 @@ class TrainingRange:
 
 
 def mapper_inputs(mapper: Any, T: Any) -> Any:
-    """What the last step of a fitted mapper sees: lagged temperatures, for example."""
+    """Inputs of the last step of a fitted mapper, such as lagged temperatures."""
     mapper = getattr(mapper, "best_estimator_", mapper)
     return mapper[:-1].transform(T) if isinstance(mapper, Pipeline) and len(mapper) > 1 else T

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 
 NEAR = 2.0
-"""Half-widths from the middle of the box up to which parameters count as near it: a surrogate bends little there."""
+"""Half-widths from the middle of the box up to which parameters count as near it; a surrogate extrapolates well
+there."""
 
 MANY = 0.05
 """Share of rows far outside the box that gives a warning."""
@@ -23,7 +24,7 @@ class Box:
 
     @property
     def near(self) -> Array:
-        """Bounds of what is in the box or near it; all positive."""
+        """Bounds of the region in or near the box; all positive."""
         middle, half = self.bounds.mean(axis=1), np.diff(self.bounds, axis=1)[:, 0] / 2
         lowest = np.maximum(middle - NEAR * half, self.bounds[:, 0] / 2)
         return np.column_stack([lowest, middle + NEAR * half])
@@ -37,7 +38,7 @@ class Box:
         return _beyond(theta, self.near)
 
     def warning(self, theta: Array) -> str:
-        """What is to be said if many rows are far outside the box, else nothing."""
+        """Text of the warning if many rows are far outside the box, else an empty string."""
         known = ~np.isnan(theta).any(axis=1)
         far = self.far_outside(theta)[known]
         rows = far.any(axis=1)

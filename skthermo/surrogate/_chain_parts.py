@@ -1,4 +1,4 @@
-"""What `DataInformedFEM` is fitted from: records, and clones of its parts."""
+"""Reads the records that `DataInformedFEM` is fitted to, and clones its parts."""
 
 from typing import Any, NamedTuple
 
@@ -44,7 +44,7 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
 
 
 def check_frequencies(F: Any) -> None:
-    """Refuse what is neither a frequency in Hz nor NaN.
+    """Raise an error for values that are neither positive frequencies nor NaN.
 
     Raises
     ------
@@ -98,5 +98,5 @@ def box_of(inverse: BaseEstimator) -> Box | None:
 
 
 def passthrough() -> FunctionTransformer:
-    """Leaves arrays arrays and frames frames."""
+    """A transformer that returns its input unchanged, arrays and frames alike."""
     return FunctionTransformer().set_output(transform="default")

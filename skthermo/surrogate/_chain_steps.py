@@ -1,4 +1,4 @@
-"""The steps of `DataInformedFEM`: complete, invert, report; predict parameters, solve, go back to what is measured."""
+"""Private steps of `DataInformedFEM`: fill gaps, invert, report; predict parameters, solve, undo the alignment."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,14 +15,14 @@ from skthermo.surrogate._report import fit_report, spread_rows
 from skthermo.surrogate._simulator import Simulator, tolerance
 
 MARGIN, LEAST_MARGIN = 0.25, 0.05
-"""What a reduced model's box leaves around the learned parameters: of their range, and of their values."""
+"""Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
 
 POSSIBLE = (1e-6, 1e6)
-"""Multipliers outside which a model's matrices lose all digits."""
+"""Range of multipliers; outside it rounding errors swamp the model's matrices."""
 
 
 class ChainSteps:
-    """What the public methods of the chain are made of."""
+    """Private steps that the public methods of the chain call."""
 
     def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
         check_is_fitted(self)
@@ -41,7 +41,7 @@ class ChainSteps:
         return theta
 
     def _possible(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Parameters, NaN in rows that no structure has, and which rows these are."""
+        """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
         theta = as_columns(theta).copy()
         impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
         theta[impossible] = np.nan
@@ -55,7 +55,7 @@ class ChainSteps:
         return as_floats(self.aligner_.inverse_transform(frequencies))
 
     def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
-        """The model and, with ``reduce``, its reduced model about the parameters learned for the training weather."""
+        """The model and, with ``reduce``, its reduced model for a box around the training parameters."""
         tol = tolerance(self.model, self.reduce)
         if tol is None:
             return Simulator(self.model)
@@ -65,7 +65,7 @@ class ChainSteps:
         return Simulator.within(self.model, box, tol, random_state=0)
 
     def _report(self, T: Any, F: Any, theta: NDArray[np.float64]) -> None:
-        """Keep what the fit has found, and warn of what is doubtful."""
+        """Store the report of the fit, and give its warnings."""
         inputs = mapper_inputs(self.mapper_, T)
         trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
         self.training_range_ = TrainingRange.of(inputs, trained)
@@ -78,7 +78,7 @@ class ChainSteps:
         warn_each(self.report_.warnings())
 
     def _completed(self, T: Any, F: Any) -> Any:
-        """Frequencies without gaps, where there is an imputer."""
+        """Frequencies with gaps filled by the imputer, if there is one."""
         if self.imputer_ is None:
             return F
         n_sensors, n_modes = T.shape[1], F.shape[1]

@@ -33,11 +33,11 @@ Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
 class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
-    """FE model whose parameters follow temperature as monitoring data say.
+    """FE model whose parameters depend on temperature as learned from monitoring data.
 
-    The method of Kamali et al. (2026), Section 2: measured frequencies become parameters
-    (M1, eq. (5)), temperatures are mapped to those parameters (M2, eq. (6)), and the FE model,
-    healthy or damaged, turns them into frequencies again (eqs. (7)-(8)).
+    The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
+    temperatures to those parameters (eq. (6)), and the FE model, healthy or damaged, turns the parameters back into
+    frequencies (eqs. (7)-(8)).
 
     Parameters
     ----------
@@ -50,19 +50,19 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         M2. By default ``TemperatureMapper()``; with thermal inertia, for example
         ``make_pipeline(LagFeatures(), TemperatureMapper())``.
     aligner : transformer or "passthrough", default="passthrough"
-        Takes measured frequencies to the model's domain and back, such as ``BiasAligner(model)``.
+        Maps measured frequencies onto the model's and back, such as ``BiasAligner(model)``.
     imputer : transformer or "passthrough", default="passthrough"
-        Completes the frequencies from temperatures and frequencies side by side, in `fit` only.
-        Without it, rows with a missing mode do not train M2.
+        Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only.
+        Without an imputer, rows with a missing mode do not train M2.
     reduce : bool or float, default=False
-        Whether predictions and simulations go through ``model.reduced``, by which large models are solved much faster.
-        Its box holds the parameters that M2 gives for the training weather, and a quarter of their range on either
-        side. True allows a relative error of 1e-5 in the frequencies, a number that error. Rows outside the box are
-        solved by the model itself, with a warning that counts them.
+        Whether predictions and simulations use the reduced model ``model.reduced``, which makes large models much
+        faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
+        either side. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Rows
+        outside the box are solved by the model itself, with a warning that counts them.
     n_jobs : int, optional
-        Jobs over which rows are spread where the model is solved for many.
+        Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
-        Seeds every part that has no seed of its own.
+        Seed of every part that has no seed of its own.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
     parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
         Multipliers that M1 found in the training data, eq. (5).
     report_ : FitReport
-        What `fit` has found: rows that were left out and why, offsets of modes, errors, what is doubtful.
+        Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     training_range_ : TrainingRange
         Lowest and highest value of each input of M2, lags included.
     box_ : Box or None
@@ -90,8 +90,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
     Notes
     -----
     ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T)))``
-    and nothing else: no correction is learned behind the FE model. Temperatures in a frame
-    give frames. A row that cannot be computed is NaN; none is dropped.
+    and nothing else: no correction is learned on top of the FE model. If temperatures are a frame, results are frames.
+    A row that cannot be computed is NaN; no row is dropped.
 
     References
     ----------
@@ -170,8 +170,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            Once each, with counts, of what `report_` finds doubtful: few rows, rows left out, modes that are far from
-            the model's or look swapped, parameters far outside the bounds of the inverse.
+            One warning, with counts, for each kind of doubtful data in `report_`: few rows, rows left out, modes that
+            are far from the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
         self.mode_names_ = column_names(F, "f")
@@ -219,8 +219,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters; NaN where M2 has no complete input, and, with a warning,
-            where it gives what no structure has (less than 1e-6 or more than 1e6).
+            Multipliers of the nominal parameters; NaN where an input of M2 is missing, and, with a warning, where M2
+            gives a physically impossible multiplier (less than 1e-6 or more than 1e6).
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
@@ -302,7 +302,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         return complete_r2(y, predicted)
 
     def applicability(self, X: ArrayLike) -> pd.DataFrame:
-        """How far weather and parameters are from what was learned, row by row.
+        """How far inputs and parameters are outside the training range, row by row.
 
         Parameters
         ----------
@@ -312,9 +312,9 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Returns
         -------
         DataFrame
-            On X's index: a column for each input of M2, lags included, with how far it is outside the rows that
-            trained M2, in units of its range there (0 inside); and ``outside_bounds``, whether a parameter is outside
-            the bounds of the inverse.
+            With X's index. One column for each input of M2, lags included: its distance outside the range of the
+            training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
+            parameter is outside the bounds of the inverse.
         """
         check_is_fitted(self)
         T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))

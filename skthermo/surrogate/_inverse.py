@@ -21,8 +21,8 @@ from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._simulator import tolerance
 
 MANY_REORDERED = 0.1
-"""Share of simulations in which modes change their order that gives a warning. 5 % of the truss's box cost its tables
-nothing; 29 % of Z24's double the error."""
+"""Share of simulations with modes in another order above which a warning is given. A share of 5 % does not harm the
+truss's results; 29 % doubles the error of Z24."""
 
 
 class InverseSurrogate(TransformerMixin, MultiplierRegressor):
@@ -35,41 +35,41 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     model : FE model, optional
         Needed unless `fit` gets frequencies and parameters.
     regressor : regressor, optional
-        Any regressor, between the logarithms of frequencies and of parameters, which are nearly linear in each
-        other; both are standardised. One that takes a single output only is fitted once for each parameter. By
-        default a small ``MLPRegressor``; see `paper_network` for the paper's.
+        Any regressor. It learns the standardised logarithms of the parameters from those of the frequencies, a nearly
+        linear relation. A regressor of a single output is fitted once for each parameter. By default a small
+        ``MLPRegressor``; see `paper_network` for the paper's.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-        Box of multipliers: a half-width, lowest and highest of each parameter, or a mapping that gives one or the
-        other for every parameter.
+        Box of multipliers: a half-width, lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to its half-width or to (lowest, highest).
     n_samples : int, default=1000
         Number of simulations.
     noise : float or array-like of shape (n_modes,), default=0.0
-        Relative standard deviation of Gaussian noise added to the simulated frequencies. With
-        the measurement's noise, M1 learns the posterior mean of the parameters and does not
-        amplify that noise, at the price of estimates drawn towards the middle of the box.
+        Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
+        measurement, M1 learns the posterior mean of the parameters and does not amplify that noise, but its estimates
+        are biased towards the middle of the box.
     reduce : bool or float, default=False
-        Whether simulations are of ``model.reduced(bounds)``, which large models are learned from much
-        faster. True allows a relative error of 1e-5 in the frequencies, a number that error.
-        `inverse_transform` stays with the model itself.
+        Whether to simulate with the reduced model ``model.reduced(bounds)``, much faster for large models. True allows
+        a relative error of 1e-5 in the frequencies; a number sets the error allowed. `inverse_transform` always uses
+        the full model.
     memory : str or joblib.Memory, optional
-        Where simulations are kept, so that a search over other settings does not repeat them.
-        Processes that want the same simulations wait for the first one. With ``random_state=None`` they are always
-        the same. Clear it when the program behind a model of your own changes.
+        Where simulations are stored, so that a search over other settings does not repeat them. If several processes
+        need the same simulations, one makes them and the others wait. With ``random_state=None``, stored simulations
+        are always the same. Clear the memory when the program behind a model of your own changes.
     n_jobs : int, optional
-        Jobs over which simulations are spread.
+        Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
-        Seeds the drawing, the noise, and the regressor unless that has its own seed.
+        Seed of the samples, of the noise, and of the regressor unless it has its own seed.
 
     Attributes
     ----------
     regressor_ : regressor
-        Fitted; between standardised log frequencies and standardised log parameters.
+        Fitted to standardised log frequencies (inputs) and standardised log parameters (outputs).
     inputs_, targets_ : Standardiser
         Means and scales of the log frequencies and of the log parameters.
     samples_ : Bunch
-        ``theta`` and ``frequencies`` learned from, before noise.
+        ``theta`` and ``frequencies`` of the training samples, before noise.
     box_ : Box or None
-        The bounds, where simulations were learned from.
+        The bounds, if the samples were simulated; else None.
     n_parameters_ : int
         Number of parameters.
     parameter_names_ : list of str or None
@@ -81,8 +81,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
 
     Notes
     -----
-    Frequencies cannot tell apart more parameters than there are modes, and an estimate is
-    an effective stiffness rather than a material's.
+    Frequencies cannot determine more parameters than there are modes, and an estimate is an effective stiffness, not a
+    material property.
 
     References
     ----------
@@ -142,9 +142,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes), optional
-            Frequencies in Hz. Without y only their number and names count.
+            Frequencies in Hz. Without y only the number and names of the columns are used.
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
-            Multipliers that belong to X. Without them both are simulated.
+            Multipliers of each row of X. Without y, frequencies and multipliers are simulated.
 
         Returns
         -------
@@ -178,15 +178,15 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         return self
 
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
-        """Learn the inverse and give the parameters of the same records.
+        """Fit, and return the parameters of the same records.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz.
         y : array-like of shape (n_samples, ...), optional
-            Without a model, the multipliers that belong to X. With a model it is ignored: in a pipeline it is what a
-            later step learns, and the inverse learns from simulations.
+            Without a model, the multipliers of each row of X. With a model y is ignored, because the inverse learns
+            from simulations; in a pipeline, y is the target of a later step.
 
         Returns
         -------
@@ -221,7 +221,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         return frame_like(X, theta, self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Frequencies of parameters, by the FE model.
+        """Frequencies of given parameters, computed by the FE model.
 
         Parameters
         ----------

@@ -15,17 +15,17 @@ class TemperatureMapper(MultiplierRegressor):
     Parameters
     ----------
     regressor : regressor, optional
-        Any regressor; one that takes a single output only is fitted once for each parameter. Temperatures are
-        standardised and the logarithms of the parameters learned, standardised too, so that predictions are positive
-        (parameters that are not all positive, and so no multipliers, are learned as they are). By default a
-        small ``MLPRegressor``; see `paper_network` for the paper's.
+        Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
+        logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
+        parameters are not positive, no logarithm is taken. By default a small ``MLPRegressor``; see `paper_network`
+        for the paper's.
     random_state : int, RandomState or None, default=None
-        Seeds the regressor unless that has its own seed.
+        Seed of the regressor, unless it has its own seed.
 
     Attributes
     ----------
     regressor_ : regressor
-        Fitted; between standardised temperatures and standardised log parameters.
+        Fitted to standardised temperatures (inputs) and standardised log parameters (outputs).
     inputs_, targets_ : Standardiser
         Means and scales of the temperatures and of the (log) parameters.
     n_parameters_ : int

@@ -1,4 +1,4 @@
-"""Memory of simulations, shared by processes."""
+"""Stored simulations, shared by processes."""
 
 from pathlib import Path
 from pickle import PicklingError
@@ -19,12 +19,12 @@ ORDER_CHECKS = 256
 def remembered_simulations(
     memory: str | Memory | None, model: FEModel, bounds: Bounds, n_samples: int, tol: float | None, *, n_jobs, seed
 ) -> tuple[Bunch, float]:
-    """`simulations`, read from a memory if they are there; processes that want the same ones wait for the first.
+    """`simulations`, read from the memory if stored there; of several processes only one makes them.
 
     Raises
     ------
     ValueError
-        If the memory is a file, or the model cannot be recognised when it comes again.
+        If the memory is a file, or the model has no hash by which its simulations could be found again.
     """
     bounds = check_bounds(bounds, model.parameter_names)
     try:
@@ -51,7 +51,7 @@ def remembered_simulations(
 def simulations(
     identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, n_jobs: int | None, seed: int
 ) -> tuple[Bunch, float]:
-    """A sample, by the reduced model if there is a tolerance, and the share of it in which modes change their order."""
+    """Random samples (of the reduced model if ``tol`` is given), and the share with modes in another order."""
     if tol is not None:
         model = model.reduced(bounds, tol=tol, random_state=seed)
     drawn = sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)

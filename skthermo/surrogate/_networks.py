@@ -15,8 +15,8 @@ TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 def default_network() -> MLPRegressor:
     """A small network for noisy data, with an L2 penalty that keeps it from fitting the noise.
 
-    Adam, because scikit-learn's L-BFGS gets a loss that is averaged over outputs and a gradient
-    that is summed over them: with several outputs its line search fails.
+    Trained by Adam, because scikit-learn's L-BFGS averages the loss over outputs but sums the gradient: with several
+    outputs its line search fails.
     """
     return MLPRegressor(
         hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
@@ -24,15 +24,15 @@ def default_network() -> MLPRegressor:
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:
-    """The deep networks of Kamali et al. (2026), as near as ``MLPRegressor`` comes to them.
+    """The deep networks of Kamali et al. (2026), as closely as ``MLPRegressor`` allows.
 
     Parameters
     ----------
     network : {"truss", "kw51-inverse", "kw51-mapper"} or {1, 4, 6}
-        What the network is for, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers),
+        Purpose of the network, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers),
         the inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
     **parameters
-        Parameters of ``MLPRegressor`` to set otherwise.
+        Parameters of ``MLPRegressor`` that replace those of the paper.
 
     Returns
     -------
@@ -49,8 +49,8 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. The dropout of Table 1 (0.05 after the
     input) and Table 6 (0.2 after the first two layers) is replaced by the L2 penalty ``alpha``, 0.1 and 1 here, and,
     for the inverse surrogate, by ``noise`` on the simulated frequencies. Training ends before 1000 epochs when the
-    loss has stopped falling; no rows are held back to decide this, which fails on small samples.
-    Standardisation of inputs and outputs is the estimators' own.
+    loss has stopped falling; no rows are held out to decide this, because a small sample has too few of them.
+    The estimators themselves standardise inputs and outputs.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""What both surrogates share: a regression between standardised inputs and standardised log multipliers."""
+"""Base of both surrogates: regression of standardised log multipliers on standardised inputs."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ from skthermo.surrogate._standardiser import Standardiser, is_positive
 
 
 class MultiplierRegressor(RegressorMixin, BaseEstimator):
-    """Base of regressors onto multipliers: complete rows in, NaN where an input is missing.
+    """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
     A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`.
     """
@@ -37,20 +37,20 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         X : array-like or DataFrame of shape (n_samples, n_features)
             Inputs; NaN is allowed.
         return_std : bool, default=False
-            Whether to return standard deviations too, of a regressor whose own ``predict`` gives them.
+            Whether to return standard deviations too; the regressor's own ``predict`` must give them.
 
         Returns
         -------
         theta : ndarray or DataFrame of shape (n_samples, n_parameters)
-            Positive if those learned from were; NaN in rows where an input is missing. A frame on X's
-            index where X and the multipliers learned from were frames.
+            Positive if the training multipliers were; NaN in rows where an input is missing. A frame with X's index if
+            X and the training multipliers were frames.
         std : ndarray or DataFrame of shape (n_samples, n_parameters)
-            Only with ``return_std``: standard deviations of theta, to first order in those of its logarithm.
+            Only with ``return_std``: standard deviations of theta, to first order from those of ln theta.
 
         Raises
         ------
         ValueError
-            If standard deviations are asked of a regressor that has none.
+            If ``return_std`` is set and the regressor gives no standard deviations.
         """
         theta, std = self._predict_arrays(X, return_std)
         return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
@@ -106,7 +106,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets)
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
-        """Multipliers and their standard deviations, (n_samples, n_parameters) each; NaN where not known or asked."""
+        """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""
         check_is_fitted(self)
         inputs = self._read_inputs(X)
         complete = ~np.isnan(inputs).any(axis=1)
@@ -127,7 +127,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
 
     def _as_targets(self, X: Any, values: Array) -> Any:
-        """A vector or a frame where the targets learned from were."""
+        """Predictions as a vector or a frame if the training targets were."""
         if self.y_is_vector_:
             return values[:, 0]
         return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)

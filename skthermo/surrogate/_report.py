@@ -1,4 +1,4 @@
-"""What a fit has found, and what is doubtful about it."""
+"""Report of a fit: its findings and warnings."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,22 +21,22 @@ TINY = 1e-12
 
 ROWS_PER_PARAMETER = 10
 LARGE_OFFSET = 15.0
-"""Percent by which a measured mode differs from the model's that asks for an explanation."""
+"""Difference in percent between a measured mode and the model's above which a warning is given."""
 
 CLEARLY_BETTER = 0.25
-"""Share of the squared offsets that another order of modes leaves, if modes are taken to be swapped."""
+"""Modes count as swapped if another order reduces the squared offsets to this share or less."""
 
 
 @dataclass(frozen=True, repr=False)
 class FitReport:
-    """What `DataInformedFEM.fit` has found in the records.
+    """Findings of `DataInformedFEM.fit` about the records.
 
     Parameters
     ----------
     n_rows, n_trained : int
         Rows given, and rows that trained the temperature mapper.
     left_out : Series
-        Rows that did not train it, by reason; a row may have several reasons.
+        Rows that did not train the mapper, by reason; a row may have several reasons.
     offsets : Series
         Mean measured frequency against the model's nominal one, by mode, in percent.
     n_outside : int or None
@@ -44,12 +44,13 @@ class FitReport:
     outside : Series
         Share of rows outside, by parameter.
     deviations : Series
-        Smallest possible relative standard deviation of each parameter from one record, by the scatter that the chain
-        leaves and the model's derivatives (Cramer-Rao); infinite where the modes cannot tell a parameter.
+        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
+        from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
+        determine a parameter.
     errors : DataFrame
         MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
     n_scored : int
-        Rows behind ``errors``, spread evenly over those that trained.
+        Number of rows used for ``errors``, spread evenly over the training rows.
 
     Examples
     --------
@@ -98,7 +99,7 @@ class FitReport:
         return percent
 
     def warnings(self) -> Iterator[tuple[str, str]]:
-        """Kind and text of what is doubtful about the rows."""
+        """Warnings about the rows: kind and text of each."""
         n_parameters = len(self.deviations)
         if 2 * self.n_trained < self.n_rows:
             reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
@@ -149,7 +150,7 @@ def fit_report(
 
 
 def spread_rows(trained: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Positions of at most a few hundred rows, spread evenly over those that trained."""
+    """Positions of at most a few hundred rows, spread evenly over the training rows."""
     rows = np.flatnonzero(trained)
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), SCORED_ROWS)).astype(int))]
 
@@ -183,7 +184,7 @@ def mode_offsets(model: FEModel, F: Any) -> pd.Series:
 
 
 def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
-    """Kind and text of what is doubtful about the order and the units of the modes."""
+    """Warnings about the order and the units of the modes: kind and text of each."""
     offsets = mode_offsets(model, F)
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]

@@ -1,4 +1,4 @@
-"""Frequencies of many rows of parameters, by a reduced model where it is certified and the full one elsewhere."""
+"""Frequencies of many rows of parameters, by the reduced model inside its box and the full model outside."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate
 
 MANY_ROWS = 2000
-"""Rows from which on a full sparse model takes minutes."""
+"""Number of rows from which a full sparse model takes minutes."""
 
 
 DEFAULT_TOLERANCE = 1e-5
 
 
 def tolerance(model: FEModel, reduce: bool | float) -> float | None:
-    """Relative error of frequencies that a reduced model may have, by a parameter ``reduce``; None without reduction.
+    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class Simulator:
     model : FE model
         The full one.
     reduced : FE model or None
-        Gives the same frequencies within the box.
+        The reduced model, which gives the same frequencies within the box.
     box : ndarray of shape (n_parameters, 2) or None
         Bounds of that box.
     """

@@ -1,4 +1,4 @@
-"""Inputs and targets as regressors learn them best: logarithms, mean zero, unit variance."""
+"""Standardisation of inputs and targets: logarithms, zero mean, unit variance."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from skthermo._arrays import Array
 
 @dataclass(frozen=True)
 class Standardiser:
-    """z = (x - mean) / scale for each column, or of log x; and back.
+    """z = (x - mean) / scale for each column, of x or of log x, and the inverse.
 
     Attributes
     ----------
     mean, scale : ndarray of shape (n_columns,)
-        Of the values, or of their logarithms.
+        Mean and standard deviation of the values, or of their logarithms.
     log : bool
-        Whether logarithms are taken; values that come back are then positive.
+        Whether logarithms are taken; the inverse then gives positive values.
     """
 
     mean: Array
@@ -35,13 +35,13 @@ class Standardiser:
         return ((np.log(values) if self.log else values) - self.mean) / self.scale
 
     def inverse_transform(self, standardised: Array) -> Array:
-        """Values of standardised ones; a logarithm too large for a float becomes infinity."""
+        """Values from standardised values; a logarithm too large for a float becomes infinity."""
         values = standardised * self.scale + self.mean
         with np.errstate(over="ignore"):
             return np.exp(values) if self.log else values
 
     def inverse_deviations(self, deviations: Array, values: Array) -> Array:
-        """Standard deviations of values from those of their standardised ones, to first order."""
+        """Standard deviations of values from those of the standardised values, to first order."""
         return deviations * self.scale * (values if self.log else 1)
 
 

@@ -1,4 +1,4 @@
-"""Affine models: one core of terms and eigensolver, and the full and the reduced model on it."""
+"""Affine models: the full and the reduced model, and the terms and eigensolver that both use."""
 
 from skthermo.fem.affine._affine import AffineModel
 from skthermo.fem.affine._read_terms import check_different, check_n_modes, read_terms

@@ -35,23 +35,23 @@ class AffineModel(AffineBase):
     ----------
     stiffness : mapping of tuple of str to matrix, or sequence of such pairs
         Parameter names -> symmetric matrix (n_dof, n_dof), dense or SciPy sparse, in N/m. The
-        key ``()`` is the constant part; a name may stand in a key more than once. Pairs,
-        unlike a mapping, may repeat a key, so that groups can cut through a parameter.
+        key ``()`` is the constant part; a name may occur in a key more than once. Pairs, unlike a mapping, may repeat
+        a key, so that a damage group can hold a part of a parameter's members.
     mass : matrix, mapping or sequence of pairs
         Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless
         degrees of freedom).
     n_modes : int, default=6
         How many of the lowest modes the model gives.
     parameter_names : sequence of str, optional
-        Columns of theta. By default the names in the order in which the terms mention them.
+        Columns of theta. By default the names in the order of the terms.
     groups : mapping of str to list of (tuple of str or int), optional
-        Damage group -> the stiffness terms that it scales, by key or by position. By default
-        each parameter's name is a group of all stiffness terms that carry it.
+        Damage group -> the stiffness terms that it scales, by key or by position. By default each parameter is a
+        group: all stiffness terms that it multiplies.
     track : bool, default=False
         True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
         swap. False: column j is the j-th lowest mode.
     dof_names : sequence of str, optional
-        What degrees of freedom are called in errors.
+        Names of the degrees of freedom in error messages.
 
     Attributes
     ----------
@@ -62,15 +62,15 @@ class AffineModel(AffineBase):
     ------
     ValueError
         If shapes disagree, a matrix is not symmetric or not finite, a name is unknown, the
-        nominal stiffness leaves a motion free, or there are fewer modes than ``n_modes``.
+        nominal stiffness is singular (a mechanism), or there are fewer modes than ``n_modes``.
 
     Notes
     -----
-    Up to 200 degrees of freedom eigenproblems are dense and solved in batches: with a constant mass that
-    is factored once, else (mass that depends on theta or is singular, or a wide spectrum) through the
-    flexibility L^-1 M L^-T with K = L L'. Larger ones are sparse and solved one by one by Lanczos
-    iterations on K^-1 M, from a seeded start. All run on as many threads as BLAS may use. Where the
-    stiffness is not positive definite, frequencies are NaN and a warning says at which theta.
+    Up to 200 degrees of freedom eigenproblems are dense and solved in batches. A constant mass is factored once; a
+    mass that depends on theta or is singular, or a wide spectrum, is solved through the flexibility L^-1 M L^-T with K
+    = L L'. Larger problems are sparse and solved one by one by Lanczos iterations on K^-1 M, from a seeded start. All
+    solvers run on as many threads as BLAS may use. Where the stiffness is not positive definite, frequencies are NaN
+    and a warning says at which theta.
 
     Examples
     --------
@@ -126,13 +126,13 @@ class AffineModel(AffineBase):
         )
 
     def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
-        """A new model with less stiffness (or more) in some groups; mass stays.
+        """A new model with less stiffness (or more) in some groups and the same mass.
 
         Parameters
         ----------
         damage : mapping of str to float
             Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half,
-            -0.15 a strengthening by 15 %. Terms of several damaged groups take every factor.
+            -0.15 a strengthening by 15 %. A term in several damaged groups is multiplied by all their factors.
 
         Returns
         -------
@@ -171,7 +171,7 @@ class AffineModel(AffineBase):
         return self._twin(self._core.rescaled(row))
 
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
-        """A small model that gives the same frequencies within a box, to a stated error.
+        """A small model that gives the same frequencies within a box, to a stated relative error.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class AffineModel(AffineBase):
         tol : float, default=1e-5
             Largest relative error of a frequency.
         random_state : int, RandomState or None, default=None
-            Seed of the points at which the basis is made and checked.
+            Seed of the points at which the basis is built and checked.
 
         Returns
         -------

@@ -20,10 +20,10 @@ Model = TypeVar("Model", bound="AffineBase")
 
 
 class AffineBase(ABC):
-    """Base of `AffineModel` and `ReducedModel`: everything that asks a core for modes.
+    """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
     A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and
-    `_bounds_warning` serve those that are solved on a basis, within a box.
+    `_bounds_warning` are for models that are solved on a basis, within a box.
     """
 
     _parameter_names: tuple[str, ...]
@@ -66,7 +66,7 @@ class AffineBase(ABC):
 
     @property
     def prefer(self) -> str:
-        """Hint to joblib: "threads" or "processes". Sparse solves hold Python's lock, dense ones do not."""
+        """Hint to joblib: "threads" or "processes". Sparse solvers hold Python's global lock, dense ones do not."""
         return "threads" if self._core.is_dense else "processes"
 
     def frequencies(self, theta: ArrayLike) -> Array:
@@ -113,8 +113,8 @@ class AffineBase(ABC):
         Parameters
         ----------
         theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of
-            single modes do not exist and the values are those of an arbitrary basis.
+            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of single modes do not exist,
+            and the values depend on the arbitrary choice of mode shapes.
 
         Returns
         -------
@@ -149,7 +149,7 @@ class AffineBase(ABC):
         theta : array-like of shape (n_parameters,) or (1, n_parameters)
             Multipliers of the nominal parameters.
         follow : bool, default=False
-            Whether to look at as many modes as it takes to find every nominal mode.
+            Whether to compute enough modes to find every nominal mode among them.
 
         Returns
         -------
@@ -192,13 +192,13 @@ class AffineBase(ABC):
         return csc_array(core.stiffness.assemble(row)[0]), csc_array(core.mass.assemble(row)[0])
 
     def with_modes(self: Model, modes: Sequence[int]) -> Model:
-        """A new model whose columns are other modes.
+        """A new model with other modes as its columns.
 
         Parameters
         ----------
         modes : sequence of int
-            Ranks of modes of the healthy nominal model, the lowest being 0, in the order of the new columns.
-            `match_modes` proposes them. They need not be among the present columns.
+            Ranks of modes of the healthy nominal model (0 is the lowest), in the order of the new columns.
+            `match_modes` proposes such ranks. Modes that are not among the present columns are allowed.
 
         Returns
         -------
@@ -208,7 +208,7 @@ class AffineBase(ABC):
         Raises
         ------
         ValueError
-            If a mode is named twice, is not an integer, or is beyond those that the model has.
+            If a mode is named twice, is not an integer, or does not exist in the model.
 
         Examples
         --------
@@ -238,7 +238,7 @@ class AffineBase(ABC):
         Raises
         ------
         ValueError
-            If a name is unknown or repeats, or there is none.
+            If a name is unknown or repeated, or ``names`` is empty.
 
         Examples
         --------
@@ -260,7 +260,8 @@ class AffineBase(ABC):
         Returns
         -------
         AffineModel or ReducedModel
-            For searches that pass through theta outside a box or without modes. It shares this model's matrices.
+            For searches that may pass through theta outside the box or without a solution. It shares the matrices of
+            this model.
         """
         twin = self._twin(self._core)
         twin._is_quiet = True
@@ -272,9 +273,9 @@ class AffineBase(ABC):
         Parameters
         ----------
         theta : ndarray of shape (n_samples, n_parameters)
-            Multipliers; rows with NaN are passed over.
+            Multipliers; rows with NaN are ignored.
         frequencies : ndarray of shape (n_samples, ...)
-            What was solved for them.
+            The solution for each row.
         """
         self._warn_of_bounds(theta, stacklevel=5)
         if not self._is_quiet:
@@ -295,7 +296,7 @@ class AffineBase(ABC):
     def _changed(
         self: Model, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
     ) -> Model:
-        """A model like this one whose full core is changed, with the parameters of these names."""
+        """A model like this one with a changed full core and these parameter names."""
 
     @property
     @abstractmethod

@@ -1,4 +1,4 @@
-"""A basis of mode shapes that represents a model within a box, grown to a stated error."""
+"""A basis of mode shapes that represents a model within a box, enlarged until a stated error is reached."""
 
 from itertools import product
 from typing import NamedTuple
@@ -21,10 +21,11 @@ CHECKS = 20
 MAX_ROUNDS = 40
 
 LEAST_ENERGY = 1e-13
-"""Share of strain energy below which a direction is made of rounding."""
+"""Share of strain energy below which a direction is rounding error."""
 
 WIDEST_SPECTRUM = 1e13
-"""Spectrum, times the relative error allowed, up to which the standard form has the digits."""
+"""Largest ratio of highest to lowest eigenvalue, divided by ``tol``, for which the standard form is accurate
+enough."""
 
 
 class Basis(NamedTuple):
@@ -40,7 +41,7 @@ class Basis(NamedTuple):
 def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
-    """Add modes where the estimated error is largest until it is small, and the true error at fresh points too.
+    """Add modes at the point of largest estimated error until estimate and true error at new points are small.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def grow_basis(
 
 
 def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
-    """The core on basis vectors, in a form that keeps the digits that ``tol`` asks for."""
+    """The core on basis vectors, in a form that is accurate to ``tol``."""
     return full.projected(vectors, widest_spectrum=tol * WIDEST_SPECTRUM)
 
 
@@ -102,7 +103,7 @@ def without(points: Array, others: Array) -> Array:
 
 
 def snapshots_at(full: AffineCore, theta: Array) -> Array:
-    """Shapes of the full model's lowest modes, and of its own where these are others, side by side."""
+    """Shapes of the lowest modes of the full model and of the modes in its columns, side by side."""
     if not len(theta):
         return np.empty((full.stiffness.n_dof, 0))
     n_snapshots = full.first_candidates

@@ -1,4 +1,4 @@
-"""What AffineModel and ReducedModel share: terms, eigensolver, tracking, derivatives."""
+"""Core of AffineModel and ReducedModel: terms, eigensolver, tracking, derivatives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from skthermo.fem.modal import (
 )
 
 GUARD_MODES = 4
-"""Number of modes above the tracked ones that are examined first: a mode that swaps moves up by a few ranks."""
+"""Number of modes above the tracked ones that are examined first: modes that swap move up by a few ranks only."""
 
 MAX_CANDIDATES_PER_MODE = 8
 """How many times as many candidates as modes are examined before a mode counts as dissolved."""
@@ -38,7 +38,7 @@ class NominalModes:
     weighted_shapes : ndarray of shape (n, n_modes)
         M phi, with the nominal mass M and shapes phi of unit modal mass.
     mass_coefficients : ndarray of shape (n_mass_terms,)
-        What multiplies each mass term in M.
+        Coefficient of each mass term in M.
     repeated : ndarray of bool of shape (n_modes, n_modes)
         Which of the modes share a repeated frequency.
     """
@@ -70,7 +70,7 @@ class AffineCore:
     available: int
     """How many modes the mass allows and the solver finds."""
     healthy: "AffineCore | None" = None
-    """The core whose nominal modes are the columns, where that is another one."""
+    """The core whose nominal modes define the columns, if it is not this one."""
 
     @classmethod
     def from_terms(
@@ -88,7 +88,7 @@ class AffineCore:
 
     @property
     def n_lowest(self) -> int:
-        """How many of the lowest modes hold all columns at theta = 1."""
+        """How many of the lowest modes contain all columns at theta = 1."""
         return int(self.ranks.max()) + 1
 
     @property
@@ -98,7 +98,7 @@ class AffineCore:
 
     @property
     def max_candidates(self) -> int:
-        """How many of the lowest modes are examined at the most before a mode counts as dissolved."""
+        """Largest number of lowest modes that are examined before a mode counts as dissolved."""
         return min(self.available, MAX_CANDIDATES_PER_MODE * self.n_lowest)
 
     @property
@@ -194,7 +194,7 @@ class AffineCore:
         )
 
     def _tracked(self, theta: Array, n_candidates: int) -> tuple[Array, Array]:
-        """Nominal modes among the lowest candidates, and among more where these leave a doubt."""
+        """Nominal modes found among the lowest candidates, or among more candidates where the match is uncertain."""
         eigenvalues, candidates = self.solver.modes(theta, n_candidates)
         mac = self.nominal_mac(candidates)
         order = pair_modes(mac, self.nominal.repeated)

@@ -15,14 +15,14 @@ DENSE_DOFS = 200
 """Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
 
 STRONGEST = -10.0
-"""Severity of a strengthening below which percent are taken for a fraction."""
+"""Lowest severity accepted; a lower number is probably a percentage given instead of a fraction."""
 
 DENSE_SHARE = 0.3
 """Share of nonzero entries above which a matrix counts as dense."""
 
 
 def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:
-    """Keys and matrices, copied and symmetric, each dense or sparse as it came."""
+    """Keys and matrices: symmetric copies, dense or sparse as given."""
     if isinstance(terms, Mapping):
         pairs = list(terms.items())
     elif isinstance(terms, Sequence) and all(_is_pair(term) for term in terms):
@@ -79,7 +79,7 @@ def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
-    """Names of the parameters: each stands in some term, and the terms name no others."""
+    """Names of the parameters, checked: each occurs in some term, and the terms contain no other names."""
     mentioned = dict.fromkeys(name for key in keys for name in key)
     if parameter_names is None:
         names = tuple(mentioned)
@@ -126,7 +126,7 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
 
 
 def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
-    """Checks that groups are known and severities leave some stiffness."""
+    """Checks that groups are known and that severities leave some stiffness."""
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     for group, severity in damage.items():
@@ -159,5 +159,5 @@ def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:
 
 
 def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
-    """How often each parameter stands in each key, (n_terms, n_parameters)."""
+    """How often each parameter occurs in each key, (n_terms, n_parameters)."""
     return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)

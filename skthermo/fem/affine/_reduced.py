@@ -14,11 +14,11 @@ from skthermo.fem.affine._core import AffineCore
 
 
 class ReducedModel(AffineBase):
-    """An affine FE model on a small basis of its own mode shapes, to a stated error.
+    """An affine FE model projected on a small basis of its own mode shapes, accurate to a stated error.
 
-    Modes at random points and corners of the box, and then where an error estimate is largest, span a basis V;
-    every term is projected once, V' K_t V, so that a solve is a small dense eigenproblem. Made by
-    `AffineModel.reduced`.
+    The basis V is spanned by modes at random points and corners of the box, and then at points where an error estimate
+    is largest. Every term is projected once, V' K_t V, so that each solve is a small dense eigenproblem.
+    `AffineModel.reduced` makes such a model.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class ReducedModel(AffineBase):
     error_ : float
         Largest relative error of a frequency at the check points.
     check_points_ : ndarray of shape (n_checks, n_parameters)
-        Theta at which the full model was solved for ``error_``: ten or more uniform in the box, and up to
+        Theta at which the full model was solved to compute ``error_``: ten or more uniform in the box, and up to
         ten of its corners, none of them a snapshot point.
     snapshot_points_ : ndarray of shape (n_snapshots, n_parameters)
         Theta whose modes span the basis.
@@ -53,11 +53,11 @@ class ReducedModel(AffineBase):
 
     Notes
     -----
-    A frequency of rank j is never below the full model's of that rank (Rayleigh-Ritz). The
+    The j-th lowest frequency is never below the full model's j-th (Rayleigh-Ritz). The
     estimate of a relative error is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi
     of a mode of unit modal mass and the nominal stiffness K_0. Within 30 % of K_0 it was found to be 0.64 to
-    1.3 times the error. Shapes are given at all degrees of
-    freedom. A damaged model is checked anew, and its basis grows if it must.
+    1.3 times the error. Shapes are given at all degrees of freedom. A damaged model is checked anew, and its basis is
+    enlarged if necessary.
 
     References
     ----------
@@ -103,7 +103,7 @@ class ReducedModel(AffineBase):
         return self._core.stiffness.n_dof
 
     def damaged(self, damage: Mapping[str, float]) -> "ReducedModel":
-        """A new model with less stiffness (or more) in some groups, on a basis that represents it.
+        """A new model with less stiffness (or more) in some groups, with a basis checked for the damage.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class ReducedModel(AffineBase):
         Returns
         -------
         ReducedModel
-            For the same box, which its multipliers now measure from theta.
+            For the same box; its bounds are now relative to theta.
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
         twin = self._twin(self._core)
@@ -177,7 +177,7 @@ class ReducedModel(AffineBase):
         return self._regrown(self._full._changed(change, names), self._bounds[kept])
 
     def _regrown(self, full: AffineBase, bounds: Array) -> "ReducedModel":
-        """A reduced model of another full one, whose basis begins with this one's."""
+        """A reduced model of another full model; its basis starts from the present one."""
         twin = self._twin(self._core)
         twin._full, twin._bounds, twin._parameter_names = full, bounds, full.parameter_names
         twin._use(grow_basis(full._core, bounds, self._tol, 0, start=self._basis))

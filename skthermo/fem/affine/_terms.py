@@ -11,7 +11,7 @@ from skthermo._arrays import Array, Matrix, as_dense
 from skthermo.fem._theta import ROWS_PER_CHUNK
 
 SPARSE_ROWS_PER_CHUNK = 16
-"""Sparse samples are solved one after the other; a few of them are enough work for one task."""
+"""Sparse samples are solved one by one; a few of them are enough work for one task."""
 
 
 class AffineTerms(ABC):
@@ -22,7 +22,7 @@ class AffineTerms(ABC):
     exponents : ndarray of shape (n_terms, n_parameters)
         How often each parameter multiplies each term; a row of zeros is the constant part.
     factors : ndarray of shape (n_terms,), optional
-        Fixed multipliers, such as what damage leaves of a term. One by default.
+        Fixed multipliers, such as 1 - severity of damage. One by default.
     """
 
     n_dof: int
@@ -72,7 +72,7 @@ class AffineTerms(ABC):
         """The weighted sum of the matrices."""
 
     def each(self, theta: Array) -> Iterator[Matrix]:
-        """The summed matrices one after the other; a constant one is summed once."""
+        """The summed matrices, one by one; a constant matrix is summed once."""
         for i, row in enumerate(theta[:, np.newaxis]):
             if i == 0 or not self.is_constant:
                 matrix = self.assemble(row)[0]
@@ -97,7 +97,7 @@ class AffineTerms(ABC):
 
     @abstractmethod
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineTerms":
-        """Terms of fewer parameters, the others being 1."""
+        """Terms of fewer parameters; the others are fixed at 1."""
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":

@@ -1,4 +1,4 @@
-"""Structures of nodes and members, and how they become affine terms."""
+"""Structures of nodes and members, and their assembly into affine terms."""
 
 from skthermo.fem.assembly._structure import Structure
 

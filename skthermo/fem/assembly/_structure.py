@@ -43,12 +43,12 @@ class Structure:
     Raises
     ------
     ValueError
-        Names the node, member, group or direction that is unknown, duplicated, disconnected,
-        shorter than a millionth of the structure or of a property that is not positive.
+        If a node, member, group or direction is unknown, duplicated or disconnected, or a member is shorter than a
+        millionth of the structure or has a property that is not positive. The error names it.
 
     Examples
     --------
-    A king-post truss, whose post and rafters are parameters:
+    A king-post truss with its post and rafters as parameters:
 
     >>> from skthermo.fem import Bar, Structure
     >>> steel = dict(E=210e9, A=0.01, density=7850.0)
@@ -119,13 +119,13 @@ class Structure:
         Parameters
         ----------
         parameters : sequence of str, or mapping of str to group or (property, group[, matrix])
-            What theta multiplies. A group's name stands for the whole stiffness of the group;
-            ``{"A_arch": ("A", "arches")}`` for one property ("E", "A", "I_yy", "k", "m", ...) of
-            its members, in stiffness and mass; ``("A", "arches", "stiffness")`` in stiffness alone
-            (or ``"mass"``); ``("mass", group)`` for the whole mass.
+            What theta multiplies. The name of a group means its whole stiffness; ``{"A_arch": ("A", "arches")}`` means
+            one property ("E", "A", "I_yy", "k", "m", ...) of its members, in stiffness and mass; ``("A", "arches",
+            "stiffness")`` means the stiffness alone (or ``"mass"``); ``("mass", group)`` means the whole mass of a
+            group.
         groups : sequence of str, or mapping of str to group or (property, group), optional
-            What can be damaged: the whole stiffness of a group, or, as in ``{"torsion": ("G",
-            "girder")}``, what one property has in it. By default all of the structure's groups.
+            What can be damaged: the whole stiffness of a group, or the part of it that one property multiplies, as in
+            ``{"torsion": ("G", "girder")}``. By default all groups of the structure.
         n_modes : int, default=6
             Number of modes.
         track : bool, default=False
@@ -138,8 +138,8 @@ class Structure:
         Raises
         ------
         ValueError
-            If a group or property is unknown, a property of ``groups`` has no stiffness, or the
-            structure is a mechanism.
+            If a group or property is unknown, a property in ``groups`` does not affect the stiffness, or the structure
+            is a mechanism.
         """
         bindings = self._read_bindings(parameters, "parameter")
         damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
@@ -250,7 +250,7 @@ def _read_group(group: str, names: Any) -> frozenset:
 
 
 def _read_directions(along: Any, node: Hashable) -> list[str]:
-    """Directions one by one: ("x", "ry") is such a list; "xyz rx ry" names five."""
+    """List of directions from a collection such as ("x", "ry"), or from text: "xyz rx ry" names five."""
     if not isinstance(along, Collection | None):
         raise ValueError(f"support of node {node!r} is {along!r}; expected directions such as 'xy' or ('x', 'ry')")
     if not isinstance(along, str):

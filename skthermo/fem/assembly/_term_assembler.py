@@ -17,7 +17,7 @@ Key = tuple[str, ...]
 
 
 class TermAssembler:
-    """Sums members' matrices by the parameters that multiply them and the groups that damage them.
+    """Sums members' matrices into one term for each combination of parameters and damage groups.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class TermAssembler:
         return terms or [((), self._matrix([]))]
 
     def positions(self, group: str) -> list[int]:
-        """Positions among the terms of those that a damage group scales."""
+        """Positions of the terms that a damage group scales."""
         return [i for i, (_, damage) in enumerate(self._entries) if group in damage]
 
     def _matrix(self, blocks: Sequence[tuple[np.ndarray, ...]]) -> scipy.sparse.csr_array:

@@ -1,4 +1,4 @@
-"""Finite elements, one a file."""
+"""Finite elements, each in its own file."""
 
 from skthermo.fem.elements._bar import Bar
 from skthermo.fem.elements._beam import Beam

@@ -15,7 +15,7 @@ LOCAL = (*TRANSLATIONS, *ROTATIONS)
 
 
 class Action(NamedTuple):
-    """One of the four ways in which a beam deforms, which do not influence each other."""
+    """One of the four uncoupled deformations of a beam: tension, torsion and bending in two planes."""
 
     dofs: list[int]  # positions among the 12 local degrees of freedom
     stiffness_of: tuple[str, str]
@@ -77,9 +77,9 @@ def hermite_mass(length: float, *, lumped: bool) -> Array:
 class Beam(PhysicalElement):
     """Straight Euler-Bernoulli beam: tension, torsion and bending about both axes, in 3-D.
 
-    Local x runs from start to end; local z lies in the plane of x and ``orientation``, on its side, and
-    local y completes the right-handed frame. With the default, a level beam has local y level and
-    local z upwards, so that ``I_yy`` is vertical bending and ``I_zz`` lateral.
+    Local x runs from start to end. Local z lies in the plane of x and ``orientation``, on the side of ``orientation``,
+    and local y completes the right-handed frame. By default, local y of a horizontal beam is horizontal and local z
+    points upwards, so that ``I_yy`` is for vertical bending and ``I_zz`` for lateral bending.
 
     Parameters
     ----------
@@ -109,9 +109,8 @@ class Beam(PhysicalElement):
 
     Notes
     -----
-    Each of the four actions is condensed on its own where an end is released, and its mass
-    with it (Guyan), so that matrices stay affine in the properties. Shear deformation and
-    the rotary inertia of bending are left out.
+    Where an end is released, stiffness and mass of each of the four actions are condensed separately (Guyan), so that
+    matrices stay affine in the properties. Shear deformation and the rotary inertia of bending are left out.
 
     References
     ----------
@@ -169,7 +168,7 @@ class Beam(PhysicalElement):
         return [(node, direction) for node in self.nodes for direction in LOCAL]
 
     def ends(self, coordinates: Array) -> Array:
-        """Where the beam itself begins and ends."""
+        """Coordinates of both ends of the beam, offsets included."""
         if coordinates.shape[1] != 3:
             raise ValueError(f"beam from node {self.start!r} to node {self.end!r}: expected three coordinates, got two")
         return coordinates + np.array([self.offset_start, self.offset_end])
@@ -214,7 +213,7 @@ class Beam(PhysicalElement):
 
 
 def condensation(stiffness: Array, released: NDArray[np.bool_]) -> Array:
-    """What all degrees of freedom do when the kept ones move and the released ones carry nothing."""
+    """Matrix from the kept degrees of freedom to all of them, if the released ones carry no force."""
     kept = ~released
     motion = np.diag(kept.astype(float))
     if released.any():

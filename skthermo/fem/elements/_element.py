@@ -1,7 +1,7 @@
 """The interface of finite elements: nodes, properties, stiffness and mass.
 
-Every element gives its matrices by the product of properties that multiplies them, so that
-any of these properties can become a parameter.
+Every element gives one matrix for each product of properties, such as E A, so that any of these properties can become
+a parameter.
 """
 
 from collections.abc import Hashable, Iterator, Mapping
@@ -20,11 +20,11 @@ TRANSLATIONS = ("x", "y", "z")
 ROTATIONS = ("rx", "ry", "rz")
 
 SHORTEST = 1e-6
-"""Length of a member, as a share of the structure's extent, below which its two ends are taken for one place."""
+"""Length of a member, as a share of the structure's extent, below which its ends count as the same point."""
 
 
 class Element(Protocol):
-    """The duck type of what `Structure` assembles: an element of your own needs these members.
+    """The interface of elements that `Structure` assembles; your own element needs these methods.
 
     Attributes
     ----------
@@ -34,8 +34,8 @@ class Element(Protocol):
     Notes
     -----
     Stiffness is a dictionary from properties to matrices: ``{("E", "A"): matrix}`` says that the matrix is
-    proportional to the properties E and A, each of which can then be made a parameter. Mass likewise. Rows are in
-    the order of ``dofs``, whose directions are "x", "y", "z", "rx", "ry" and "rz" (in 2-D: "x" and "y").
+    proportional to the properties E and A, so that each of them can be a parameter. The same holds for mass. Rows are
+    in the order of ``dofs``, whose directions are "x", "y", "z", "rx", "ry" and "rz" (in 2-D: "x" and "y").
     """
 
     @property
@@ -52,10 +52,10 @@ class Element(Protocol):
         """Where the element itself has its ends or corners, given its nodes."""
 
     def stiffness(self, coordinates: Array) -> ByProperties:
-        """Stiffness matrices in N/m by the product of properties that multiplies each."""
+        """Stiffness matrices in N/m, one for each product of properties."""
 
     def mass(self, coordinates: Array) -> ByProperties:
-        """Mass matrices in kg by the product of properties that multiplies each."""
+        """Mass matrices in kg, one for each product of properties."""
 
 
 class PhysicalElement:
@@ -75,7 +75,7 @@ class PhysicalElement:
 
 
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
-    """Refuse an element with unknown nodes, hardly any length, or a property that is not positive."""
+    """Raise an error if an element has unknown nodes, is too short, or has a property that is not positive."""
     if isinstance(element, type) or not hasattr(element, "nodes"):
         raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
     for node in element.nodes:

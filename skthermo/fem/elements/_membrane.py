@@ -14,7 +14,7 @@ GAUSS_POINTS = CORNERS / np.sqrt(3)
 
 @dataclass(frozen=True)
 class Membrane(PhysicalElement):
-    """Flat quadrilateral in plane stress: stiff in its plane only, heavy in every direction.
+    """Flat quadrilateral in plane stress: stiffness in its plane only, mass in every direction.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class Membrane(PhysicalElement):
 
     Notes
     -----
-    Bilinear displacements, 2 x 2 Gauss points. Constant strain is exact; bending in the plane is too
-    stiff unless there are several elements across. Nothing resists motion out of the plane: other
-    members must.
+    Bilinear displacements, 2 x 2 Gauss points. Constant strain is exact; bending in the plane is too stiff unless
+    there are several elements across. Membranes have no stiffness out of their plane: other members must hold their
+    nodes.
 
     References
     ----------
@@ -43,7 +43,7 @@ class Membrane(PhysicalElement):
 
     Examples
     --------
-    A strip in tension, F L / (E t b):
+    Forces of a strip in tension, E t b / L times its elongation:
 
     >>> import numpy as np
     >>> from skthermo.fem import Membrane
@@ -127,7 +127,7 @@ def slopes(point: Array) -> Array:
 
 
 def strains(gradients: Array) -> Array:
-    """From the nodes' displacements in the plane to normal strains and shear, (3, 8)."""
+    """Matrix B from the in-plane displacements of the nodes to normal and shear strains, (3, 8)."""
     matrix = np.zeros((3, 8))
     matrix[0, 0::2], matrix[1, 1::2] = gradients
     matrix[2, 0::2], matrix[2, 1::2] = gradients[::-1]

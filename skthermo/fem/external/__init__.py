@@ -1,4 +1,4 @@
-"""FE models from elsewhere: exported matrices, programs that assemble them, programs that solve."""
+"""FE models from other programs, through exported matrices or functions that return matrices or frequencies."""
 
 from skthermo.fem.external._callable import CallableModel
 from skthermo.fem.external._exported import load_affine

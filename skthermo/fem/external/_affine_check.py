@@ -1,4 +1,4 @@
-"""Checks that a program's matrices are affine in its parameters, and names the parameter if not."""
+"""Checks that a program's matrices are affine in its parameters, and names the parameter in which they are not."""
 
 from collections.abc import Callable
 from functools import reduce
@@ -62,12 +62,12 @@ def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
 
 
 def check_affine(program: Program, terms: tuple[Terms, Terms], row: Array) -> None:
-    """Refuse a program whose matrices at a row of multipliers are not the sum of its terms.
+    """Raise an error if the matrices of a program at a row of multipliers are not the sum of its terms.
 
     Raises
     ------
     ValueError
-        Names the parameter, or the two, that act otherwise.
+        Names the parameter, or the two parameters, in which the program is not affine.
     """
     if _difference(program, terms, row) is None:
         return
@@ -101,7 +101,7 @@ def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> Dif
 
 
 def _power(multiplier: float, found: Difference, terms: Terms, name: str) -> float | None:
-    """The power p of a parameter t that explains an entry: (t^p - 1) / (2^p - 1) is its change at t over that at 2."""
+    """The power p of a parameter that explains an entry: (t^p - 1) / (2^p - 1) is its change at t over that at 2."""
     entries: dict[tuple[str, ...], float] = {key: matrix[found.row, found.column] for key, matrix in terms}
     doubling = entries.get((name,), 0.0)
     if not doubling:

@@ -1,4 +1,4 @@
-"""A file of solved samples, which later processes can use."""
+"""A file of solved samples, shared with other and later processes."""
 
 import json
 import os
@@ -24,7 +24,7 @@ class SampleCache:
     Parameters
     ----------
     path : str or path-like
-        The file; it and its folder are made when the first sample is solved.
+        The file. The file and its folder are created when the first sample is solved.
     parameter_names : sequence of str
         Columns of theta.
     n_modes : int
@@ -42,7 +42,7 @@ class SampleCache:
         self._inode, self._end = 0, 0
 
     def read(self) -> Mapping[bytes, Array]:
-        """Frequencies by the bytes of their theta; reads on where the last call stopped.
+        """Frequencies, keyed by the bytes of their theta. Reads only what was appended since the last call.
 
         Raises
         ------
@@ -80,11 +80,11 @@ class SampleCache:
         self._known, self._damaged, self._inode, self._end = {}, [], inode, 0
 
     def __getstate__(self) -> dict:
-        """Pickled without its records: workers read the file themselves."""
+        """State for pickling, without the records: workers read the file themselves."""
         return vars(self) | {"_known": {}, "_damaged": [], "_inode": 0, "_end": 0}
 
     def append(self, theta: Array, frequencies: Array) -> None:
-        """Write rows after the last whole record; other processes wait."""
+        """Write rows after the last complete record; other processes wait meanwhile."""
         records = np.zeros(len(theta), self._record)
         records["theta"], records["frequencies"] = theta, frequencies
         records["checksum"] = self._checksums(records)
@@ -103,7 +103,7 @@ class SampleCache:
             self._mend(records[:1].tobytes())
 
     def _mend(self, record: bytes) -> None:
-        """Write a copy of a good record over each damaged one, so that the others keep their place."""
+        """Overwrite each damaged record with a copy of a good one, so that all others keep their place."""
         with open(self.path, "r+b") as file:
             lock(file)
             for position in self._damaged:

@@ -15,11 +15,11 @@ from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
 
 ROWS_PER_TASK = 32
-"""Of a program that solves row by row: few, so that all workers get some and progress shows."""
+"""Rows per task for a function that solves row by row: few, so that all workers are busy and progress is visible."""
 
 
 class CallableModel:
-    """Any program that turns parameters into frequencies, as an FE model.
+    """An FE model from any function that turns parameters into frequencies.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class CallableModel:
     vectorized : bool, default=False
         Whether the function takes many rows at once.
     cache : str or path-like, optional
-        A file that keeps every solved row of theta, so that none is solved twice: neither
-        when the process was killed and starts again, nor in another process later on.
+        A file that stores every solved row of theta, so that no row is solved twice, neither after a crash nor in a
+        later process.
 
     Attributes
     ----------
@@ -60,11 +60,11 @@ class CallableModel:
 
     Notes
     -----
-    A row is recognised by the exact bits of its theta, and written as soon as it is solved; of
-    many rows at once (``vectorized=True``), all when the last is. Several processes may share a
-    cache; what one of them is still solving, another solves too. A cache cannot know whether the
-    function is still the same: delete the file when the program changes. On Windows, where
-    nothing locks the file, let one process at a time write it.
+    A row is recognised by the exact bits of its theta and is written as soon as it is solved; with
+    ``vectorized=True``, all rows of a call are written together. Several processes may share a cache, but a row that
+    one process is still solving may be solved by another too. A cache cannot know whether the function is still the
+    same: delete the file when the function changes. On Windows the file is not locked, so let only one process at a
+    time write it.
 
     Examples
     --------
@@ -103,7 +103,7 @@ class CallableModel:
 
     @property
     def rows_per_chunk(self) -> int:
-        """How many samples are one task, where many are solved."""
+        """Number of samples in one parallel task."""
         return ROWS_PER_CHUNK if self.vectorized else ROWS_PER_TASK
 
     def frequencies(self, theta: ArrayLike) -> Array:
@@ -122,12 +122,12 @@ class CallableModel:
         Raises
         ------
         ValueError
-            If theta has the wrong width or values, the function returns another shape or what is not real
+            If theta has the wrong width or values, the function returns another shape or values that are not real
             numbers, or the cache belongs to other parameters.
         RuntimeError
-            If the function fails at all of several rows, rows that the cache holds included, by an error or by a
-            frequency that is neither NaN nor finite and positive, or, with ``vectorized=True``, raises an error at
-            several rows at once; the error says at which theta first.
+            If the function fails at all of several rows (cached rows count as solved), or, with ``vectorized=True``,
+            raises an error for several rows at once. A row fails if the function raises an error or returns a
+            frequency that is neither NaN nor finite and positive. The error names the first such theta.
 
         Warns
         -----
@@ -182,7 +182,7 @@ class CallableModel:
         return result.reshape(len(rows), self.n_modes)
 
     def _impossible(self, rows: Array, frequencies: Array) -> dict[int, RuntimeError]:
-        """Rows with what is no frequency."""
+        """Errors of the rows with an impossible frequency."""
         wrong = ~np.isnan(frequencies) & ~(np.isfinite(frequencies) & (frequencies > 0))
         return {
             int(row): RuntimeError(
@@ -193,12 +193,12 @@ class CallableModel:
         }
 
     def quiet(self) -> "CallableModel":
-        """The same model, which gives NaN without warning or error where the function fails.
+        """The same model, but without warnings and errors: it gives NaN where the function fails.
 
         Returns
         -------
         CallableModel
-            For searches that pass through such rows.
+            For searches that may pass through rows at which the function fails.
         """
         twin = copy.copy(self)
         twin._is_quiet = True
@@ -212,7 +212,7 @@ class CallableModel:
         theta : ndarray of shape (n_samples, n_parameters)
             Multipliers.
         frequencies : ndarray of shape (n_samples, n_modes)
-            What was solved for them.
+            The solution for each row.
         """
         if not self._is_quiet:
             warn_of_failures(theta, frequencies, stacklevel=5)

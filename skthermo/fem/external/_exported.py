@@ -37,7 +37,7 @@ def load_affine(
 ) -> AffineModel:
     """An FE model from the stiffness terms and the mass matrix that another program has written.
 
-    K(theta) is the sum of theta_j times the j-th stiffness matrix, each a parameter of the matrix's name.
+    K(theta) is the sum of theta_j times the j-th stiffness matrix; each parameter has the name of its matrix.
 
     Parameters
     ----------
@@ -46,15 +46,15 @@ def load_affine(
         folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``) or what
         `scipy.sparse.save_npz` writes (``.npz``). Matrices are dense or sparse.
     stiffness : collection of str, or mapping of str to str or tuple of str, optional
-        Matrices that are terms; a mapping says which parameters multiply each, as in `AffineModel`: ``()``
-        none, ``("E", "A")`` a product, the same parameter several matrices. By default every square matrix
-        but the mass and the total is a term.
+        Names of the matrices that are terms. A mapping also gives the parameters that multiply each matrix, as in
+        `AffineModel`: ``()`` for none, ``("E", "A")`` for a product; several matrices may have the same parameter. By
+        default every square matrix except the mass and the total is a term.
     mass : str, optional
         The mass matrix. By default the one called M, M0 or mass, in lower or upper case.
     total : str or False, optional
         The whole nominal stiffness, with which the terms are compared. By default the matrix called K, K0 or
-        stiffness, in lower or upper case, if there are others and ``stiffness`` does not name it. False says that
-        there is none: the stiffness is the sum of the terms, whatever else the file holds.
+        stiffness, in lower or upper case, if there are other matrices and ``stiffness`` does not name it. False means
+        that there is no total: the stiffness is the sum of the terms, whatever else the file holds.
     n_modes : int, default=6
         How many of the lowest modes the model gives.
     parameter_names : sequence of str, optional
@@ -72,7 +72,7 @@ def load_affine(
     Raises
     ------
     FileNotFoundError
-        If there is nothing at the path.
+        If the path does not exist.
     ValueError
         Names the file and the variable that is damaged, missing, of another size than the mass, or not
         finite; or names the total if it holds less stiffness than the terms summed.
@@ -80,31 +80,29 @@ def load_affine(
     Warns
     -----
     UserWarning
-        If a total that was found by its name is more than the sum of the terms, the others left out by ``stiffness``
-        or not: the rest is then a constant part of the stiffness; if, without ``stiffness``, a matrix
-        of another name is the sum of all others, and so taken as the total; or if a term is proportional to the
-        mass or to the sum of the other terms.
+        If a total that was found by its name is more than the sum of the terms, so that the rest becomes a constant
+        part of the stiffness; if, without ``stiffness``, a matrix of another name equals the sum of all others and is
+        therefore taken as the total; or if a term is proportional to the mass or to the sum of the other terms.
 
     See Also
     --------
-    AffineModel : From matrices at hand.
+    AffineModel : From matrices in memory.
     probe : From a program that returns matrices.
 
     Notes
     -----
-    Which matrix is which is decided by these rules alone:
+    The role of each matrix is decided by these rules alone:
 
-    - Text, structs, numbers, vectors and matrices that are not square are left alone. A square matrix of another
+    - Text, structs, numbers, vectors and matrices that are not square are ignored. A square matrix of another
       size than the mass, not finite, skew-symmetric (gyroscopic), or of the mass's size and complex, is an error
-      unless ``stiffness`` names the terms; an imaginary part of zeros is left out. Of a folder, only the files of
-      these names and the total are then read.
+      unless ``stiffness`` names the terms; an imaginary part of zeros is dropped. If ``stiffness`` names the terms,
+      only the mass, the terms and the total are read from a folder.
     - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
-    - A file may need at most ten times its size of memory, or 256 MB.
-    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If it is
-      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal,
-      that is an error. So a file with the total and all terms, of which ``stiffness`` names a few, is a
-      model in which these vary and the others stay. A matrix K0 that comes on top of the terms is said to be so by
-      ``stiffness={"K0": (), "K1": "E_deck", ...}``.
+    - Reading a file may take at most ten times its size in memory, or 256 MB.
+    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If the total is
+      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal, that is an
+      error. If ``stiffness`` names only some of the terms in a file with a total, these terms vary and the others are
+      constant. To add K0 to the terms as a constant part, give ``stiffness={"K0": (), "K1": "E_deck", ...}``.
 
     Examples
     --------
@@ -178,7 +176,7 @@ def _is_finite(matrix: Matrix) -> bool:
 
 
 def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
-    """The reason why no matrix can be the mass, for an error."""
+    """Text for the error that no matrix can be the mass."""
     for name, matrix in matrices.items():
         if name.lower() in MASS_NAMES:
             shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
@@ -188,7 +186,7 @@ def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
 
 
 def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
-    """Names of the stiffness terms; warns of matrices that look like something else."""
+    """Names of the stiffness terms; warns of matrices that look like a total or like mass."""
     found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
     for name, term in found.items():
         if term.nnz and not (term + term.T).count_nonzero():
@@ -231,7 +229,7 @@ def _ratio(term: Matrix, reference: Matrix) -> float:
 
 
 def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
-    """Whether all differences are small beside the diagonal."""
+    """Whether all differences are small relative to the diagonal."""
     rest = scipy.sparse.coo_array(matrix - expected)
     diagonal = np.abs(expected.diagonal())
     return not (np.abs(rest.data) > tolerance * np.sqrt(diagonal[rest.row] * diagonal[rest.col])).any()

@@ -25,10 +25,10 @@ def probe(
     n_checks: int = 3,
     random_state: RandomState = None,
 ) -> AffineModel:
-    """The affine terms behind a program that returns stiffness and mass for given parameters.
+    """An affine model from a program that returns stiffness and mass for given parameters.
 
-    K(theta) = K_0 + sum of theta_j K_j, and M likewise, are recovered from one call at theta = 1 and one for
-    each parameter, with that parameter doubled; from then on the program is not needed.
+    The terms of K(theta) = K_0 + sum of theta_j K_j, and of M likewise, are recovered from one call at theta = 1 and
+    one call for each parameter, with that parameter doubled. After that the program is no longer needed.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def probe(
     track : bool, default=False
         Whether a column follows its mode rather than its rank.
     n_checks : int, default=3
-        Number of random points, each multiplier between 0.5 and 1.5, at which the program is called once
-        more to verify that it is affine.
+        Number of random points, each multiplier between 0.5 and 1.5, at which the program is called to verify that it
+        is affine.
     random_state : int, RandomState or None, default=None
         Seed of these points.
 
@@ -68,8 +68,8 @@ def probe(
 
     Notes
     -----
-    Differences are relative to the diagonal, abs(A_ij - B_ij) / sqrt(A_ii A_jj): below some 1e-14 they are
-    rounding and left out, so that sparse matrices stay sparse; above 1e-6 a program is not affine.
+    Differences are relative to the diagonal, abs(A_ij - B_ij) / sqrt(A_ii A_jj): differences below about 1e-14 are
+    rounding errors and left out, so that sparse matrices stay sparse; above 1e-6 a program counts as not affine.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def probe(
 
 
 def _terms(names: Sequence[str], base: scipy.sparse.csc_array, doubled: Sequence[scipy.sparse.csc_array]) -> Terms:
-    """What each parameter adds when doubled, and what then is left as the constant part."""
+    """The term of each parameter, which is the change when it is doubled, and the constant part that remains."""
     diagonal, rounding = base.diagonal(), ROUNDING * (len(names) + 1)
     parts = [_without(rounding, matrix - base, diagonal) for matrix in doubled]
     rest = _without(rounding, base - reduce(add, parts), diagonal)

@@ -1,4 +1,4 @@
-"""Solving many samples, drawing them, and measurement noise."""
+"""Random samples of parameters, their frequencies and derivatives, and measurement noise."""
 
 from skthermo.fem.sampling._evaluate import evaluate
 from skthermo.fem.sampling._linearise import linearise

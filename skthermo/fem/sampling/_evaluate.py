@@ -26,9 +26,9 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
     n_jobs : int, optional
-        Jobs over which chunks of rows are spread, through joblib.
+        Number of parallel jobs (joblib); each takes chunks of rows.
     progress : bool, optional
-        Whether a bar on stderr tells how far it is. By default on a terminal, once a second has passed.
+        Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
 
     Returns
     -------
@@ -38,8 +38,8 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     Raises
     ------
     ValueError
-        If the model is none or gives another shape, or theta has the wrong width, or a value that is neither
-        NaN nor finite and positive.
+        If ``model`` is not an FE model or returns another shape, or theta has the wrong width, or a value that is
+        neither NaN nor finite and positive.
 
     Warns
     -----
@@ -48,9 +48,9 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
 
     Notes
     -----
-    Rows are cut into the same chunks whatever ``n_jobs`` is, and so give the same bits: of ``rows_per_chunk`` rows
-    if the model states that. One job of a model that is ``thread_safe`` runs on as many threads as
-    BLAS may use.
+    The chunks do not depend on ``n_jobs``, so that results are the same to the last bit. A chunk has
+    ``rows_per_chunk`` rows if the model states that number. With one job, a model that is ``thread_safe`` runs on as
+    many threads as BLAS may use.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
 
 
 def check_shape(result: ArrayLike, expected: tuple[int, ...], what: str) -> Array:
-    """Refuse what a model gives in another shape, instead of repeating it to fill a table."""
+    """Raise an error if a result has another shape, rather than broadcast it."""
     array = np.asarray(result)
     if array.shape != expected:
         raise ValueError(f"{what} have shape {array.shape}; expected {expected}, the first for the rows of theta")
@@ -86,7 +86,7 @@ def check_shape(result: ArrayLike, expected: tuple[int, ...], what: str) -> Arra
 
 
 def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
-    """Frequencies of the rows at each of the places, in order; closing the generator ends the work."""
+    """Frequencies of each chunk of rows, in order; closing the generator stops the work."""
     thread_safe = getattr(model, "thread_safe", False)
     frequencies = cast(BatchModel, model).quiet().frequencies if thread_safe else model.frequencies
     if thread_safe and effective_n_jobs(n_jobs) == 1:
@@ -100,7 +100,7 @@ def _parallel(**options: Any) -> Parallel:
     """A joblib `Parallel` that yields results as they come, where the active backend can."""
     try:
         return Parallel(return_as="generator", **options)
-    except ValueError:  # pools of workers, Ray's among them, give all at the end
+    except ValueError:  # some backends, such as Ray's, return all results at the end
         return Parallel(**options)
 
 

@@ -12,12 +12,12 @@ from skthermo.fem.sampling._evaluate import check_shape, evaluate
 
 
 def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple[Array, Array]:
-    """Frequencies of many rows of parameters, and how they change with the parameters.
+    """Frequencies of many rows of parameters, and their derivatives.
 
     Parameters
     ----------
     model : FE model
-        Exact derivatives are taken from a method ``linearised`` or ``jacobian``, where it has one; else central
+        Exact derivatives come from its method ``linearised`` or ``jacobian``, if it has one; else from central
         differences.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
@@ -39,7 +39,7 @@ def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple
 
     Examples
     --------
-    The frequency of a mass on a spring grows with the square root of its stiffness:
+    The frequency of a mass on a spring is proportional to the square root of the stiffness:
 
     >>> from skthermo.fem import AffineModel, linearise
     >>> model = AffineModel({("k",): [[400.0]]}, [[1.0]], n_modes=1)
@@ -73,7 +73,7 @@ def central_differences(model: FEModel, theta: Array, step: float) -> Array:
     if not isinstance(step, Real) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
     n_samples, n_parameters = theta.shape
-    steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # sample, parameter that is moved, parameter
+    steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
     moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])
     solved = evaluate(model, moved.reshape(-1, n_parameters))
     sides = solved.reshape(2, n_samples, n_parameters, -1)

@@ -15,7 +15,7 @@ WIDTH = 30
 
 
 def with_progress(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
-    """Pass arrays through, and show on stderr how many of their rows have come.
+    """Yield the arrays unchanged, and show on stderr how many of their rows are done.
 
     With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides: 1 shows the bar, 0 does not. Unset, the bar
     appears only on a terminal, after a second, and only in the main thread of the main process: bars of several workers

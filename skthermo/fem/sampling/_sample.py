@@ -31,17 +31,17 @@ def sample(
     model : FE model
         Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-        A half-width (0.2 means 1 +- 20 %), lowest and highest multipliers, or a mapping that gives one or the
-        other for every parameter.
+        A half-width (0.2 means 1 +- 20 %), lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to its half-width or to (lowest, highest).
     n_samples : int, default=1000
         Number of rows.
     method : {"uniform", "lhs", "sobol"}, default="uniform"
-        Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (even
-        where ``n_samples`` is a power of 2).
+        Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (balanced if ``n_samples`` is a
+        power of 2).
     n_jobs : int, optional
-        Jobs over which chunks of rows are spread, through joblib.
+        Number of parallel jobs (joblib); each takes chunks of rows.
     progress : bool, optional
-        Whether a bar on stderr tells how far it is. By default on a terminal, once a second has passed.
+        Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
     random_state : int, RandomState or None, default=None
         Seed. The same seed gives the same bits whatever ``n_jobs`` is.
 
@@ -53,8 +53,8 @@ def sample(
     Raises
     ------
     ValueError
-        If the model is none, the bounds are infeasible, ``n_samples`` is not a positive integer, the method is
-        unknown, or ``random_state`` or ``n_jobs`` is something else.
+        If ``model`` is not an FE model, the bounds are infeasible, ``n_samples`` is not a positive integer, the method
+        is unknown, or ``random_state`` or ``n_jobs`` is invalid.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.
     if method == "uniform":
         return random_state.uniform(size=(n_samples, n_parameters))
     engines = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}
-    if method not in list(engines):  # a method may be something that has no hash
+    if method not in list(engines):  # a list, because a method that cannot be hashed would fail in a dictionary
         raise ValueError(f"method is {method!r}; expected one of {['uniform', *engines]}")
     generator = np.random.default_rng(random_state.randint(np.iinfo(np.int32).max))
     return engines[method](n_parameters, rng=generator).random(n_samples)
