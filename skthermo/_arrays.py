@@ -19,8 +19,8 @@ def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what
     unknown = [name for name in values if name not in parameter_names]
     missing = [name for name in parameter_names if name not in values]
     if unknown or missing:
-        problem = f"names {unknown}" if unknown else f"leaves out {missing}"
-        raise ValueError(f"{what} {problem}; expected each of the parameters {list(parameter_names)}")
+        problem = f"{unknown} are unknown" if unknown else f"{missing} are missing"
+        raise ValueError(f"{what}: {problem}; expected each of the parameters {list(parameter_names)}")
     return [values[name] for name in parameter_names]
 
 

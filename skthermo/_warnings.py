@@ -1,23 +1,19 @@
-"""Warnings that point at the user's line, each given once."""
+"""Warnings that point at the user's line, once each."""
 
-import os
 import sys
 import warnings
+import weakref
 from collections.abc import Iterable
-from pathlib import Path
-from types import FrameType
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import joblib
-import sklearn
-
-OURS = tuple(str(Path(package).parent) + os.sep for package in (__file__, sklearn.__file__, joblib.__file__))
+PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}
+"""Packages whose lines are not the user's."""
 
 
 class _Folds:
-    """The cross-validation or search that warned last, by its frame, and the kinds of warnings it has given."""
+    """The run of jobs of the cross-validation or search that warned last, and the kinds of warnings it has given."""
 
-    frame: FrameType | None = None
+    run: ClassVar[Any] = staticmethod(lambda: None)
     kinds: ClassVar[set[str]] = set()
 
 
@@ -31,14 +27,15 @@ def warn_user(message: str, kind: str) -> None:
     kind : str
         One cross-validation or search gives one warning of each kind, not one for each fold.
     """
-    frame, level, folds = sys._getframe(1), 2, None
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(OURS):
-        if frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
-            folds = frame
+    frame, level, in_folds, run = sys._getframe(1), 2, False, None
+    while frame.f_back is not None and (module := frame.f_globals.get("__name__", "")).split(".")[0] in PASSED_OVER:
+        in_folds = in_folds or module.startswith("sklearn.model_selection")
+        if frame.f_code.co_name == "__call__" and type(frame.f_locals.get("self")).__name__ == "Parallel":
+            run = frame.f_locals["self"]
         frame, level = frame.f_back, level + 1
-    if folds is not None:
-        if folds is not _Folds.frame:
-            _Folds.frame, _Folds.kinds = folds, set()
+    if in_folds and run is not None:
+        if _Folds.run() is not run:
+            _Folds.run, _Folds.kinds = weakref.ref(run), set()
         if kind in _Folds.kinds:
             return
         _Folds.kinds.add(kind)
@@ -46,6 +43,6 @@ def warn_user(message: str, kind: str) -> None:
 
 
 def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
-    """Give each warning, a pair of kind and text."""
+    """Give warnings by kind and text."""
     for kind, message in warnings_by_kind:
         warn_user(message, kind)

@@ -1,6 +1,5 @@
 """The part that all damage detectors share: threshold, scores and alarms."""
 
-import warnings
 from abc import ABC, abstractmethod
 from numbers import Real
 from typing import Self
@@ -13,6 +12,7 @@ from sklearn.base import BaseEstimator, OutlierMixin
 from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_markers
 from skthermo._validation import Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._warnings import warn_user
 
 
 class DamageDetector(OutlierMixin, BaseEstimator, ABC):
@@ -136,10 +136,8 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         decision = self.decision_function(X)
         unknown = int(np.isnan(decision).sum())
         if unknown:
-            warnings.warn(
-                f"{unknown} of {len(decision)} rows have a missing mode: no alarm is raised there",
-                UserWarning,
-                stacklevel=2,
+            warn_user(
+                f"{unknown} of {len(decision)} rows have a missing value: no alarm is raised there", "missing values"
             )
         return np.where(decision < 0, -1, 1)
 

@@ -1,6 +1,5 @@
 """Rows of parameter multipliers."""
 
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, real_array
+from skthermo._warnings import warn_user
 
 ROWS_PER_CHUNK = 256
 """Largest number of samples solved together."""
@@ -77,16 +77,15 @@ def check_theta(
     return rows
 
 
-def warn_of_failures(theta: Array, solved: Array, *, stacklevel: int = 4) -> None:
+def warn_of_failures(theta: Array, solved: Array) -> None:
     """Warn of rows without NaN that have no solution: their number and the theta of the first."""
     failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
     if failed.any():
         first = np.flatnonzero(failed)[0]
-        warnings.warn(
+        warn_user(
             f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
             f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
-            UserWarning,
-            stacklevel=stacklevel,
+            "no solution",
         )
 
 

@@ -36,17 +36,22 @@ class TrainingRange:
 
     def warning(self, inputs: Any) -> str:
         """Text of the warning if rows are far outside the range, else an empty string."""
-        excess, values = np.nan_to_num(self.excess(inputs)), as_floats(inputs)
+        values = as_floats(inputs)
+        known = ~np.isnan(values).any(axis=1)
+        if not known.any():
+            return f"none of {len(values)} rows can be predicted: each lacks a temperature or a lagged one"
+        excess = np.where(known[:, np.newaxis], self.excess(inputs), 0.0)
         rows = (excess > FAR).any(axis=1)
         if not rows.any():
             return ""
         column = int(excess.max(axis=0).argmax())
         row = int(excess[:, column].argmax())
+        kelvin = " (these look like kelvin)" if np.nanmin(values[known]) > 150 else ""
         value, lowest, highest = values[row, column], self.lowest[column], self.highest[column]
         return (
             f"{rows.sum()} of {len(rows)} rows have temperatures far outside those that the mapper was trained on: "
             f"{self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} to {highest:.4g}; expected "
-            "degrees Celsius, and records of such weather to train on"
+            f"degrees Celsius{kelvin}, and records of such weather to train on"
         )
 
 

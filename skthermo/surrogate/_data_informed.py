@@ -22,12 +22,13 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
-from skthermo.fem import FEModel, add_noise
+from skthermo.fem import FEModel, add_noise, check_noise
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._applicability import mapper_inputs
 from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
 from skthermo.surrogate._chain_steps import ChainSteps
 from skthermo.surrogate._report import mode_warnings
+from skthermo.surrogate._simulator import tolerance
 
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
@@ -174,6 +175,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             are far from the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
+        tolerance(self.model, self.reduce)
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
@@ -254,7 +256,7 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
         damage : mapping of str to float, optional
-            Severity by damage group of the model: 0.5 is half the stiffness.
+            Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %.
         noise : float or array-like of shape (n_modes,), default=0.0
             Relative standard deviation of Gaussian noise on the frequencies.
         random_state : int, RandomState or None, default=None
@@ -270,6 +272,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         ValueError
             If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
         """
+        check_is_fitted(self)
+        check_noise(noise, len(self.mode_names_))
         frequencies = self._frequencies(X, damage)
         return frame_like(X, add_noise(frequencies, noise, random_state=random_state), self.mode_names_)
 

@@ -23,6 +23,12 @@ ROWS_PER_PARAMETER = 10
 LARGE_OFFSET = 15.0
 """Difference in percent between a measured mode and the model's above which a warning is given."""
 
+SMALL_OFFSET = 5.0
+"""Percent by which a mode may differ from the model's without being taken for another one."""
+
+ABSURD = 2.0
+"""Times the median of its mode, or its inverse, from which a frequency counts as absurd."""
+
 CLEARLY_BETTER = 0.25
 """Modes count as swapped if another order reduces the squared offsets to this share or less."""
 
@@ -86,7 +92,7 @@ class FitReport:
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
-        return [*lines, f"Errors are in-sample, of {self.n_scored} rows."]
+        return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
 
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
@@ -186,13 +192,28 @@ def mode_offsets(model: FEModel, F: Any) -> pd.Series:
 def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
     """Warnings about the order and the units of the modes: kind and text of each."""
     offsets = mode_offsets(model, F)
+    values = as_floats(F)
+    with np.errstate(invalid="ignore"):
+        absurd = np.abs(np.log(values / np.nanmedian(values, axis=0))) > np.log(ABSURD)
+    if absurd.any():
+        row, column = np.argwhere(absurd)[0]
+        yield (
+            "absurd frequencies",
+            f"{absurd.sum()} frequencies are more than {ABSURD:g} times the median of their mode, or less than "
+            f"1/{ABSURD:g} of it, first {offsets.index[column]!r} in row {row}: {values[row, column]:g} Hz; expected "
+            "NaN where a mode was not identified",
+        )
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
     if (ratios > 0).all() and len(ratios) > 1:
         table = match_modes(model, as_floats(F))
-        order, best = table["mode"].to_numpy(), table["offset"].to_numpy()
-        moved = order != np.arange(len(order))
-        if moved.any() and (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET:
+        unchanged = np.arange(len(offsets))
+        near = offsets.abs().to_numpy() < SMALL_OFFSET
+        order = np.where(near, unchanged, table["mode"])
+        best = np.where(near, offsets, table["offset"])
+        moved = order != unchanged
+        is_better = (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET
+        if moved.any() and is_better and len(np.unique(order)) == len(order):
             yield (
                 "order of modes",
                 f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "

@@ -24,6 +24,9 @@ AT_BOUND = 1e-4
 LARGE_ERROR = 15.0
 """Percent by which an updated model misses a frequency that asks for an explanation."""
 
+UNDETERMINED = 1e4
+"""Times the smallest deviation of a parameter from which on another one is not determined."""
+
 BEYOND_NOISE = 10.0
 """Standard deviations by which it misses a frequency that noise does not explain."""
 
@@ -115,13 +118,24 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
 
 
 def doubtful_fits(
-    measured: Measured, table: pd.DataFrame, theta: Array, bounds: Array, parameter_names: Sequence[str]
+    measured: Measured,
+    table: pd.DataFrame,
+    theta: Array,
+    bounds: Array,
+    covariance: Array | None,
+    parameter_names: Sequence[str],
 ) -> Iterator[str]:
     """Warnings about parameters at their bounds and frequencies that noise cannot explain."""
     at_bound = np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < AT_BOUND * np.diff(bounds, axis=1)[:, 0]
     if at_bound.any():
         listed = ", ".join(f"{name!r} ({theta[i]:.3g})" for i, name in enumerate(parameter_names) if at_bound[i])
         yield f"the optimum lies at the bounds of {listed}: expected wider bounds, or another model"
+    if covariance is not None:
+        deviations = np.sqrt(np.diagonal(covariance))
+        undetermined = ~(deviations < UNDETERMINED * np.nanmin(deviations))
+        if undetermined.any() and not undetermined.all():
+            listed = [name for i, name in enumerate(parameter_names) if undetermined[i]]
+            yield f"{listed} hardly move the measured modes and are not determined: leave them out, or give a prior"
     far = table["error_after"].abs() > LARGE_ERROR
     if far.any():
         ratios = table["measured"] / table["after"]

@@ -243,7 +243,14 @@ class ModelUpdater(BaseEstimator):
         self.table_ = modes_table(model, measured, best.theta)
         doubts = [*false_matches(model, measured, best.theta)]
         if best.success:
-            doubts += doubtful_fits(measured, self.table_, best.theta, bounds, self.model.parameter_names)
+            doubts += doubtful_fits(
+                measured,
+                self.table_,
+                best.theta,
+                bounds,
+                self.covariance_ if prior is None else None,
+                self.model.parameter_names,
+            )
         else:
             doubts.append(unfinished(best, residuals))
         for message in doubts:

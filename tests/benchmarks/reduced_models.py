@@ -1,6 +1,6 @@
 """Large frames, reduced and not, against a loop of scipy.sparse.linalg.eigsh.
 
-    OMP_NUM_THREADS=1 PYTHONPATH=. SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
 
 On three smaller models, on the exported building frame, if SKTHERMO_DATA names the folder that has it, and on a
 tied-arch bridge. The loop solves ready-made matrices, some of the samples only, and is scaled up; making the basis and
@@ -9,6 +9,7 @@ checking it counts as part of every reduced sample. Medians of several rounds in
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,9 @@ from measure import median_seconds, peak_megabytes
 
 from skthermo.datasets import make_kw51, make_z24
 from skthermo.fem import AffineModel, sample
-from tests.fem.frames import FRAME
+
+sys.path.append(str(Path(__file__).parents[1] / "fem"))
+from frames import FRAME
 
 BOUNDS = 0.3
 

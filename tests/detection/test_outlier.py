@@ -79,7 +79,7 @@ def test_missing_modes_give_no_index_and_no_alarm():
     index = detector.damage_index(holed)
     assert index.index.equals(STAMPS)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows have a missing mode"):
+    with pytest.warns(UserWarning, match="2 of 400 rows have a missing value"):
         alarms = detector.predict(holed)
     np.testing.assert_array_equal(np.flatnonzero(alarms == 1), [3, 7])
     without = OutlierDetector(IsolationForest(random_state=0)).fit(holed.drop(index=STAMPS[[3, 7]]))

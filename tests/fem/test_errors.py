@@ -307,3 +307,44 @@ def test_a_repeated_key_lets_groups_cut_through_a_parameter():
     model = AffineModel([(("k",), first), (("k",), second)], I2, n_modes=2, groups={"left": [0], "right": [1]})
     hertz = model.damaged({"right": 0.75}).frequencies([[4.0]]) * 2 * np.pi
     np.testing.assert_allclose(hertz, [[2.0, 2.0]])
+
+
+class OwnBar:
+    """An element of one's own, with keys and matrices to get wrong."""
+
+    nodes, key, matrix = ("left", "apex"), ("E", "A"), np.eye(4)
+
+    def dofs(self, dimension):
+        return [(node, direction) for node in self.nodes for direction in "xy"]
+
+    def properties(self):
+        return iter([("E", 2e11, False), ("A", 0.01, False)])
+
+    def ends(self, coordinates):
+        return coordinates
+
+    def stiffness(self, coordinates):
+        return {self.key: 1e6 * self.matrix}
+
+    def mass(self, coordinates):
+        return {("A",): np.eye(4)}
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "message"),
+    [
+        ("key", "EA", r"stiffness of member 'own' has the key 'EA'; expected a tuple of its properties \['A', 'E'\]"),
+        ("key", ("E", "Area"), r"stiffness of member 'own' has the key \('E', 'Area'\)"),
+        ("matrix", np.eye(3), r"stiffness of member 'own' has shape \(3, 3\); expected \(4, 4\), a row for each"),
+    ],
+)
+def test_matrices_of_an_element_of_ones_own_are_checked(attribute, value, message):
+    def structure():
+        return Structure({"left": (0, 0), "apex": (1, 1)}, {"own": OwnBar()}, {"left": "xy"}, {"all": ["own"]})
+
+    model = structure().assemble({"E": ("E", "all")}, n_modes=1)
+    np.testing.assert_allclose(model.frequencies([[4.0]]), 2 * model.frequencies([[1.0]]))
+    wrong = OwnBar()
+    setattr(wrong, attribute, value)
+    with pytest.raises(ValueError, match=message):
+        Structure({"left": (0, 0), "apex": (1, 1)}, {"own": wrong}, {"left": "xy"}, {"all": ["own"]}).assemble(["all"])

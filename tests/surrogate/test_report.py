@@ -17,6 +17,7 @@ from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z2
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate._report import mode_warnings
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
@@ -126,6 +127,20 @@ class TestWarningsOfFit:
         complete = KNNGapImputer().set_output(transform="pandas").fit_transform(gappy)
         assert not caught(lagged.fit, complete, F)
 
+    def test_absurd_records_are_named(self):
+        absurd = F.copy()
+        absurd.iloc[5, 2] = 999.0
+        texts = [str(w.message) for w in caught(chain(mapper=TemperatureMapper(Ridge())).fit, T, absurd)]
+        message = r"1 frequencies are more than 2 times .* first 'f3' in row 5: 999 Hz"
+        assert any(re.match(message, text) for text in texts)
+
+    def test_only_modes_that_are_far_off_are_taken_for_others(self):
+        z24 = make_z24()
+        nominal = z24.frequencies(np.ones(4))[0] * [1.02, 1.01, 1.02, 1.023]
+        text = dict(mode_warnings(z24, nominal[np.newaxis, [1, 0, 2, 3]]))["order of modes"]
+        assert "['f1', 'f2'] look like other modes" in text
+        assert "with_modes([1, 0, 2, 3])" in text
+
     def test_a_narrow_box_is_named(self):
         narrow = InverseSurrogate(bounds=0.05, noise=0.01)
         with pytest.warns(UserWarning, match=r"of 365 rows give parameters far outside .* trained in 0.95 to 1.05"):
@@ -159,6 +174,11 @@ class TestWarningsOfFit:
 
 
 class TestForeignWeather:
+    def test_rows_without_temperatures_are_said_to_have_no_prediction(self, fitted):
+        with pytest.warns(UserWarning, match="none of 365 rows can be predicted: each lacks a temperature"):
+            predicted = fitted.predict(LATER.assign(T2=np.nan))
+        assert predicted.isna().all().all()
+
     @pytest.mark.parametrize(
         ("weather", "value"),
         [(LATER * 1.8 + 32, "Fahrenheit"), (LATER + 273.15, "kelvin"), (LATER + 40, "hotter")],

@@ -313,7 +313,7 @@ def test_bounds_go_by_name():
     drawn = InverseSurrogate(TRUSS, LinearRegression(), bounds=by_name, n_samples=500, random_state=0).fit().samples_
     np.testing.assert_allclose(drawn.theta.min(axis=0), [0.8, 0.7, 0.9, 0.5], atol=0.01)
     np.testing.assert_allclose(drawn.theta.max(axis=0), [1.2, 1.3, 1.1, 2.0], atol=0.01)
-    with pytest.raises(ValueError, match=r"bounds leaves out \['vertical'\]; expected each of the parameters"):
+    with pytest.raises(ValueError, match=r"bounds: \['vertical'\] are missing; expected each of the parameters"):
         InverseSurrogate(TRUSS, bounds={"top": 0.3, "bottom": 0.2, "diagonal": 0.1}).fit()
 
 

@@ -124,6 +124,7 @@ def test_complex_shapes_of_random_phase_are_made_real():
     np.testing.assert_allclose(from_complex.theta_, from_real.theta_, atol=1e-6)
 
 
+@pytest.mark.filterwarnings(r"ignore:\[.b., .c.\] hardly move the measured modes")
 def test_a_prior_holds_what_cannot_be_told():
     model = AffineModel(
         {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}, np.eye(2), n_modes=2
@@ -248,3 +249,11 @@ def test_covariance_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound(dof
     np.testing.assert_allclose(np.median(deviations, axis=0)[identifiable], bound[identifiable], rtol=0.1)
     errors = (np.mean(found, axis=0) - truth) / (bound / np.sqrt(n_fits))
     assert np.abs(errors[identifiable]).max() < 4
+
+
+def test_parameters_that_no_mode_feels_are_named():
+    """A hundred-thousandth of the third spring is a parameter."""
+    terms = {("a",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 4.0, 0]), ("c",): np.diag([0, 0, 9e-5])}
+    model = AffineModel(terms | {(): np.diag([0, 0, 9.0])}, np.eye(3), n_modes=3)
+    with pytest.warns(UserWarning, match=r"\['c'\] hardly move the measured modes and are not determined"):
+        ModelUpdater(model).fit(model.frequencies([[1.1, 0.9, 1.0]]))

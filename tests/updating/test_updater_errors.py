@@ -131,5 +131,5 @@ def test_a_prior_goes_by_name():
     in_order = [1.0, 1e-6, 1e-6, 1e-6]
     fits = [ModelUpdater(TRUSS, prior=prior).fit(measured, frequency_std=0.01) for prior in (by_name, in_order)]
     np.testing.assert_array_equal(fits[0].theta_, fits[1].theta_)
-    with pytest.raises(ValueError, match=r"prior names \['roof'\]"):
+    with pytest.raises(ValueError, match=r"prior: \['roof'\] are unknown"):
         ModelUpdater(TRUSS, prior=by_name | {"roof": 1.0}).fit(measured)

@@ -1,6 +1,5 @@
 """The public methods of affine models: checks, chunks, threads, warnings."""
 
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
@@ -11,6 +10,7 @@ from scipy.sparse import csc_array
 
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads
+from skthermo._warnings import warn_user
 from skthermo.fem._theta import check_theta, warn_of_failures
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import check_different, check_modes
@@ -157,7 +157,7 @@ class AffineBase(ABC):
             More modes than ``n_modes``, in ascending order.
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
-        self._warn_of_bounds(row, stacklevel=3)
+        self._warn_of_bounds(row)
         return self._core.local_modes(row, follow=follow, basis=self._basis)
 
     def nominal_mac(self, shapes: Array) -> Array:
@@ -277,9 +277,9 @@ class AffineBase(ABC):
         frequencies : ndarray of shape (n_samples, ...)
             The solution for each row.
         """
-        self._warn_of_bounds(theta, stacklevel=5)
+        self._warn_of_bounds(theta)
         if not self._is_quiet:
-            warn_of_failures(theta, frequencies, stacklevel=5)
+            warn_of_failures(theta, frequencies)
 
     def __sklearn_clone__(self: Model) -> Model:
         return self
@@ -311,10 +311,10 @@ class AffineBase(ABC):
         """Hook: ReducedModel warns outside its box."""
         return ""
 
-    def _warn_of_bounds(self, theta: Array, *, stacklevel: int) -> None:
+    def _warn_of_bounds(self, theta: Array) -> None:
         message = "" if self._is_quiet else self._bounds_warning(theta)
         if message:
-            warnings.warn(message, UserWarning, stacklevel=stacklevel)
+            warn_user(message, "outside the reduced box")
 
     def _in_chunks(self, solve: Callable[[Array], tuple[Array, ...]], theta: ArrayLike) -> tuple[Array, ...]:
         rows = check_theta(theta, self.parameter_names)

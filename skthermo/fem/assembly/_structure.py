@@ -8,7 +8,7 @@ import numpy as np
 from skthermo._arrays import Array
 from skthermo.fem.affine import AffineModel
 from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
-from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element
+from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element, check_matrices
 
 Binding = tuple[str, str] | tuple[str, str, str]
 Target = tuple[str, str, tuple[str, ...]]
@@ -148,8 +148,10 @@ class Structure:
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
             damage = self._bound(name, damageable, STIFFNESS)
-            stiffness.add(element.stiffness(coordinates), dofs, self._bound(name, bindings, STIFFNESS), damage)
-            mass.add(element.mass(coordinates), dofs, self._bound(name, bindings, MASS))
+            matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), STIFFNESS)
+            stiffness.add(matrices, dofs, self._bound(name, bindings, STIFFNESS), damage)
+            masses = check_matrices(name, element, element.mass(coordinates), len(dofs), MASS)
+            mass.add(masses, dofs, self._bound(name, bindings, MASS))
         return AffineModel(
             stiffness.terms(),
             mass.terms(),

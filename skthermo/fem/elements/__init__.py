@@ -2,7 +2,15 @@
 
 from skthermo.fem.elements._bar import Bar
 from skthermo.fem.elements._beam import Beam
-from skthermo.fem.elements._element import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element
+from skthermo.fem.elements._element import (
+    ROTATIONS,
+    TRANSLATIONS,
+    ByProperties,
+    Dof,
+    Element,
+    check_element,
+    check_matrices,
+)
 from skthermo.fem.elements._membrane import Membrane
 from skthermo.fem.elements._point_mass import PointMass
 from skthermo.fem.elements._spring import Spring
@@ -19,4 +27,5 @@ __all__ = [
     "PointMass",
     "Spring",
     "check_element",
+    "check_matrices",
 ]

@@ -7,7 +7,7 @@ a parameter.
 from collections.abc import Hashable, Iterator, Mapping
 from math import isfinite
 from numbers import Real
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,6 +17,7 @@ Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]
 
 TRANSLATIONS = ("x", "y", "z")
+MEMBERS = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
 ROTATIONS = ("rx", "ry", "rz")
 
 SHORTEST = 1e-6
@@ -74,10 +75,29 @@ class PhysicalElement:
         return coordinates
 
 
+def check_matrices(name: Hashable, element: Element, matrices: Any, n_dofs: int, what: str) -> ByProperties:
+    """Refuse matrices of another size than the element's degrees of freedom, or of properties that it has not."""
+    known = {symbol for symbol, _, _ in element.properties()}
+    for properties, matrix in matrices.items():
+        if not isinstance(properties, tuple) or not set(properties) <= known:
+            raise ValueError(
+                f"the {what} of member {name!r} has the key {properties!r}; expected a tuple of its properties "
+                f"{sorted(known)}"
+            )
+        if np.shape(matrix) != (n_dofs, n_dofs):
+            raise ValueError(
+                f"the {what} of member {name!r} has shape {np.shape(matrix)}; expected ({n_dofs}, {n_dofs}), a row for "
+                "each of its dofs"
+            )
+    return matrices
+
+
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
     """Raise an error if an element has unknown nodes, is too short, or has a property that is not positive."""
-    if isinstance(element, type) or not hasattr(element, "nodes"):
-        raise ValueError(f"member {name!r} is {element!r}; expected an element such as Bar(...)")
+    missing = [member for member in MEMBERS if not hasattr(element, member)]
+    if isinstance(element, type) or missing:
+        lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(MEMBERS) else ""
+        raise ValueError(f"member {name!r} is {element!r}{lacks}; expected an element such as Bar(...)")
     for node in element.nodes:
         if node not in coordinates:
             raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")

@@ -1,7 +1,6 @@
 """FE models computed by a user's own program."""
 
 import copy
-import warnings
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, real_array
+from skthermo._warnings import warn_user
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, check_theta, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
@@ -162,7 +162,7 @@ class CallableModel:
             if len(failures) > 1 and everywhere and not self._is_quiet:
                 raise first
             if not self._is_quiet:
-                warnings.warn(f"{len(failures)} of {len(rows)} rows are NaN: {first}", UserWarning, stacklevel=2)
+                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", "failing program")
             solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
         found = [solved[key] if key in solved else known[key] for key in keys]
         return np.array(found).reshape(len(rows), self.n_modes)
@@ -215,7 +215,7 @@ class CallableModel:
             The solution for each row.
         """
         if not self._is_quiet:
-            warn_of_failures(theta, frequencies, stacklevel=5)
+            warn_of_failures(theta, frequencies)
 
     def __sklearn_clone__(self) -> "CallableModel":
         return self
