@@ -10,38 +10,21 @@ from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import NotFittedError
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import KFold, cross_val_predict, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.fem import CallableModel
 from skthermo.metrics import frequency_scorer, mape
-from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.preprocessing import BiasAligner, KNNGapImputer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.surrogate.chains import TRUSS, F, T, chain, inverse, mapper
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 
-TRUSS = make_truss()
-YEAR = make_truss_campaign(random_state=0)
 LATER = make_truss_campaign(random_state=1)
-T, F = YEAR.temperatures, YEAR.frequencies
-
-
-def inverse(**options):
-    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
-
-
-def mapper(lags=2):
-    return make_pipeline(LagFeatures(lags), TemperatureMapper(LinearRegression()))
-
-
-def chain(**options):
-    defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
-    return DataInformedFEM(TRUSS, **(defaults | options))
 
 
 with warnings.catch_warnings():

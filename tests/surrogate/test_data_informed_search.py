@@ -9,36 +9,15 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 from sklearn.base import clone
 from sklearn.ensemble import ExtraTreesRegressor
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel
-from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.surrogate.chains import TRUSS, F, T, chain, inverse
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
-
-TRUSS = make_truss()
-YEAR = make_truss_campaign(random_state=0)
-T, F = YEAR.temperatures, YEAR.frequencies
-
-
-def inverse(**options):
-    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
-
-
-def mapper(lags=2):
-    return make_pipeline(LagFeatures(lags), TemperatureMapper(LinearRegression()))
-
-
-def chain(**options):
-    defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
-    return DataInformedFEM(TRUSS, **(defaults | options))
 
 
 with warnings.catch_warnings():

@@ -1,0 +1,27 @@
+"""A small chain and its records, for tests."""
+
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+
+
+def inverse(**options):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
+
+
+def mapper(lags=2):
+    return make_pipeline(LagFeatures(lags), TemperatureMapper(LinearRegression()))
+
+
+def chain(**options):
+    defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
+    return DataInformedFEM(TRUSS, **(defaults | options))
