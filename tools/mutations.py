@@ -105,7 +105,7 @@ def survives(folder, file, tests, breaks, original, mutated):
         raise SystemExit(f"{file} has {original!r} {source.count(original)} times; expected it once")
     path.write_text(source.replace(original, mutated))
     start = time.perf_counter()
-    command = [sys.executable, "-B", "-m", "pytest", "-q", "-x", f"tests/{tests}"]
+    command = [sys.executable, "-B", "-m", "pytest", "-n0", "-q", "-x", f"tests/{tests}"]
     paths = os.environ | {"PYTHONPATH": str(folder)}
     run = subprocess.run(command, cwd=folder, env=paths, capture_output=True, text=True)
     path.write_text(source)
