@@ -1,5 +1,6 @@
 """Warnings that point at the user's line, once each."""
 
+import multiprocessing
 import sys
 import warnings
 import weakref
@@ -25,7 +26,8 @@ def warn_user(message: str, kind: str) -> None:
     message : str
         Text of the warning.
     kind : str
-        One cross-validation or search gives one warning of each kind, not one for each fold.
+        One cross-validation or search gives one warning of each kind, not one for each fold; a worker process, which
+        sees only its own folds, one in its life.
     """
     frame, level, in_folds, run = sys._getframe(1), 2, False, None
     while frame.f_back is not None and (module := frame.f_globals.get("__name__", "")).split(".")[0] in PASSED_OVER:
@@ -33,6 +35,8 @@ def warn_user(message: str, kind: str) -> None:
         if frame.f_code.co_name == "__call__" and type(frame.f_locals.get("self")).__name__ == "Parallel":
             run = frame.f_locals["self"]
         frame, level = frame.f_back, level + 1
+    if multiprocessing.parent_process() is not None:
+        in_folds, run = True, multiprocessing.current_process()
     if in_folds and run is not None:
         if _Folds.run() is not run:
             _Folds.run, _Folds.kinds = weakref.ref(run), set()

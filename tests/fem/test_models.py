@@ -173,3 +173,9 @@ def test_mac_names_what_is_no_number():
         with pytest.raises(ValueError, match=message):
             mac([1.0, 2.0], phi)
     assert np.isnan(mac([1.0, 2.0], [pd.NA, 1.0])).all()  # a missing value
+
+
+def test_a_dense_model_is_recognised_after_a_journey_to_another_process():
+    """Searches look simulations up by this hash, in workers and at home."""
+    model = make_truss()
+    assert joblib.hash(pickle.loads(pickle.dumps(model))) == joblib.hash(model) == joblib.hash(make_truss())

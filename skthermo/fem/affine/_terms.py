@@ -115,7 +115,7 @@ class DenseTerms(AffineTerms):
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
-        return cls(np.stack([as_dense(matrix) for matrix in matrices]), exponents)
+        return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
 
     @property
     def n_entries(self) -> int:
