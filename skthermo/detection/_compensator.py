@@ -228,6 +228,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         return _check_feature_names_in(self, input_features)[self.targets_]
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any]:
+        if isinstance(self.estimator, type):
+            raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
         _check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = _positions(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))

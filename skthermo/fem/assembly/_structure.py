@@ -177,9 +177,10 @@ class Structure:
         if not isinstance(targets, Mapping):
             if not isinstance(targets, Iterable) or not all(isinstance(target, str) for target in targets):
                 raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
-            if len(set(targets)) < len(targets):
-                raise ValueError(f"{what}s are {list(targets)}; expected each group once")
-            targets = {group: group for group in targets}
+            names = list(targets)
+            if len(set(names)) < len(names):
+                raise ValueError(f"{what}s are {names}; expected each group once")
+            targets = {group: group for group in names}
         bindings = {}
         for name, target in targets.items():
             if not isinstance(target, str) and not (isinstance(target, Sequence) and len(target) in (2, 3)):
