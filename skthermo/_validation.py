@@ -18,6 +18,7 @@ from sklearn.utils._param_validation import HasMethods, Interval, InvalidParamet
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted
 
 from skthermo._arrays import without_mask, without_missing
+from skthermo._models import is_model
 
 __all__ = [
     "BaseSearchCV",
@@ -32,9 +33,7 @@ __all__ = [
     "_num_samples",
     "check_array",
     "check_is_fitted",
-    "check_model",
     "clone_sharing_models",
-    "is_model",
     "numbers_expected",
     "seed_parts",
     "seeded",
@@ -78,24 +77,6 @@ def with_nan(X: Any) -> Any:
     if isinstance(X, np.ndarray) and X.dtype == object:
         return without_missing(np.asarray(X))
     return without_mask(X)
-
-
-def is_model(candidate: Any) -> bool:
-    """Whether an object has the attributes of an FE model."""
-    wanted = ("parameter_names", "n_modes", "frequencies")
-    return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in wanted)
-
-
-def check_model(candidate: Any) -> None:
-    """Raise an error for an object that is not an FE model.
-
-    Raises
-    ------
-    ValueError
-        Says what was given.
-    """
-    if not is_model(candidate):
-        raise ValueError(f"model is {candidate!r:.200}; expected parameter_names, n_modes and frequencies")
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:

@@ -12,8 +12,9 @@ from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
 from skthermo._arrays import as_columns, as_floats
+from skthermo._models import is_model
 from skthermo._regressors import fit_outputs
-from skthermo._validation import BaseSearchCV, _BaseImputer, is_model
+from skthermo._validation import BaseSearchCV, _BaseImputer
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):

@@ -52,15 +52,6 @@ class FEModel(Protocol):
         """Natural frequencies in Hz, (n_samples, n_modes), of theta (n_samples, n_parameters)."""
 
 
-def check_model(model: Any) -> None:
-    """Raise an error for an object that is not an FE model."""
-    missing = [name for name in ("parameter_names", "n_modes", "frequencies") if not hasattr(model, name)]
-    if missing or isinstance(model, type):
-        raise ValueError(
-            f"model is {model!r:.200}; expected an FE model, an object with parameter_names, n_modes and frequencies"
-        )
-
-
 class ModalModel(FEModel, Protocol):
     """An FE model that gives mode shapes.
 

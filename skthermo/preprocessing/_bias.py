@@ -9,6 +9,7 @@ from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
+from skthermo._models import is_model
 from skthermo._validation import (
     HasMethods,
     StrOptions,
@@ -16,7 +17,6 @@ from skthermo._validation import (
     check_array,
     check_is_fitted,
     clone_sharing_models,
-    is_model,
     validate_data,
 )
 

@@ -8,7 +8,8 @@ from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arrays import as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._validation import check_array, is_model, seed_parts, seeded, validate_data
+from skthermo._models import check_model
+from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.fem import check_bounds
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
@@ -27,8 +28,7 @@ class Parts(NamedTuple):
 def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
     """Temperatures and frequencies, checked; frames stay frames."""
     model = chain.model
-    if not is_model(model):
-        raise ValueError(f"model is {model!r}; expected parameter_names, n_modes and frequencies")
+    check_model(model)
     if y is None:
         raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
     values = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)

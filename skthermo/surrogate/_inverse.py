@@ -12,7 +12,8 @@ from sklearn.utils import Bunch, check_random_state
 
 from skthermo._arrays import Bounds, as_floats
 from skthermo._frames import column_names, frame_like
-from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, is_model, validate_data
+from skthermo._models import check_model
+from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, add_noise, check_bounds, check_noise, check_theta, evaluate
 from skthermo.surrogate._box import Box
@@ -263,8 +264,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         return np.array(self.parameter_names_ or numbered, dtype=object)
 
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
-        if not is_model(self.model):
-            raise ValueError(f"model is {self.model!r}; expected parameter_names, n_modes and frequencies")
+        check_model(self.model)
         model = self.model
         names_only = np.ones((1, model.n_modes)) if X is None else X
         n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, real_array
-from skthermo._validation import check_model
+from skthermo._models import check_model
 from skthermo.fem import FEModel, check_theta, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))

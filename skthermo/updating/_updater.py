@@ -14,15 +14,8 @@ from sklearn.utils import check_random_state
 
 from skthermo._arrays import Array, Bounds, by_parameter, real_array
 from skthermo._frames import column_names
-from skthermo._validation import (
-    HasMethods,
-    Interval,
-    StrOptions,
-    _fit_context,
-    check_model,
-    clone_sharing_models,
-    validate_data,
-)
+from skthermo._models import check_model
+from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
 from skthermo.fem import FEModel, check_bounds
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured

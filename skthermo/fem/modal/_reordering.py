@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
-from skthermo.fem._protocol import ModalModel, check_model
+from skthermo._models import check_model
+from skthermo.fem._protocol import ModalModel
 from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._mac import mac
 from skthermo.fem.modal._tracking import pair_modes

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array
-from skthermo.fem._protocol import FEModel, check_model
+from skthermo._models import check_model
+from skthermo.fem._protocol import FEModel
 from skthermo.fem._theta import check_theta
 from skthermo.fem.sampling._evaluate import check_shape, evaluate
 

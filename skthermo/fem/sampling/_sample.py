@@ -6,8 +6,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
+from skthermo._models import check_model
 from skthermo.fem._bounds import check_bounds
-from skthermo.fem._protocol import FEModel, check_model
+from skthermo.fem._protocol import FEModel
 from skthermo.fem.sampling._evaluate import evaluate
 
 if TYPE_CHECKING:
