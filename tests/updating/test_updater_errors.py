@@ -82,9 +82,7 @@ def test_a_model_that_is_none_is_refused():
         def frequencies(self, theta):
             return theta
 
-    with pytest.raises(
-        ValueError, match="an object with parameter_names, n_modes and frequencies"
-    ):
+    with pytest.raises(ValueError, match="an object with parameter_names, n_modes and frequencies"):
         ModelUpdater(Frequencies()).fit(F)
 
 
