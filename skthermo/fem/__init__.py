@@ -1,6 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
-from skthermo.fem._bounds import check_bounds
+from skthermo.fem._bounds import check_bounds, check_prior
 from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import (
     BatchModel,
@@ -40,6 +40,7 @@ __all__ = [
     "check_bounds",
     "check_dofs",
     "check_noise",
+    "check_prior",
     "check_theta",
     "evaluate",
     "linearise",

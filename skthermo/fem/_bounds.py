@@ -1,10 +1,11 @@
-"""Bounds on parameter multipliers."""
+"""Bounds and priors of parameter multipliers."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, Bounds, by_parameter, real_array
 
@@ -58,6 +59,42 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
         if not 0 < lowest < highest < np.inf:
             raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
     return array
+
+
+def check_prior(prior: ArrayLike | Mapping[str, float], parameter_names: Sequence[str]) -> Array:
+    """Standard deviation of the prior of every parameter.
+
+    Parameters
+    ----------
+    prior : float, array-like of shape (n_parameters,) or mapping of str to float
+        Relative standard deviations: a number, one for each parameter, or a mapping from each parameter to its own.
+    parameter_names : sequence of str
+        The parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_parameters,)
+
+    Raises
+    ------
+    ValueError
+        If the shape is wrong, a value is not finite and above 0, or a mapping leaves out a parameter or names an
+        unknown one.
+
+    Examples
+    --------
+    >>> from skthermo.fem import check_prior
+    >>> check_prior({"E_arch": 0.1, "E_deck": 0.3}, ["E_deck", "E_arch"])
+    array([0.3, 0.1])
+    """
+    names = list(parameter_names)
+    given = by_parameter(prior, names, "prior") if isinstance(prior, Mapping) else prior
+    deviations = real_array(given, "prior")
+    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & np.isfinite(deviations)).all():
+        raise ValueError(
+            f"prior is {deviations}; expected relative standard deviations above 0, a number or one for each of {names}"
+        )
+    return np.broadcast_to(deviations, (len(names),))
 
 
 def _pair(width: Any, name: str) -> Any:

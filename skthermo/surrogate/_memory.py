@@ -18,7 +18,7 @@ ORDER_CHECKS = 256
 
 def remembered_simulations(
     memory: str | Memory | None, model: FEModel, bounds: Bounds, n_samples: int, tol: float | None, *, n_jobs, seed
-) -> tuple[Bunch, float]:
+) -> tuple[Bunch, float, Any]:
     """`simulations`, read from the memory if stored there; of several processes only one makes them.
 
     Raises
@@ -50,10 +50,10 @@ def remembered_simulations(
 
 def simulations(
     identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, n_jobs: int | None, seed: int
-) -> tuple[Bunch, float]:
-    """Random samples (of the reduced model if ``tol`` is given), and the share with modes in another order."""
-    if tol is not None:
-        model = model.reduced(bounds, tol=tol, random_state=seed)
+) -> tuple[Bunch, float, Any]:
+    """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None."""
+    reduced = None if tol is None else model.reduced(bounds, tol=tol, random_state=seed)
+    model = reduced or model
     drawn = sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
     sorts = not getattr(model, "track", True) and hasattr(model, "modes")
-    return drawn, share_reordered(model, drawn.theta[:ORDER_CHECKS]) if sorts else 0.0
+    return drawn, share_reordered(model, drawn.theta[:ORDER_CHECKS]) if sorts else 0.0, reduced

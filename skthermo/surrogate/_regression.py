@@ -108,7 +108,10 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""
         check_is_fitted(self)
-        inputs = self._read_inputs(X)
+        return self._estimate(self._read_inputs(X), return_std)
+
+    def _estimate(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
+        """What the regressor gives for inputs that have been read."""
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self.n_parameters_), np.nan)
         std = np.full_like(theta, np.nan)

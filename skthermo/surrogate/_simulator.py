@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, evaluate
+from skthermo.fem import FEModel, evaluate, linearise
 
 MANY_ROWS = 2000
 """Number of rows from which a full sparse model takes minutes."""
@@ -72,8 +73,7 @@ class Simulator:
         if self.reduced is None:
             self._hint(len(theta))
             return evaluate(self.model, theta, n_jobs=n_jobs)
-        lowest, highest = self.box.T
-        outside = ((theta < lowest) | (theta > highest)).any(axis=1)
+        outside = self._outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
         if outside.any():
@@ -85,6 +85,21 @@ class Simulator:
                 )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
         return frequencies
+
+    def linearise(self, theta: Array, n_jobs: int | None = None) -> tuple[Array, Array]:
+        """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters), without warnings."""
+        outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
+        frequencies = np.full((len(theta), self.model.n_modes), np.nan)
+        jacobian = np.full((*frequencies.shape, theta.shape[1]), np.nan)
+        for model, rows in ((self.reduced, ~outside), (self.model, outside)):
+            if rows.any():
+                quiet = model.quiet() if hasattr(model, "quiet") else model
+                frequencies[rows], jacobian[rows] = linearise(quiet, theta[rows], n_jobs=n_jobs)
+        return frequencies, jacobian
+
+    def _outside(self, theta: Array) -> NDArray[np.bool_]:
+        lowest, highest = self.box.T
+        return ((theta < lowest) | (theta > highest)).any(axis=1)
 
     def _hint(self, n_rows: int) -> None:
         if n_rows >= MANY_ROWS and hasattr(self.model, "reduced") and getattr(self.model, "prefer", "") == "processes":

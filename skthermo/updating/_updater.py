@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import Array, Bounds, by_parameter, real_array
+from skthermo._arrays import Array, Bounds, real_array
 from skthermo._frames import column_names
 from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
-from skthermo.fem import FEModel, check_bounds
+from skthermo.fem import FEModel, check_bounds, check_prior
 from skthermo.updating._information import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
@@ -281,16 +281,7 @@ class ModelUpdater(BaseEstimator):
         return bounds
 
     def _read_prior(self) -> Array | None:
-        if self.prior is None:
-            return None
-        names = list(self.model.parameter_names)
-        given = by_parameter(self.prior, names, "prior") if isinstance(self.prior, dict) else self.prior
-        prior = real_array(given, "prior")
-        if prior.shape not in ((), (len(names),)) or not ((prior > 0) & np.isfinite(prior)).all():
-            raise ValueError(
-                f"prior is {prior}; expected relative standard deviations above 0, a number or one for each of {names}"
-            )
-        return np.broadcast_to(prior, (len(names),))
+        return None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
 
     def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
         lowest, highest = bounds.T

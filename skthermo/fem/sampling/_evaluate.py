@@ -62,8 +62,7 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
            [  nan,   nan]])
     """
     check_model(model)
-    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
-        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+    check_n_jobs(n_jobs)
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
     frequencies = np.full((len(rows), model.n_modes), np.nan)
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
@@ -76,6 +75,12 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
             frequencies[place] = check_shape(part, (len(place), model.n_modes), "the model's frequencies")
     getattr(model, "warn_of", warn_of_failures)(rows, frequencies)
     return frequencies
+
+
+def check_n_jobs(n_jobs: int | None) -> None:
+    """Raise an error for a number of jobs that joblib does not take."""
+    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
+        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
 
 
 def check_shape(result: ArrayLike, expected: tuple[int, ...], what: str) -> Array:
@@ -94,7 +99,7 @@ def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | No
         yield from map_on_blas_threads(lambda place: frequencies(rows[place]), places)
     else:
         parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-        yield from parallel(delayed(_solve_chunk)(frequencies, rows[place]) for place in places)
+        yield from parallel(delayed(solve_chunk)(frequencies, rows[place]) for place in places)
 
 
 def _parallel(**options: Any) -> Parallel:
@@ -105,6 +110,7 @@ def _parallel(**options: Any) -> Parallel:
         return Parallel(**options)
 
 
-def _solve_chunk(frequencies: Callable[[Array], Array], theta: Array) -> Array:
+def solve_chunk(solve: Callable[[Array], Any], theta: Array) -> Any:
+    """What a model's method gives for some rows, on one thread."""
     with single_blas_thread():
-        return frequencies(theta)
+        return solve(theta)

@@ -1,18 +1,23 @@
 """Frequencies and their derivatives at many rows of theta."""
 
+from collections.abc import Callable
 from numbers import Real
+from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array
 from skthermo._models import check_model
 from skthermo.fem._protocol import FEModel
-from skthermo.fem._theta import check_theta
-from skthermo.fem.sampling._evaluate import check_shape, evaluate
+from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta
+from skthermo.fem.sampling._evaluate import check_n_jobs, check_shape, evaluate, solve_chunk
 
 
-def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple[Array, Array]:
+def linearise(
+    model: FEModel, theta: ArrayLike, *, step: float = 0.001, n_jobs: int | None = None
+) -> tuple[Array, Array]:
     """Frequencies of many rows of parameters, and their derivatives.
 
     Parameters
@@ -24,6 +29,8 @@ def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple
         Multipliers of the nominal parameters. NaN is allowed.
     step : float, default=0.001
         Relative step of central differences.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
 
     Returns
     -------
@@ -55,18 +62,30 @@ def linearise(model: FEModel, theta: ArrayLike, *, step: float = 0.001) -> tuple
     known = ~np.isnan(rows).any(axis=1)
     if not known.any():
         return frequencies, jacobian
+    check_n_jobs(n_jobs)
     if hasattr(model, "linearised"):
-        solved, slopes = model.linearised(rows[known])
+        solved, slopes = _in_jobs(model, model.linearised, rows[known], n_jobs)
     else:
-        solved = evaluate(model, rows[known])
+        solved = evaluate(model, rows[known], n_jobs=n_jobs)
         exact = getattr(model, "jacobian", None)
-        slopes = exact(rows[known]) if exact else central_differences(model, rows[known], step)
+        slopes = exact(rows[known]) if exact else central_differences(model, rows[known], step, n_jobs)
     frequencies[known] = check_shape(solved, frequencies[known].shape, "the model's frequencies")
     jacobian[known] = check_shape(slopes, jacobian[known].shape, "the model's derivatives")
     return frequencies, jacobian
 
 
-def central_differences(model: FEModel, theta: Array, step: float) -> Array:
+def _in_jobs(model: Any, linearised: Callable[[Array], tuple[Array, Array]], rows: Array, n_jobs: int | None) -> Any:
+    """Frequencies and derivatives from chunks of rows, solved in parallel."""
+    if effective_n_jobs(n_jobs) == 1:
+        return linearised(rows)
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    chunks = (rows[start : start + size] for start in range(0, len(rows), size))
+    parallel = Parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+    parts = parallel(delayed(solve_chunk)(linearised, chunk) for chunk in chunks)
+    return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+
+
+def central_differences(model: FEModel, theta: Array, step: float, n_jobs: int | None = None) -> Array:
     """d f / d theta by central differences of a relative step, (n_samples, n_modes, n_parameters).
 
     One-sided where one side has no frequencies.
@@ -76,7 +95,7 @@ def central_differences(model: FEModel, theta: Array, step: float) -> Array:
     n_samples, n_parameters = theta.shape
     steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
     moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])
-    solved = evaluate(model, moved.reshape(-1, n_parameters))
+    solved = evaluate(model, moved.reshape(-1, n_parameters), n_jobs=n_jobs)
     sides = solved.reshape(2, n_samples, n_parameters, -1)
     known = ~np.isnan(sides)
     if not known.all():

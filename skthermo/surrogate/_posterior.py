@@ -1,0 +1,117 @@
+"""Posterior modes of ln theta given ln f, all rows at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+
+Linearise = Callable[[Array], tuple[Array, Array]]
+"""Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters) at theta."""
+
+REACH = 3.0
+"""Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
+
+LONGEST_STEP = 0.5
+"""Largest change of ln theta in one step."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Gaussian prior of ln theta, within limits; each (n_parameters,)."""
+
+    mean: Array
+    width: Array
+    lowest: Array
+    highest: Array
+
+
+    @classmethod
+    def of_box(cls, bounds: Array, width: Array | None = None) -> "Prior":
+        """The prior of a box: the mean and, unless the width is given, the variance of ln theta spread evenly over it."""
+        lowest, highest = np.log(bounds).T
+        mean, half = (lowest + highest) / 2, (highest - lowest) / 2
+        return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Half of the squared misfits of ln f and of ln theta, in standard deviations of the noise and of the prior.
+
+    Attributes
+    ----------
+    linearise : callable
+        Frequencies and derivatives.
+    log_measured : ndarray of shape (n_samples, n_modes)
+        ln f, NaN where a mode is missing.
+    noise : ndarray of shape (n_samples, n_modes)
+        Standard deviations of ln f.
+    prior : Prior
+        Of ln theta.
+    """
+
+    linearise: Linearise
+    log_measured: Array
+    noise: Array
+    prior: Prior
+
+    def at(self, x: Array) -> "Local":
+        """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
+        theta = np.exp(x)
+        frequencies, jacobian = self.linearise(theta)
+        sensitivity = jacobian * theta[:, np.newaxis] / (frequencies * self.noise)[:, :, np.newaxis]
+        residual = (self.log_measured - np.log(frequencies)) / self.noise
+        missing = np.isnan(self.log_measured)
+        residual, sensitivity = np.where(missing, 0.0, residual), np.where(missing[:, :, np.newaxis], 0.0, sensitivity)
+        distance = (x - self.prior.mean) / self.prior.width
+        value = 0.5 * ((residual**2).sum(axis=1) + (distance**2).sum(axis=1))
+        gradient = -np.einsum("smp,sm->sp", sensitivity, residual) + distance / self.prior.width
+        hessian = sensitivity.swapaxes(1, 2) @ sensitivity + np.diag(self.prior.width**-2.0)
+        return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual)
+
+    def of(self, rows: NDArray) -> "Objective":
+        """The objective of some rows."""
+        return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior)
+
+    def with_modes(self, order: NDArray) -> "Objective":
+        """The objective with the measured modes in another order."""
+        return Objective(self.linearise, self.log_measured[:, order], self.noise[:, order], self.prior)
+
+
+@dataclass
+class Local:
+    """Value, gradient and Gauss-Newton Hessian of an `Objective` at ln theta = x, row by row."""
+
+    x: Array
+    value: Array
+    gradient: Array
+    hessian: Array
+    residual: Array
+
+    def step(self, prior: Prior, damping: Array) -> Array:
+        """Damped Gauss-Newton step, at most to the limits; a parameter that would leave its limit stays."""
+        held = ((self.x <= prior.lowest) & (self.gradient > 0)) | ((self.x >= prior.highest) & (self.gradient < 0))
+        free = ~held
+        n_parameters = self.x.shape[1]
+        diagonal = np.einsum("spp->sp", self.hessian)
+        matrix = self.hessian * (free[:, :, np.newaxis] & free[:, np.newaxis])
+        matrix += np.eye(n_parameters) * (damping[:, np.newaxis] * diagonal + held * diagonal)[:, np.newaxis]
+        step = -np.linalg.solve(matrix, np.where(free, self.gradient, 0.0)[:, :, np.newaxis])[:, :, 0]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
+        return np.clip(self.x + step, prior.lowest, prior.highest) - self.x
+
+    def deviations(self) -> Array:
+        """Posterior standard deviations of ln theta (Laplace's approximation)."""
+        return np.sqrt(np.einsum("spp->sp", np.linalg.inv(self.hessian)))
+
+    def put(self, rows: NDArray, other: "Local") -> None:
+        """Replace some rows."""
+        for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine[rows] = theirs
+
+    def of(self, rows: NDArray) -> "Local":
+        """Some rows."""
+        return Local(*(values[rows] for values in vars(self).values()))

@@ -1,0 +1,112 @@
+"""Refinement of estimated parameters on the FE model: Levenberg-Marquardt steps, restarts where modes cross."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo.surrogate._posterior import Local, Objective
+
+SMALL_STEP = 1e-6
+"""A Gauss-Newton step of ln theta below which a row has converged."""
+
+SMALL_SHARE = 0.01
+"""The same as a share of the posterior standard deviation."""
+
+FIRST_DAMPING, LAST_DAMPING = 1e-4, 1e8
+"""Damping after the first step that fails, relative to the diagonal of the Hessian, and damping at which a row stalls."""
+
+LARGE_MISFIT = 3.0
+"""Root mean square of the residuals, in standard deviations of the noise, above which another order of modes is tried."""
+
+CLOSE = 0.1
+"""Difference of ln f up to which two neighbouring modes may have crossed."""
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Where every row has ended.
+
+    Attributes
+    ----------
+    x, std : ndarray of shape (n_samples, n_parameters)
+        ln theta and its posterior standard deviations.
+    misfit : ndarray of shape (n_samples,)
+        Root mean square of the residuals of ln f.
+    converged : ndarray of bool of shape (n_samples,)
+    """
+
+    x: Array
+    std: Array
+    misfit: Array
+    converged: NDArray[np.bool_]
+
+
+def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
+    """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
+
+    The frequencies of a model that sorts its modes have kinks where modes cross, and rows may stall there. Such rows
+    are started again beyond the kink.
+    """
+    found, converged = minimise(objective, start, n_steps)
+    if sorts:
+        for lower in range(objective.log_measured.shape[1] - 1):
+            doubtful = ~converged | (normalised_misfit(objective, found) > LARGE_MISFIT)
+            rows = np.flatnonzero(doubtful & (np.abs(gap(objective, found, lower)) < CLOSE))
+            if rows.size:
+                part = objective.of(rows)
+                there, done = minimise(part, across(part, found.of(rows), lower), n_steps)
+                better = there.value < found.value[rows]
+                found.put(rows[better], there.of(better))
+                converged[rows[better]] = done[better]
+    n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
+    misfit = np.sqrt(((found.residual * objective.noise) ** 2).sum(axis=1) / n_measured)
+    return Refined(found.x, found.deviations(), misfit, converged)
+
+
+def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArray[np.bool_]]:
+    """Levenberg-Marquardt steps from x: where each row ends, and whether it has converged."""
+    found = objective.at(x)
+    converged = np.zeros(len(x), dtype=bool)
+    damping = np.zeros(len(x))
+    active = np.flatnonzero(np.isfinite(found.value))
+    for remaining in range(n_steps, -1, -1):
+        here = found.of(active)
+        undamped = here.step(objective.prior, np.zeros(len(active)))
+        small = np.maximum(SMALL_STEP, SMALL_SHARE * here.deviations())
+        converged[active] = (np.abs(undamped) <= small).all(axis=1)
+        active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
+        if not active.size or not remaining:
+            break
+        here = found.of(active)
+        there = objective.of(active).at(here.x + here.step(objective.prior, damping[active]))
+        better = there.value < here.value
+        found.put(active[better], there.of(better))
+        damping[active] = np.where(better, relaxed(damping[active]), np.maximum(FIRST_DAMPING, 10 * damping[active]))
+    return found, converged
+
+
+def relaxed(damping: Array) -> Array:
+    """Damping after a step that succeeds."""
+    return np.where(damping > FIRST_DAMPING, damping / 10, 0.0)
+
+
+def normalised_misfit(objective: Objective, found: Local) -> Array:
+    """Root mean square of the residuals in standard deviations of the noise."""
+    n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
+    return np.sqrt((found.residual**2).sum(axis=1) / n_measured)
+
+
+def gap(objective: Objective, found: Local, lower: int) -> Array:
+    """Difference of ln f between two neighbouring modes of the model; NaN where one of them is missing."""
+    fitted = objective.log_measured[:, lower : lower + 2] - (found.residual * objective.noise)[:, lower : lower + 2]
+    return fitted[:, 1] - fitted[:, 0]
+
+
+def across(objective: Objective, found: Local, lower: int) -> Array:
+    """One Gauss-Newton step that aims at the measured modes ``lower`` and ``lower + 1`` in exchanged order."""
+    order = np.arange(objective.log_measured.shape[1])
+    order[[lower, lower + 1]] = order[[lower + 1, lower]]
+    here = objective.with_modes(order).at(found.x)
+    return here.x + here.step(objective.prior, np.zeros(len(here.x)))
