@@ -6,11 +6,11 @@ import numpy as np
 from sklearn.base import BaseEstimator, clone
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._models import check_model
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
-from skthermo.fem import check_bounds
+from skthermo.fem import check_bounds, linearise
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
@@ -81,11 +81,22 @@ def clone_parts(chain: Any) -> Parts:
                     f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                     f"{chain.model!r} has"
                 )
+    if chain.coordinates == "frequencies":
+        for part in (parts.mapper, *parts.mapper.get_params().values()):
+            if isinstance(part, TemperatureMapper) and part.sensitivities is None:
+                part.set_params(sensitivities=nominal_sensitivities(chain.model))
     random_state = seeded(chain.random_state)
     for part in parts:
         if part is not None:
             seed_parts(part, random_state)
     return parts
+
+
+def nominal_sensitivities(model: Any) -> Array | None:
+    """d ln f / d ln theta at the nominal state, (n_modes, n_parameters); None if the model cannot be solved there."""
+    frequencies, jacobian = linearise(model, np.ones((1, len(model.parameter_names))))
+    sensitivities = jacobian[0] / frequencies[0][:, np.newaxis]
+    return sensitivities if np.isfinite(sensitivities).all() else None
 
 
 def box_of(inverse: BaseEstimator) -> Box | None:

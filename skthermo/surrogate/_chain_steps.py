@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import as_columns, as_floats
+from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import frame_like
 from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
@@ -85,10 +85,21 @@ class ChainSteps:
         values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
         return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
 
-    def _fit_inverse(self, F: Any) -> NDArray[np.float64]:
-        """Fit aligner and M1, which gives the parameters of the training data."""
+    def _fit_inverse(self, F: Any) -> tuple[Array, Array | None]:
+        """Fit aligner and M1, which gives the parameters of the training data and, if it can, their weights."""
         aligned = self.aligner_.fit(F).transform(F)
-        theta = as_floats(self.inverse_.fit(aligned).transform(aligned))
+        self.inverse_.fit(aligned)
+        if getattr(self.inverse_, "n_steps_", 0):
+            found = self.inverse_.invert(aligned)
+            self.inverse_.warn_of(found)
+            return as_floats(found.theta), precision(found) if self.weighted else None
+        theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self.parameter_names_):
             raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
-        return theta
+        return theta, None
+
+
+def precision(found: Any) -> Array:
+    """Mean precision of the parameters of each row, as a share of the highest; 0 where they are unknown."""
+    precisions = (as_floats(found.theta) / as_floats(found.std)) ** 2
+    return np.nan_to_num((precisions / np.nanmax(precisions, axis=0)).mean(axis=1))

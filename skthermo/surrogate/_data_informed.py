@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arrays import as_columns, as_floats
+from skthermo._arrays import as_floats, as_random_state
 from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._regressors import weights_for
 from skthermo._validation import (
     HasMethods,
     Interval,
@@ -19,21 +20,20 @@ from skthermo._validation import (
     check_array,
     check_is_fitted,
     clone_sharing_models,
-    validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
 from skthermo.fem import FEModel, add_noise, check_noise
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._applicability import mapper_inputs
 from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
 from skthermo.surrogate._chain_steps import ChainSteps
+from skthermo.surrogate._chain_uncertainty import ChainUncertainty
 from skthermo.surrogate._report import mode_warnings
 from skthermo.surrogate._simulator import tolerance
 
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
+class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -54,7 +54,15 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         Maps measured frequencies onto the model's and back, such as ``BiasAligner(model)``.
     imputer : transformer or "passthrough", default="passthrough"
         Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only.
-        Without an imputer, rows with a missing mode do not train M2.
+        Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
+        there; without refining, they do not train M2.
+    coordinates : {"frequencies", "parameters"}, default="frequencies"
+        What a `TemperatureMapper` learns: parameters in coordinates in which their errors count as those of frequencies
+        do (see its ``sensitivities``), or parameters themselves.
+    weighted : bool, default=True
+        Whether rows train M2 with weights that are their posterior precision, so that rows with missing modes count
+        less. Weights need an inverse that refines, and a mapper whose ``fit`` takes ``sample_weight``; other rows
+        count alike.
     reduce : bool or float, default=False
         Whether predictions and simulations use the reduced model ``model.reduced``, which makes large models much
         faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
@@ -119,6 +127,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         "mapper": [HasMethods(["fit", "predict"]), None],
         "aligner": [HasMethods(["fit", "transform", "inverse_transform"]), StrOptions({"passthrough"})],
         "imputer": [HasMethods(["fit_transform"]), StrOptions({"passthrough"})],
+        "coordinates": [StrOptions({"frequencies", "parameters"})],
+        "weighted": ["boolean"],
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
@@ -132,6 +142,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         mapper: BaseEstimator | None = None,
         aligner: BaseEstimator | str = "passthrough",
         imputer: BaseEstimator | str = "passthrough",
+        coordinates: Literal["frequencies", "parameters"] = "frequencies",
+        weighted: bool = True,
         reduce: bool | float = False,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -141,6 +153,8 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         self.mapper = mapper
         self.aligner = aligner
         self.imputer = imputer
+        self.coordinates = coordinates
+        self.weighted = weighted
         self.reduce = reduce
         self.n_jobs = n_jobs
         self.random_state = random_state
@@ -181,9 +195,10 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
         self.box_ = box_of(self.inverse_)
         warn_each(mode_warnings(self.model, F))
-        theta = self._fit_inverse(self._completed(T, F))
+        theta, weights = self._fit_inverse(self._completed(T, F))
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
-        self.mapper_.fit(T, self.parameters_)
+        self.mapper_.fit(T, self.parameters_, **weights_for(self.mapper_, weights))
+        self._records, self._residuals = (T, F, weights), None
         self._report(T, F, theta)
         return self
 
@@ -226,27 +241,34 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
-    def predict(self, X: ArrayLike) -> Table:
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Table | tuple[Table, Table]:
         """Frequencies of the healthy structure at given temperatures.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
+        return_std : bool, default=False
+            Whether to return standard deviations too.
 
         Returns
         -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
+        frequencies : ndarray or DataFrame of shape (n_samples, n_modes)
             In Hz, in the measured domain.
+        std : ndarray or DataFrame of shape (n_samples, n_modes)
+            Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
+            weather, out of fold, in Hz. They contain the scatter of the measurement.
         """
-        return frame_like(X, self._frequencies(X), self.mode_names_)
+        frequencies = self._frequencies(X)
+        predicted = frame_like(X, frequencies, self.mode_names_)
+        return (predicted, frame_like(X, frequencies * self._spread(X), self.mode_names_)) if return_std else predicted
 
     def simulate(
         self,
         X: ArrayLike,
         *,
         damage: Mapping[str, float] | None = None,
-        noise: ArrayLike = 0.0,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
         random_state: int | np.random.RandomState | None = None,
     ) -> Table:
         """Frequencies of the structure, healthy or damaged, as monitoring would record them, eq. (8).
@@ -257,8 +279,11 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             Temperatures in degrees Celsius.
         damage : mapping of str to float, optional
             Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %.
-        noise : float or array-like of shape (n_modes,), default=0.0
-            Relative standard deviation of Gaussian noise on the frequencies.
+        noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
+            Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
+            residuals, out of fold, of a whole training record of similar weather, so that modes scatter together,
+            scatter more in frost, and are missing as in the training records. Runs of consecutive records are drawn if
+            residuals are serially correlated; rows of X should then be in order of time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -273,9 +298,15 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
             If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
         """
         check_is_fitted(self)
-        check_noise(noise, len(self.mode_names_))
-        frequencies = self._frequencies(X, damage)
-        return frame_like(X, add_noise(frequencies, noise, random_state=random_state), self.mode_names_)
+        random = as_random_state(random_state)
+        if isinstance(noise, str):
+            if noise != "fitted":
+                raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
+            frequencies = self._frequencies(X, damage) * (1 + self._fitted_noise(X, random))
+        else:
+            check_noise(noise, len(self.mode_names_))
+            frequencies = add_noise(self._frequencies(X, damage), noise, random_state=random)
+        return frame_like(X, frequencies, self.mode_names_)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -304,30 +335,6 @@ class DataInformedFEM(ChainSteps, RegressorMixin, BaseEstimator):
         if 2 * scored < len(predicted):
             warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
         return complete_r2(y, predicted)
-
-    def applicability(self, X: ArrayLike) -> pd.DataFrame:
-        """How far inputs and parameters are outside the training range, row by row.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        DataFrame
-            With X's index. One column for each input of M2, lags included: its distance outside the range of the
-            training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
-            parameter is outside the bounds of the inverse.
-        """
-        check_is_fitted(self)
-        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
-        inputs = mapper_inputs(self.mapper_, T)
-        excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
-        excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(T))
-        outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
-        return excess.assign(outside_bounds=outside)
 
     def __sklearn_clone__(self) -> "DataInformedFEM":
         return clone_sharing_models(self)

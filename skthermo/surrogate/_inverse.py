@@ -19,7 +19,9 @@ from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, add_noise, check_bounds, check_noise, check_theta, evaluate
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
-from skthermo.surrogate._refinement import DEFAULT_STEPS, Refinement
+from skthermo.surrogate._networks import default_network
+from skthermo.surrogate._refined_inverse import RefinedInverse
+from skthermo.surrogate._refinement import Refinement
 from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._simulator import Simulator, tolerance
 
@@ -28,7 +30,7 @@ MANY_REORDERED = 0.1
 truss's results; 29 % doubles the error of Z24."""
 
 
-class InverseSurrogate(TransformerMixin, MultiplierRegressor):
+class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     """Parameters of an FE model from frequencies, learned from simulations; eqs. (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
@@ -54,7 +56,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     refine : int, optional
         Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row,
         until the model has the measured frequencies (or, with ``noise``, until the posterior is largest). Rows with
-        some modes missing are estimated from the others. By default 20 for a model that gives exact derivatives
+        some modes missing are estimated from the others. By default 40 for a model that gives exact derivatives
         (``linearised`` or ``jacobian``), else 0. With a number above 0, other models are differentiated by central
         differences: 2 n_parameters + 1 solutions a step and row.
     prior : float, array-like of shape (n_parameters,) or mapping, optional
@@ -115,6 +117,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
     True
     """
 
+    _default_regressor = staticmethod(default_network)
     _parameter_constraints: dict = {
         "model": [HasMethods(["frequencies"]), None],
         "regressor": [HasMethods(["fit", "predict"]), None],
@@ -241,54 +244,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             the box.
         """
         theta = self._predict_arrays(X)[0]
-        self.warn_of(theta)
-        return frame_like(X, theta, self.get_feature_names_out())
-
-    def invert(self, X: ArrayLike) -> Bunch:
-        """Parameters of measured frequencies, and how sure they are.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz; NaN is allowed.
-
-        Returns
-        -------
-        Bunch
-            - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode, and in rows with a
-              missing mode that have not converged;
-            - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation, given
-              ``noise`` and the prior; those of the prior in rows that have not converged;
-            - ``misfit`` (n_samples,): root mean square of the relative differences that are left between the measured
-              frequencies and the model's;
-            - ``converged`` (n_samples,): whether the refinement has converged. Other rows keep the regressor's
-              estimate.
-
-        Raises
-        ------
-        ValueError
-            If the estimator does not refine.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss
-        >>> from skthermo.surrogate import InverseSurrogate
-        >>> model = make_truss()
-        >>> inverse = InverseSurrogate(model, bounds=0.2, noise=0.001, random_state=0).fit()
-        >>> found = inverse.invert(model.frequencies([[0.95, 1.05, 0.9, 1.0]]))
-        >>> found.theta.round(3), found.std.round(3)
-        (array([[0.951, 1.048, 0.9  , 0.986]]), array([[0.006, 0.008, 0.002, 0.087]]))
-        """
-        check_is_fitted(self)
         if not self.n_steps_:
-            raise ValueError(
-                f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
-            )
-        frequencies = self._read_inputs(X)
-        found = self.refinement_.refined(frequencies, self._estimate(frequencies)[0])
-        names = self.get_feature_names_out()
-        found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
-        return found
+            self._warn_of_box(theta)
+        return frame_like(X, theta, self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Frequencies of given parameters, computed by the FE model.
@@ -331,43 +289,6 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         check_is_fitted(self)
         numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
         return np.array(self.parameter_names_ or numbered, dtype=object)
-
-    def warn_of(self, theta: NDArray[np.float64]) -> None:
-        """Warn if many rows are far outside the bounds.
-
-        Parameters
-        ----------
-        theta : ndarray of shape (n_samples, n_parameters)
-            Multipliers.
-        """
-        message = "" if self.box_ is None else self.box_.warning(theta)
-        if message:
-            warn_user(message, "outside the bounds")
-
-    def _n_steps(self) -> int:
-        """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
-        if self.model is None:
-            if self.refine:
-                raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
-            return 0
-        is_differentiable = hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")
-        return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
-
-    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[NDArray, NDArray]:
-        check_is_fitted(self)
-        if not self.n_steps_:
-            return super()._predict_arrays(X, return_std)
-        found = self.invert(X)
-        theta = as_floats(found.theta)
-        stalled = ~(found.converged | np.isnan(as_floats(X)).all(axis=1))
-        if stalled.any():
-            warn_user(
-                f"{stalled.sum()} of {len(theta)} rows did not converge in {self.n_steps_} steps, row "
-                f"{np.flatnonzero(stalled)[0]} the first: they keep the regressor's estimate, NaN where a mode is "
-                "missing",
-                "not converged",
-            )
-        return theta, as_floats(found.std)
 
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         check_model(self.model)

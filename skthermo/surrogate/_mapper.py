@@ -4,8 +4,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
+from skthermo._arrays import Array, real_array
 from skthermo._frames import check_columns, check_temperatures, frame_like
-from skthermo._validation import HasMethods, _fit_context, seeded
+from skthermo._validation import HasMethods, _check_sample_weight, _fit_context, seeded
+from skthermo.surrogate._networks import default_splines
 from skthermo.surrogate._regression import MultiplierRegressor
 
 
@@ -17,8 +19,13 @@ class TemperatureMapper(MultiplierRegressor):
     regressor : regressor, optional
         Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
         logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
-        parameters are not positive, no logarithm is taken. By default a small ``MLPRegressor``; see `paper_network`
-        for the paper's.
+        parameters are not positive, no logarithm is taken. By default splines of degree 1 and ridge regression, which
+        extrapolate in straight lines: ``make_pipeline(SplineTransformer(n_knots=6, degree=1, knots="quantile",
+        extrapolation="linear"), RidgeCV(numpy.logspace(-3, 4, 15)))``. See `paper_network` for the paper's network.
+    sensitivities : array-like of shape (n_modes, n_parameters), optional
+        d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change of
+        ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
+        by the pseudo-inverse. `DataInformedFEM` gives those of its model.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -58,8 +65,10 @@ class TemperatureMapper(MultiplierRegressor):
     True
     """
 
+    _default_regressor = staticmethod(default_splines)
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
+        "sensitivities": ["array-like", None],
         "random_state": ["random_state"],
     }
 
@@ -67,13 +76,15 @@ class TemperatureMapper(MultiplierRegressor):
         self,
         regressor: BaseEstimator | None = None,
         *,
+        sensitivities: ArrayLike | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.regressor = regressor
+        self.sensitivities = sensitivities
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "TemperatureMapper":
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> "TemperatureMapper":
         """Learn the mapping from complete rows.
 
         Parameters
@@ -82,6 +93,8 @@ class TemperatureMapper(MultiplierRegressor):
             Temperatures in degrees Celsius, lagged or not.
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row; a regressor whose ``fit`` takes no weights ignores them.
 
         Returns
         -------
@@ -92,11 +105,33 @@ class TemperatureMapper(MultiplierRegressor):
         ------
         ValueError
             If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
-            that stands for a missing value, such as -999, or fewer than two rows are complete.
+            that stands for a missing value, such as -999, or fewer than two rows are complete; if ``sensitivities``
+            do not have a column for each parameter, or theta is not positive there.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)
-        self._learn(T, theta, seeded(self.random_state), log_inputs=False)
+        weights = None if sample_weight is None else _check_sample_weight(sample_weight, T)
+        self._learn(
+            T,
+            theta,
+            seeded(self.random_state),
+            log_inputs=False,
+            coordinates=self._coordinates(theta),
+            sample_weight=weights,
+        )
         return self
+
+    def _coordinates(self, theta: Array) -> Array | None:
+        if self.sensitivities is None:
+            return None
+        sensitivities = real_array(self.sensitivities, "sensitivities")
+        if sensitivities.ndim != 2 or sensitivities.shape[1] != theta.shape[1] or not np.isfinite(sensitivities).all():
+            raise ValueError(
+                f"sensitivities have shape {sensitivities.shape}; expected finite numbers, (n_modes, "
+                f"{theta.shape[1]}), a column for each parameter"
+            )
+        if (theta <= 0).any():
+            raise ValueError(f"theta falls to {np.nanmin(theta):g}; expected positive multipliers with sensitivities")
+        return sensitivities

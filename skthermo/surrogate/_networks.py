@@ -1,8 +1,12 @@
-"""Neural networks for the two surrogates."""
+"""Default regressors of the two surrogates, and the paper's networks."""
 
 from typing import Any, Literal
 
+import numpy as np
+from sklearn.linear_model import RidgeCV
 from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import SplineTransformer
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
@@ -21,6 +25,15 @@ def default_network() -> MLPRegressor:
     return MLPRegressor(
         hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
     )
+
+
+def default_splines() -> Pipeline:
+    """Broken lines with knots at quantiles of each input, for which ridge regression finds the slopes.
+
+    They go on in straight lines beyond the data.
+    """
+    lines = SplineTransformer(n_knots=6, degree=1, knots="quantile", extrapolation="linear")
+    return make_pipeline(lines, RidgeCV(np.logspace(-3, 4, 15)))
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:

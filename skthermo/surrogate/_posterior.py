@@ -27,10 +27,9 @@ class Prior:
     lowest: Array
     highest: Array
 
-
     @classmethod
     def of_box(cls, bounds: Array, width: Array | None = None) -> "Prior":
-        """The prior of a box: the mean and, unless the width is given, the variance of ln theta spread evenly over it."""
+        """The prior of a box: the mean and, without a width, the variance of ln theta spread evenly over it."""
         lowest, highest = np.log(bounds).T
         mean, half = (lowest + highest) / 2, (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)

@@ -14,11 +14,14 @@ SMALL_STEP = 1e-6
 SMALL_SHARE = 0.01
 """The same as a share of the posterior standard deviation."""
 
+SMALL_GAIN = 1e-8
+"""The share of the objective that a Gauss-Newton step would gain, below which rounding errors hide it."""
+
 FIRST_DAMPING, LAST_DAMPING = 1e-4, 1e8
-"""Damping after the first step that fails, relative to the diagonal of the Hessian, and damping at which a row stalls."""
+"""Damping after a first step that fails, as a share of the Hessian's diagonal, and damping at which a row stalls."""
 
 LARGE_MISFIT = 3.0
-"""Root mean square of the residuals, in standard deviations of the noise, above which another order of modes is tried."""
+"""Residuals, root mean square in standard deviations of the noise, above which another order of modes is tried."""
 
 CLOSE = 0.1
 """Difference of ln f up to which two neighbouring modes may have crossed."""
@@ -52,14 +55,9 @@ def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> 
     found, converged = minimise(objective, start, n_steps)
     if sorts:
         for lower in range(objective.log_measured.shape[1] - 1):
-            doubtful = ~converged | (normalised_misfit(objective, found) > LARGE_MISFIT)
-            rows = np.flatnonzero(doubtful & (np.abs(gap(objective, found, lower)) < CLOSE))
-            if rows.size:
-                part = objective.of(rows)
-                there, done = minimise(part, across(part, found.of(rows), lower), n_steps)
-                better = there.value < found.value[rows]
-                found.put(rows[better], there.of(better))
-                converged[rows[better]] = done[better]
+            crossed = doubtful(objective, found, converged) & (np.abs(gap(objective, found, lower)) < CLOSE)
+            retry(objective, found, converged, crossed, n_steps, lower)
+        retry(objective, found, converged, doubtful(objective, found, converged), n_steps)
     n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
     misfit = np.sqrt(((found.residual * objective.noise) ** 2).sum(axis=1) / n_measured)
     return Refined(found.x, found.deviations(), misfit, converged)
@@ -74,8 +72,9 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
     for remaining in range(n_steps, -1, -1):
         here = found.of(active)
         undamped = here.step(objective.prior, np.zeros(len(active)))
-        small = np.maximum(SMALL_STEP, SMALL_SHARE * here.deviations())
-        converged[active] = (np.abs(undamped) <= small).all(axis=1)
+        is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * here.deviations())).all(axis=1)
+        gain = -0.5 * (here.gradient * undamped).sum(axis=1)
+        converged[active] = is_small | (gain <= SMALL_GAIN * here.value)
         active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
         if not active.size or not remaining:
             break
@@ -90,6 +89,31 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
 def relaxed(damping: Array) -> Array:
     """Damping after a step that succeeds."""
     return np.where(damping > FIRST_DAMPING, damping / 10, 0.0)
+
+
+def retry(
+    objective: Objective,
+    found: Local,
+    converged: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
+    n_steps: int,
+    lower: int | None = None,
+) -> None:
+    """Start some rows again, from beyond the crossing of two modes or from the prior's mean, and keep what is better."""
+    rows = np.flatnonzero(chosen)
+    if not rows.size:
+        return
+    part, here = objective.of(rows), found.of(rows)
+    start = np.tile(objective.prior.mean, (len(rows), 1)) if lower is None else across(part, here, lower)
+    there, done = minimise(part, start, n_steps)
+    better = there.value < here.value
+    found.put(rows[better], there.of(better))
+    converged[rows[better]] = done[better]
+
+
+def doubtful(objective: Objective, found: Local, converged: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows that have not converged, or whose residuals are large against the noise."""
+    return ~converged | (normalised_misfit(objective, found) > LARGE_MISFIT)
 
 
 def normalised_misfit(objective: Objective, found: Local) -> Array:

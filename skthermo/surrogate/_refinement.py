@@ -13,7 +13,7 @@ from skthermo.surrogate._posterior import Objective, Prior
 from skthermo.surrogate._refine import refine
 from skthermo.surrogate._simulator import Simulator
 
-DEFAULT_STEPS = 20
+DEFAULT_STEPS = 40
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, the parameters that fit the

@@ -1,5 +1,6 @@
 """Base of both surrogates: regression of standardised log multipliers on standardised inputs."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._standardiser import Standardiser, is_positive
 
 
@@ -27,7 +27,10 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
     A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`.
+    ``_default_regressor`` makes the regressor where none is given.
     """
+
+    _default_regressor: Callable[[], BaseEstimator]
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """Multipliers of the nominal parameters.
@@ -87,7 +90,16 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
         return inputs, as_columns(targets)
 
-    def _learn(self, X: Array, y: Array, random_state: np.random.RandomState | None, *, log_inputs: bool) -> None:
+    def _learn(
+        self,
+        X: Array,
+        y: Array,
+        random_state: np.random.RandomState | None,
+        *,
+        log_inputs: bool,
+        coordinates: Array | None = None,
+        sample_weight: Array | None = None,
+    ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
         complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
         if complete.sum() < 2:
@@ -95,15 +107,16 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
                 f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
             )
         X, y = X[complete], y[complete]
+        weights = None if sample_weight is None else sample_weight[complete]
         self.n_parameters_ = y.shape[1]
-        self.inputs_ = Standardiser.fitted(X, log=log_inputs and is_positive(X))
-        self.targets_ = Standardiser.fitted(y, log=is_positive(y))
-        regressor = default_network() if self.regressor is None else clone(self.regressor)
+        self.inputs_ = Standardiser.fitted(X, log=log_inputs and is_positive(X), sample_weight=weights)
+        self.targets_ = Standardiser.fitted(y, log=is_positive(y), coordinates=coordinates, sample_weight=weights)
+        regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
         targets = self.targets_.transform(y)
-        targets = targets[:, 0] if self.n_parameters_ == 1 else targets
+        targets = targets[:, 0] if targets.shape[1] == 1 else targets
         with single_blas_thread():
-            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets)
+            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets, weights)
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""

@@ -145,7 +145,7 @@ def fit_report(
     return FitReport(
         n_rows=len(theta),
         n_trained=int(trained.sum()),
-        left_out=left_out(T, F, theta, inputs),
+        left_out=left_out(T, F, theta, inputs, trained),
         offsets=mode_offsets(model, F),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
@@ -169,11 +169,11 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, TINY) ** 2) @ sensitivity)))
 
 
-def left_out(T: Any, F: Any, theta: Array, inputs: Array) -> pd.Series:
+def left_out(T: Any, F: Any, theta: Array, inputs: Array, trained: NDArray[np.bool_]) -> pd.Series:
     """Rows that do not train the mapper, by reason."""
     reasons = {}
     for what, table, default in (("temperature", T, "T"), ("frequency", F, "f")):
-        missing = np.isnan(as_floats(table)).sum(axis=0)
+        missing = np.isnan(as_floats(table)[~trained]).sum(axis=0)
         for name, count in zip(column_names(table, default), missing, strict=True):
             reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))

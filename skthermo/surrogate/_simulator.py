@@ -87,7 +87,7 @@ class Simulator:
         return frequencies
 
     def linearise(self, theta: Array, n_jobs: int | None = None) -> tuple[Array, Array]:
-        """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters), without warnings."""
+        """Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters), without warnings."""
         outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         jacobian = np.full((*frequencies.shape, theta.shape[1]), np.nan)

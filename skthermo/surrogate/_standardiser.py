@@ -1,4 +1,4 @@
-"""Standardisation of inputs and targets: logarithms, zero mean, unit variance."""
+"""Standardisation of inputs and targets: logarithms, other coordinates, zero mean, unit variance."""
 
 from dataclasses import dataclass
 
@@ -10,39 +10,62 @@ from skthermo._arrays import Array
 
 @dataclass(frozen=True)
 class Standardiser:
-    """z = (x - mean) / scale for each column, of x or of log x, and the inverse.
+    """z = (A x - mean) / scale, of x or of log x, and the inverse.
 
     Attributes
     ----------
-    mean, scale : ndarray of shape (n_columns,)
-        Mean and standard deviation of the values, or of their logarithms.
+    mean, scale : ndarray of shape (n_coordinates,)
+        Mean and standard deviation of A x.
     log : bool
         Whether logarithms are taken; the inverse then gives positive values.
+    middle : ndarray of shape (n_columns,)
+        Mean of x, which the inverse keeps in directions that A does not see.
+    coordinates : ndarray of shape (n_coordinates, n_columns) or None
+        The matrix A; None is the identity.
     """
 
     mean: Array
     scale: Array
     log: bool
+    middle: Array
+    coordinates: Array | None = None
 
     @classmethod
-    def fitted(cls, values: Array, *, log: bool) -> "Standardiser":
+    def fitted(
+        cls, values: Array, *, log: bool, coordinates: Array | None = None, sample_weight: Array | None = None
+    ) -> "Standardiser":
         """Mean and standard deviation of some values; the scale of a constant column is 1."""
-        scaler = StandardScaler().fit(np.log(values) if log else values)
-        return cls(scaler.mean_, scaler.scale_, log)
+        x = np.log(values) if log else values
+        z = x if coordinates is None else x @ coordinates.T
+        scaler = StandardScaler().fit(z, sample_weight=sample_weight)
+        middle = np.average(x, axis=0, weights=sample_weight)
+        return cls(scaler.mean_, scaler.scale_, log, middle, coordinates)
 
     def transform(self, values: Array) -> Array:
         """Standardised values."""
-        return ((np.log(values) if self.log else values) - self.mean) / self.scale
+        x = np.log(values) if self.log else values
+        return ((x if self.coordinates is None else x @ self.coordinates.T) - self.mean) / self.scale
 
     def inverse_transform(self, standardised: Array) -> Array:
         """Values from standardised values; a logarithm too large for a float becomes infinity."""
-        values = standardised * self.scale + self.mean
+        deviation = standardised * self.scale
+        x = self.mean + deviation if self.coordinates is None else self.middle + deviation @ self._pseudo_inverse.T
         with np.errstate(over="ignore"):
-            return np.exp(values) if self.log else values
+            return np.exp(x) if self.log else x
 
     def inverse_deviations(self, deviations: Array, values: Array) -> Array:
-        """Standard deviations of values from those of the standardised values, to first order."""
-        return deviations * self.scale * (values if self.log else 1)
+        """Standard deviations of values from those of the standardised values, to first order.
+
+        Errors of different coordinates count as independent.
+        """
+        std = deviations * self.scale
+        if self.coordinates is not None:
+            std = np.sqrt(std**2 @ self._pseudo_inverse.T**2)
+        return std * (values if self.log else 1)
+
+    @property
+    def _pseudo_inverse(self) -> Array:
+        return np.linalg.pinv(self.coordinates)
 
 
 def is_positive(values: Array) -> bool:

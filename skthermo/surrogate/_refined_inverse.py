@@ -1,0 +1,111 @@
+"""The part of the inverse surrogate that refines the regressor's estimates on the FE model."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import Bunch
+
+from skthermo._arrays import as_floats
+from skthermo._frames import frame_like
+from skthermo._validation import check_is_fitted
+from skthermo._warnings import warn_user
+from skthermo.surrogate._box import Box
+from skthermo.surrogate._refinement import DEFAULT_STEPS, Refinement
+from skthermo.surrogate._regression import MultiplierRegressor
+
+
+class RefinedInverse(MultiplierRegressor):
+    """Methods of `InverseSurrogate` that refine estimates, and their private steps."""
+
+    model: Any
+    refine: int | None
+    box_: Box | None
+    n_steps_: int
+    refinement_: Refinement
+
+    def invert(self, X: ArrayLike) -> Bunch:
+        """Parameters of measured frequencies, and how sure they are.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz; NaN is allowed.
+
+        Returns
+        -------
+        Bunch
+            - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode, and in rows with a
+              missing mode that have not converged;
+            - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation, given
+              ``noise`` and the prior; those of the prior in rows that have not converged;
+            - ``misfit`` (n_samples,): root mean square of the relative differences that are left between the measured
+              frequencies and the model's;
+            - ``converged`` (n_samples,): whether the refinement has converged. Other rows keep the regressor's
+              estimate.
+
+        Raises
+        ------
+        ValueError
+            If the estimator does not refine.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> from skthermo.surrogate import InverseSurrogate
+        >>> model = make_truss()
+        >>> inverse = InverseSurrogate(model, bounds=0.2, noise=0.001, random_state=0).fit()
+        >>> found = inverse.invert(model.frequencies([[0.95, 1.05, 0.9, 1.0]]))
+        >>> found.theta.round(3), found.std.round(3)
+        (array([[0.951, 1.048, 0.9  , 0.986]]), array([[0.006, 0.008, 0.002, 0.087]]))
+        """
+        check_is_fitted(self)
+        if not self.n_steps_:
+            raise ValueError(
+                f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
+            )
+        frequencies = self._read_inputs(X)
+        found = self.refinement_.refined(frequencies, self._estimate(frequencies)[0])
+        names = self.get_feature_names_out()
+        found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
+        return found
+
+    def warn_of(self, found: Bunch) -> None:
+        """Warn of rows that have not converged, and if many are far outside the bounds.
+
+        Parameters
+        ----------
+        found : Bunch
+            What `invert` has given.
+        """
+        theta = as_floats(found.theta)
+        stalled = np.flatnonzero(~found.converged & ~np.isnan(found.misfit))
+        if stalled.size:
+            warn_user(
+                f"{stalled.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {stalled[0]} the "
+                "first: they keep the regressor's estimate, NaN where a mode is missing",
+                "not converged",
+            )
+        self._warn_of_box(theta)
+
+    def _warn_of_box(self, theta: NDArray[np.float64]) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta)
+        if message:
+            warn_user(message, "outside the bounds")
+
+    def _n_steps(self) -> int:
+        """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
+        if self.model is None:
+            if self.refine:
+                raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
+            return 0
+        is_differentiable = hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")
+        return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
+
+    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[NDArray, NDArray]:
+        check_is_fitted(self)
+        if not self.n_steps_:
+            return super()._predict_arrays(X, return_std)
+        found = self.invert(X)
+        self.warn_of(found)
+        return as_floats(found.theta), as_floats(found.std)
