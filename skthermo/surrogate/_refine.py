@@ -99,7 +99,7 @@ def retry(
     n_steps: int,
     lower: int | None = None,
 ) -> None:
-    """Start some rows again, from beyond the crossing of two modes or from the prior's mean, and keep what is better."""
+    """Start some rows again, beyond the crossing of two modes or at the prior's mean, and keep what is better."""
     rows = np.flatnonzero(chosen)
     if not rows.size:
         return

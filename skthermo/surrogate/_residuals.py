@@ -7,25 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 from sklearn.neighbors import NearestNeighbors
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo._arrays import Array
 from skthermo.surrogate._applicability import TrainingRange
 
-FACTOR = 1
-
-NEIGHBOURS = 25
+DRAWN_FROM = 25
 """Number of records with the most similar weather that noise is drawn from."""
 
-SPREAD_NEIGHBOURS = 100
+SPREAD_OF = 100
 """Number of records with the most similar weather whose residuals give the spread."""
 
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a drawn run of records goes on while it lasts."""
 
 EXPLAINED = 0.99
-"""Share of the variance of the inputs that the coordinates of weather keep."""
+"""Share of the variance of the weather that its coordinates keep."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +32,12 @@ class WeatherResiduals:
 
     Attributes
     ----------
-    weather : Array of shape (n_records, n_inputs)
-        Inputs of the temperature mapper.
-    values : Array of shape (n_records, n_modes)
+    weather : ndarray of shape (n_records, n_inputs)
+        Inputs of the temperature mapper, lags included.
+    values : ndarray of shape (n_records, n_modes)
         Measured frequencies over out-of-fold predictions, minus 1; NaN where a mode is missing.
     folds : ndarray of shape (n_records,)
-        The fold of each record.
+        The period of time of each record.
     """
 
     weather: Array
@@ -47,8 +45,8 @@ class WeatherResiduals:
     folds: NDArray[np.intp]
 
     @cached_property
-    def coordinates(self):
-        """Principal components of standardised weather."""
+    def coordinates(self) -> Pipeline:
+        """Principal components of the standardised weather."""
         return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(self.weather)
 
     @cached_property
@@ -57,77 +55,82 @@ class WeatherResiduals:
         return self.coordinates.transform(self.weather)
 
     def spread(self, weather: Array) -> Array:
-        """Root mean square of the residuals in similar weather, wider beyond the range of the records."""
-        return self._spread(np.ones(len(self.folds), dtype=bool), weather)
-
-    @cached_property
-    def scores(self) -> Array:
-        """Absolute residuals over the spread that the other folds give for their weather."""
-        scores = np.full_like(self.values, np.nan)
-        for fold in np.unique(self.folds):
-            test = self.folds == fold
-            scores[test] = np.abs(self.values[test]) / self._spread(~test, self.weather[test])
-        return scores
-
-    def _spread(self, rows: NDArray[np.bool_], weather: Array) -> Array:
-        near = self._neighbours(self.places[rows], self.coordinates.transform(weather), SPREAD_NEIGHBOURS)
-        excess = TrainingRange.of(self.weather, rows).excess(weather).mean(axis=1, keepdims=True)
-        return np.sqrt(np.nanmean(self.values[rows][near] ** 2, axis=1)) * (1 + FACTOR * excess)
-
-    def _neighbours(self, places, wanted, n):
-        return NearestNeighbors(n_neighbors=min(n, len(places))).fit(places).kneighbors(wanted, return_distance=False)
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes)."""
+        return self._spread(weather, np.ones(len(self.values), dtype=bool))
 
     def quantiles(self, confidence: float) -> Array:
-        """Order statistics of the scores of each mode: the ceil((n + 1) confidence)-th of n; infinite if n is too small."""
-        return np.array([conformal_quantile(column[~np.isnan(column)], confidence) for column in self.scores.T])
-
-    @cached_property
-    def unexplained(self) -> Array:
-        """Residuals minus their mean in similar weather, over their spread."""
-        n_neighbours = min(SPREAD_NEIGHBOURS, len(self.places))
-        near = NearestNeighbors(n_neighbors=n_neighbours).fit(self.places).kneighbors(return_distance=False)
-        return (self.values - np.nanmean(self.values[near], axis=1)) / np.nanstd(self.values[near], axis=1)
+        """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
+        return np.array([order_statistic(column[~np.isnan(column)], confidence) for column in self._scores.T])
 
     def draw(self, weather: Array, random_state: np.random.RandomState) -> Array:
-        """Residuals of whole records, drawn for rows of weather in order of time."""
-        places = self.coordinates.transform(weather)
-        n_records = len(self.places)
-        neighbours = NearestNeighbors(n_neighbors=min(NEIGHBOURS, n_records)).fit(self.places)
-        near = neighbours.kneighbors(places, return_distance=False)
-        far = (
-            NearestNeighbors(n_neighbors=max(1, int(SIMILAR * n_records))).fit(self.places).kneighbors(places)[0][:, -1]
-        )
-        stop = 1 / mean_run(self.unexplained)
-        chances, picks = random_state.uniform(size=len(places)), random_state.randint(near.shape[1], size=len(places))
-        donors = np.empty(len(places), dtype=int)
-        donor = n_records
-        for row, place in enumerate(places):
-            donor += 1
-            goes_on = chances[row] > stop and donor < n_records
-            if not goes_on or np.linalg.norm(self.places[donor] - place) > far[row]:
-                donor = near[row, picks[row]]
-            donors[row] = donor
-        return self.values[donors]
+        """Residuals of whole records for rows of weather in order of time, (n_samples, n_modes).
+
+        A stationary bootstrap: each row takes the record after the one before it took or, where such a run ends, one
+        of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
+        """
+        places, n_records = self.coordinates.transform(weather), len(self.places)
+        near = nearest(self.places, places, DRAWN_FROM)[1]
+        farthest = nearest(self.places, places, max(DRAWN_FROM, int(SIMILAR * n_records)))[0][:, -1]
+        ends = random_state.uniform(size=len(places)) < 1 / self._mean_run
+        fresh = near[np.arange(len(places)), random_state.randint(near.shape[1], size=len(places))]
+        taken = np.empty(len(places), dtype=int)
+        record = n_records
+        for row in range(len(places)):
+            record += 1
+            is_over = ends[row] or record >= n_records
+            if is_over or np.linalg.norm(self.places[record] - places[row]) > farthest[row]:
+                record = fresh[row]
+            taken[row] = record
+        return self.values[taken]
+
+    def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """The spread that some of the records give, the wider the farther weather is beyond their range."""
+        wanted, spread = self.coordinates.transform(weather), np.empty((len(weather), self.values.shape[1]))
+        for mode, values in enumerate(self.values.T):
+            known = np.flatnonzero(rows & ~np.isnan(values))
+            near = known[nearest(self.places[known], wanted, SPREAD_OF)[1]] if known.size else known
+            spread[:, mode] = np.sqrt((values[near] ** 2).mean(axis=1)) if known.size else np.inf
+        excess = TrainingRange.of(self.weather, rows).excess(weather).mean(axis=1)
+        return spread * (1 + excess)[:, np.newaxis]
+
+    @cached_property
+    def _scores(self) -> Array:
+        """Absolute residuals over the spread that the records of the other periods give for their weather."""
+        scores = np.empty_like(self.values)
+        for fold in np.unique(self.folds):
+            test = self.folds == fold
+            scores[test] = np.abs(self.values[test]) / self._spread(self.weather[test], ~test)
+        return scores
+
+    @cached_property
+    def _mean_run(self) -> float:
+        """Mean length of the runs: twice the correlation time of what similar weather does not explain, less one."""
+        near = nearest(self.places, self.places, SPREAD_OF)[1]
+        filled = np.where(np.isnan(self.values), 0.0, self.values)
+        means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)
+        return max(1.0, 2 * max(correlation_time(column) for column in (self.values - means).T) - 1)
 
 
-def conformal_quantile(scores: Array, confidence: float) -> float:
+def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
+    """Distances and positions of the places nearest to each wanted one."""
+    return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
+
+
+def order_statistic(scores: Array, confidence: float) -> float:
+    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
     rank = int(np.ceil((len(scores) + 1) * confidence))
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
 
 
-def mean_run(values: Array) -> float:
-    """Mean length of runs of records that keep the serial correlation: twice the integrated correlation time."""
-    times = [correlation_time(column) for column in values.T]
-    return max(1.0, 2 * max(times) - 1)
-
-
 def correlation_time(series: Array) -> float:
-    """1 + 2 * sum of the autocorrelations up to the first that is not clearly above zero."""
-    centred = series - np.nanmean(series)
-    variance, time = np.nanmean(centred**2), 1.0
-    for lag in range(1, len(series) // 10):
-        correlation = np.nanmean(centred[lag:] * centred[:-lag]) / variance
-        if not correlation > 2 / np.sqrt(len(series)):
+    """1 + 2 * the sum of the autocorrelations up to the first that is not clearly above zero."""
+    known = ~np.isnan(series)
+    centred = np.where(known, series - series[known].mean(), 0.0) if known.any() else np.zeros(len(series))
+    variance, time = (centred**2).sum() / max(known.sum(), 1), 1.0
+    for lag in range(1, len(series) // 10 if variance > 0 else 1):
+        pairs = max(np.count_nonzero(known[lag:] & known[:-lag]), 1)
+        correlation = (centred[lag:] @ centred[:-lag]) / pairs / variance
+        if correlation <= 2 / np.sqrt(pairs):
             break
         time += 2 * correlation
     return time
