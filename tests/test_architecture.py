@@ -22,7 +22,7 @@ MAY_IMPORT = {
     "preprocessing": set(),
     "metrics": set(),
     "detection": {"metrics"},
-    "surrogate": {"fem", "metrics", "updating"},
+    "surrogate": {"fem", "metrics", "preprocessing", "updating"},
     "updating": {"fem", "metrics"},
     "datasets": {"fem"},
 }

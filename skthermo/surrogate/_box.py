@@ -37,10 +37,10 @@ class Box:
         """Which parameters of each row are not even near the box; NaN is not."""
         return _beyond(theta, self.near)
 
-    def warning(self, theta: Array) -> str:
-        """Text of the warning if many rows are far outside the box, else an empty string."""
+    def warning(self, theta: Array, std: Array | float = 0.0) -> str:
+        """Text of the warning if many rows are far outside the box by two standard deviations, else an empty one."""
         known = ~np.isnan(theta).any(axis=1)
-        far = self.far_outside(theta)[known]
+        far = (_beyond(theta + 2 * std, self.near) & _beyond(theta - 2 * std, self.near))[known]
         rows = far.any(axis=1)
         if not rows.size or rows.mean() <= MANY:
             return ""

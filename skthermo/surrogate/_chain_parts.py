@@ -81,10 +81,6 @@ def clone_parts(chain: Any) -> Parts:
                     f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                     f"{chain.model!r} has"
                 )
-    if chain.coordinates == "frequencies":
-        for part in (parts.mapper, *parts.mapper.get_params().values()):
-            if isinstance(part, TemperatureMapper) and part.sensitivities is None:
-                part.set_params(sensitivities=nominal_sensitivities(chain.model))
     random_state = seeded(chain.random_state)
     for part in parts:
         if part is not None:
@@ -92,11 +88,19 @@ def clone_parts(chain: Any) -> Parts:
     return parts
 
 
-def nominal_sensitivities(model: Any) -> Array | None:
-    """d ln f / d ln theta at the nominal state, (n_modes, n_parameters); None if the model cannot be solved there."""
+def learn_frequencies(mapper: BaseEstimator, model: Any) -> Array | None:
+    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies; these coordinates.
+
+    They are d ln f / d ln theta at the nominal state; None if there is no such mapper, or its coordinates are given.
+    """
+    mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
+    if not mappers or any(part.sensitivities is not None for part in mappers):
+        return None
     frequencies, jacobian = linearise(model, np.ones((1, len(model.parameter_names))))
     sensitivities = jacobian[0] / frequencies[0][:, np.newaxis]
-    return sensitivities if np.isfinite(sensitivities).all() else None
+    for part in mappers:
+        part.set_params(sensitivities=sensitivities)
+    return sensitivities
 
 
 def box_of(inverse: BaseEstimator) -> Box | None:

@@ -85,18 +85,31 @@ class ChainSteps:
         values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
         return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
 
-    def _fit_inverse(self, F: Any) -> tuple[Array, Array | None]:
-        """Fit aligner and M1, which gives the parameters of the training data and, if it can, their weights."""
+    def _fit_inverse(self, F: Any) -> tuple[Array, Array, Array | None]:
+        """Fit aligner and M1: parameters of the training data, those that M2 learns from, and their weights."""
         aligned = self.aligner_.fit(F).transform(F)
         self.inverse_.fit(aligned)
         if getattr(self.inverse_, "n_steps_", 0):
             found = self.inverse_.invert(aligned)
             self.inverse_.warn_of(found)
-            return as_floats(found.theta), precision(found) if self.weighted else None
+            theta = as_floats(found.theta)
+            return theta, self._unshrunk(theta, found.residuals), precision(found) if self.weighted else None
         theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self.parameter_names_):
             raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
-        return theta, None
+        return theta, theta, None
+
+    def _unshrunk(self, theta: Array, residuals: Array) -> Array:
+        """Parameters without the shrinkage to the prior, for a mapper that learns in coordinates of frequencies.
+
+        One more Gauss-Newton step, without the prior, with the derivatives that define these coordinates. Parameters
+        that hardly move the frequencies may then scatter widely, but not their effects, which are all that the mapper
+        sees.
+        """
+        if self.sensitivities_ is None:
+            return theta
+        steps = np.nan_to_num(residuals @ np.linalg.pinv(self.sensitivities_).T)
+        return theta * np.exp(steps)
 
 
 def precision(found: Any) -> Array:

@@ -107,9 +107,9 @@ class ChainUncertainty:
 
     def _out_of_fold(self) -> WeatherResiduals:
         """Relative residuals of the training records, each predicted by a mapper fitted on other periods of time."""
-        T, F, weights = self._records
+        T, F, targets, weights = self._records
         order = T.index.argsort(kind="stable") if isinstance(T, pd.DataFrame) else np.arange(len(T))
-        inputs, theta = as_floats(mapper_inputs(self.mapper_, T))[order], as_floats(self.parameters_)[order]
+        inputs, theta = as_floats(mapper_inputs(self.mapper_, T))[order], targets[order]
         measured = as_floats(F)[order]
         rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1))
         usable = ~np.isnan(theta[rows]).any(axis=1)

@@ -87,6 +87,9 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         The bounds, if the samples were simulated; else None.
     n_steps_ : int
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
+    scatter_ : ndarray of shape (n_modes,)
+        Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
+        ``noise`` or, where it is 0, what the model leaves of the records that `fit` saw; 0.001 where they cannot tell.
     n_parameters_ : int
         Number of parameters.
     parameter_names_ : list of str or None
@@ -200,9 +203,10 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
                 self.parameter_names_ = list(self.model.parameter_names)
                 self.simulator_ = Simulator(self.model)
             self.samples_ = Bunch(theta=theta, frequencies=frequencies)
+        self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
         if self.n_steps_:
             self.refinement_ = Refinement.of(self)
-        self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
+            self.scatter_ = self._scatter(X)
         return self
 
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
@@ -289,6 +293,10 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         check_is_fitted(self)
         numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
         return np.array(self.parameter_names_ or numbered, dtype=object)
+
+    def _scatter(self, X: ArrayLike | None) -> NDArray[np.float64]:
+        measured = np.ones((0, self.model.n_modes)) if X is None else self._read_inputs(X)
+        return self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
 
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         check_model(self.model)

@@ -7,7 +7,7 @@ from sklearn.base import BaseEstimator
 from skthermo._arrays import Array, real_array
 from skthermo._frames import check_columns, check_temperatures, frame_like
 from skthermo._validation import HasMethods, _check_sample_weight, _fit_context, seeded
-from skthermo.surrogate._networks import default_splines
+from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
 
 
@@ -19,9 +19,9 @@ class TemperatureMapper(MultiplierRegressor):
     regressor : regressor, optional
         Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
         logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
-        parameters are not positive, no logarithm is taken. By default splines of degree 1 and ridge regression, which
-        extrapolate in straight lines: ``make_pipeline(SplineTransformer(n_knots=6, degree=1, knots="quantile",
-        extrapolation="linear"), RidgeCV(numpy.logspace(-3, 4, 15)))``. See `paper_network` for the paper's network.
+        parameters are not positive, no logarithm is taken. By default broken lines,
+        ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data.
+        See `paper_network` for the paper's network.
     sensitivities : array-like of shape (n_modes, n_parameters), optional
         d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change of
         ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
@@ -65,7 +65,7 @@ class TemperatureMapper(MultiplierRegressor):
     True
     """
 
-    _default_regressor = staticmethod(default_splines)
+    _default_regressor = staticmethod(default_lines)
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
         "sensitivities": ["array-like", None],

@@ -6,7 +6,8 @@ import numpy as np
 from sklearn.linear_model import RidgeCV
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import SplineTransformer
+
+from skthermo.preprocessing import HingeFeatures
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
@@ -27,13 +28,9 @@ def default_network() -> MLPRegressor:
     )
 
 
-def default_splines() -> Pipeline:
-    """Broken lines with knots at quantiles of each input, for which ridge regression finds the slopes.
-
-    They go on in straight lines beyond the data.
-    """
-    lines = SplineTransformer(n_knots=6, degree=1, knots="quantile", extrapolation="linear")
-    return make_pipeline(lines, RidgeCV(np.logspace(-3, 4, 15)))
+def default_lines() -> Pipeline:
+    """Broken lines whose changes of slope are penalised; they go on straight beyond the data."""
+    return make_pipeline(HingeFeatures(), RidgeCV(np.logspace(-3, 5, 33)))
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:

@@ -34,6 +34,15 @@ class Prior:
         mean, half = (lowest + highest) / 2, (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
+    def information(self, sensitivity: Array, noise: Array) -> Array:
+        """Precision of ln theta given d ln f / d ln theta and the noise of each row, with that of the prior."""
+        scaled = sensitivity / noise[:, :, np.newaxis]
+        return scaled.swapaxes(1, 2) @ scaled + np.diag(self.width**-2.0)
+
+    def deviations(self, sensitivity: Array, noise: Array) -> Array:
+        """Posterior standard deviations of ln theta (Laplace's approximation), (n_samples, n_parameters)."""
+        return np.sqrt(np.einsum("spp->sp", np.linalg.inv(self.information(sensitivity, noise))))
+
 
 @dataclass(frozen=True)
 class Objective:
@@ -60,15 +69,15 @@ class Objective:
         """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
         theta = np.exp(x)
         frequencies, jacobian = self.linearise(theta)
-        sensitivity = jacobian * theta[:, np.newaxis] / (frequencies * self.noise)[:, :, np.newaxis]
-        residual = (self.log_measured - np.log(frequencies)) / self.noise
         missing = np.isnan(self.log_measured)
-        residual, sensitivity = np.where(missing, 0.0, residual), np.where(missing[:, :, np.newaxis], 0.0, sensitivity)
+        sensitivity = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
+        sensitivity = np.where(missing[:, :, np.newaxis], 0.0, sensitivity)
+        residual = np.where(missing, 0.0, self.log_measured - np.log(frequencies))
         distance = (x - self.prior.mean) / self.prior.width
-        value = 0.5 * ((residual**2).sum(axis=1) + (distance**2).sum(axis=1))
-        gradient = -np.einsum("smp,sm->sp", sensitivity, residual) + distance / self.prior.width
-        hessian = sensitivity.swapaxes(1, 2) @ sensitivity + np.diag(self.prior.width**-2.0)
-        return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual)
+        value = 0.5 * (((residual / self.noise) ** 2).sum(axis=1) + (distance**2).sum(axis=1))
+        gradient = -np.einsum("smp,sm->sp", sensitivity, residual / self.noise**2) + distance / self.prior.width
+        hessian = self.prior.information(sensitivity, self.noise)
+        return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
 
     def of(self, rows: NDArray) -> "Objective":
         """The objective of some rows."""
@@ -81,13 +90,14 @@ class Objective:
 
 @dataclass
 class Local:
-    """Value, gradient and Gauss-Newton Hessian of an `Objective` at ln theta = x, row by row."""
+    """An `Objective` at ln theta = x, row by row, with residuals and derivatives of ln f."""
 
     x: Array
     value: Array
     gradient: Array
     hessian: Array
     residual: Array
+    sensitivity: Array
 
     def step(self, prior: Prior, damping: Array) -> Array:
         """Damped Gauss-Newton step, at most to the limits; a parameter that would leave its limit stays."""
@@ -101,10 +111,6 @@ class Local:
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
         return np.clip(self.x + step, prior.lowest, prior.highest) - self.x
-
-    def deviations(self) -> Array:
-        """Posterior standard deviations of ln theta (Laplace's approximation)."""
-        return np.sqrt(np.einsum("spp->sp", np.linalg.inv(self.hessian)))
 
     def put(self, rows: NDArray, other: "Local") -> None:
         """Replace some rows."""

@@ -1,7 +1,5 @@
 """Refinement of estimated parameters on the FE model: Levenberg-Marquardt steps, restarts where modes cross."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,27 +25,8 @@ CLOSE = 0.1
 """Difference of ln f up to which two neighbouring modes may have crossed."""
 
 
-@dataclass(frozen=True)
-class Refined:
-    """Where every row has ended.
-
-    Attributes
-    ----------
-    x, std : ndarray of shape (n_samples, n_parameters)
-        ln theta and its posterior standard deviations.
-    misfit : ndarray of shape (n_samples,)
-        Root mean square of the residuals of ln f.
-    converged : ndarray of bool of shape (n_samples,)
-    """
-
-    x: Array
-    std: Array
-    misfit: Array
-    converged: NDArray[np.bool_]
-
-
-def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
-    """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
+def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> tuple[Local, NDArray[np.bool_]]:
+    """Posterior modes of ln theta, by at most ``n_steps`` steps from each start, and which rows have converged.
 
     The frequencies of a model that sorts its modes have kinks where modes cross, and rows may stall there. Such rows
     are started again beyond the kink.
@@ -58,9 +37,7 @@ def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> 
             crossed = doubtful(objective, found, converged) & (np.abs(gap(objective, found, lower)) < CLOSE)
             retry(objective, found, converged, crossed, n_steps, lower)
         retry(objective, found, converged, doubtful(objective, found, converged), n_steps)
-    n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
-    misfit = np.sqrt(((found.residual * objective.noise) ** 2).sum(axis=1) / n_measured)
-    return Refined(found.x, found.deviations(), misfit, converged)
+    return found, converged
 
 
 def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArray[np.bool_]]:
@@ -72,7 +49,7 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
     for remaining in range(n_steps, -1, -1):
         here = found.of(active)
         undamped = here.step(objective.prior, np.zeros(len(active)))
-        is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * here.deviations())).all(axis=1)
+        is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * deviations(here))).all(axis=1)
         gain = -0.5 * (here.gradient * undamped).sum(axis=1)
         converged[active] = is_small | (gain <= SMALL_GAIN * here.value)
         active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
@@ -84,6 +61,11 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
         found.put(active[better], there.of(better))
         damping[active] = np.where(better, relaxed(damping[active]), np.maximum(FIRST_DAMPING, 10 * damping[active]))
     return found, converged
+
+
+def deviations(here: Local) -> Array:
+    """Posterior standard deviations of ln theta."""
+    return np.sqrt(np.einsum("spp->sp", np.linalg.inv(here.hessian)))
 
 
 def relaxed(damping: Array) -> Array:
@@ -119,12 +101,12 @@ def doubtful(objective: Objective, found: Local, converged: NDArray[np.bool_]) -
 def normalised_misfit(objective: Objective, found: Local) -> Array:
     """Root mean square of the residuals in standard deviations of the noise."""
     n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
-    return np.sqrt((found.residual**2).sum(axis=1) / n_measured)
+    return np.sqrt(((found.residual / objective.noise) ** 2).sum(axis=1) / n_measured)
 
 
 def gap(objective: Objective, found: Local, lower: int) -> Array:
     """Difference of ln f between two neighbouring modes of the model; NaN where one of them is missing."""
-    fitted = objective.log_measured[:, lower : lower + 2] - (found.residual * objective.noise)[:, lower : lower + 2]
+    fitted = (objective.log_measured - found.residual)[:, lower : lower + 2]
     return fitted[:, 1] - fitted[:, 0]
 
 

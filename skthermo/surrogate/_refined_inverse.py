@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils import Bunch
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import Array, as_floats
 from skthermo._frames import frame_like
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
@@ -23,6 +23,7 @@ class RefinedInverse(MultiplierRegressor):
     box_: Box | None
     n_steps_: int
     refinement_: Refinement
+    scatter_: Array
 
     def invert(self, X: ArrayLike) -> Bunch:
         """Parameters of measured frequencies, and how sure they are.
@@ -38,9 +39,9 @@ class RefinedInverse(MultiplierRegressor):
             - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode, and in rows with a
               missing mode that have not converged;
             - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation, given
-              ``noise`` and the prior; those of the prior in rows that have not converged;
-            - ``misfit`` (n_samples,): root mean square of the relative differences that are left between the measured
-              frequencies and the model's;
+              ``scatter_`` and the prior; those of the prior in rows that have not converged;
+            - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
+              missing and in rows that have not converged;
             - ``converged`` (n_samples,): whether the refinement has converged. Other rows keep the regressor's
               estimate.
 
@@ -65,7 +66,7 @@ class RefinedInverse(MultiplierRegressor):
                 f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
             )
         frequencies = self._read_inputs(X)
-        found = self.refinement_.refined(frequencies, self._estimate(frequencies)[0])
+        found = self.refinement_.refined(frequencies, self._estimate(frequencies)[0], self.scatter_)
         names = self.get_feature_names_out()
         found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
         return found
@@ -79,17 +80,17 @@ class RefinedInverse(MultiplierRegressor):
             What `invert` has given.
         """
         theta = as_floats(found.theta)
-        stalled = np.flatnonzero(~found.converged & ~np.isnan(found.misfit))
+        stalled = np.flatnonzero(~found.converged & ~np.isnan(as_floats(found.std)).all(axis=1))
         if stalled.size:
             warn_user(
                 f"{stalled.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {stalled[0]} the "
                 "first: they keep the regressor's estimate, NaN where a mode is missing",
                 "not converged",
             )
-        self._warn_of_box(theta)
+        self._warn_of_box(theta, as_floats(found.std))
 
-    def _warn_of_box(self, theta: NDArray[np.float64]) -> None:
-        message = "" if self.box_ is None else self.box_.warning(theta)
+    def _warn_of_box(self, theta: Array, std: Array | float = 0.0) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta, std)
         if message:
             warn_user(message, "outside the bounds")
 
