@@ -14,7 +14,7 @@ from sklearn.svm import OneClassSVM
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
-from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 
 ROWS_ARE_ORDERED = {

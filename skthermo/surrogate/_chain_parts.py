@@ -15,6 +15,9 @@ from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 
+ROWS_PER_DEGREE = 10
+"""Records whose share of a mapper's predictions is about one record's, as many mappers have tens of degrees of freedom."""
+
 
 class Parts(NamedTuple):
     """Clones, ready to be fitted."""
@@ -88,18 +91,22 @@ def clone_parts(chain: Any) -> Parts:
     return parts
 
 
-def learn_frequencies(mapper: BaseEstimator, model: Any) -> Array | None:
+def learn_frequencies(mapper: BaseEstimator, inverse: Any, n_rows: int) -> Array | None:
     """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies; these coordinates.
 
-    They are d ln f / d ln theta at the nominal state; None if there is no such mapper, or its coordinates are given.
+    They are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, (n_modes,
+    n_parameters). A prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does
+    the damping. None if there is no such mapper, or its coordinates are given, or the inverse does not refine.
     """
     mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
-    if not mappers or any(part.sensitivities is not None for part in mappers):
+    is_given = any(part.sensitivities is not None for part in mappers)
+    if not mappers or is_given or not getattr(inverse, "n_steps_", 0):
         return None
-    frequencies, jacobian = linearise(model, np.ones((1, len(model.parameter_names))))
-    sensitivities = jacobian[0] / frequencies[0][:, np.newaxis]
+    frequencies, jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))))
+    sensitivities = jacobian[0] / frequencies[0][:, np.newaxis] / inverse.scatter_[:, np.newaxis]
+    damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_DEGREE / n_rows
     for part in mappers:
-        part.set_params(sensitivities=sensitivities)
+        part.set_params(sensitivities=sensitivities, damping=damping)
     return sensitivities
 
 

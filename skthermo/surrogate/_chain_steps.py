@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import frame_like
+from skthermo._regressors import weights_for
 from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
+from skthermo.surrogate._chain_parts import learn_frequencies
 from skthermo.surrogate._report import fit_report, spread_rows
 from skthermo.surrogate._simulator import Simulator, tolerance
 
@@ -85,31 +87,36 @@ class ChainSteps:
         values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
         return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
 
-    def _fit_inverse(self, F: Any) -> tuple[Array, Array, Array | None]:
-        """Fit aligner and M1: parameters of the training data, those that M2 learns from, and their weights."""
+    def _fit_inverse(self, F: Any) -> tuple[Array, Array | None, Array | None]:
+        """Fit aligner and M1: parameters of the training data, residuals and weights where they are refined."""
         aligned = self.aligner_.fit(F).transform(F)
         self.inverse_.fit(aligned)
         if getattr(self.inverse_, "n_steps_", 0):
             found = self.inverse_.invert(aligned)
             self.inverse_.warn_of(found)
             theta = as_floats(found.theta)
-            return theta, self._unshrunk(theta, found.residuals), precision(found) if self.weighted else None
+            return theta, found.residuals, precision(found) if self.weighted else None
         theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self.parameter_names_):
             raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
-        return theta, theta, None
+        return theta, None, None
 
-    def _unshrunk(self, theta: Array, residuals: Array) -> Array:
-        """Parameters without the shrinkage to the prior, for a mapper that learns in coordinates of frequencies.
+    def _fit_mapper(self, T: Any, theta: Array, residuals: Array | None, weights: Array | None) -> Array:
+        """Fit M2; the parameters that it has learned.
 
-        One more Gauss-Newton step, without the prior, with the derivatives that define these coordinates. Parameters
-        that hardly move the frequencies may then scatter widely, but not their effects, which are all that the mapper
-        sees.
+        In coordinates of frequencies it learns what the prior of the inverse keeps from the parameters, too: one more
+        Gauss-Newton step, without the prior, with the derivatives that define these coordinates. Parameters that hardly
+        move the frequencies may then scatter widely, but not their effects, which are all that the mapper sees.
         """
-        if self.sensitivities_ is None:
-            return theta
-        steps = np.nan_to_num(residuals @ np.linalg.pinv(self.sensitivities_).T)
-        return theta * np.exp(steps)
+        if self.coordinates == "frequencies":
+            n_rows = np.count_nonzero(~np.isnan(theta).any(axis=1))
+            sensitivities = learn_frequencies(self.mapper_, self.inverse_, n_rows)
+            if sensitivities is not None:
+                theta = theta * np.exp(
+                    np.nan_to_num(residuals / self.inverse_.scatter_) @ np.linalg.pinv(sensitivities).T
+                )
+        self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
+        return theta
 
 
 def precision(found: Any) -> Array:

@@ -11,7 +11,6 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from skthermo._arrays import as_floats, as_random_state
 from skthermo._frames import check_same_rows, column_names, frame_like
-from skthermo._regressors import weights_for
 from skthermo._validation import (
     HasMethods,
     Interval,
@@ -24,7 +23,7 @@ from skthermo._validation import (
 from skthermo._warnings import warn_each, warn_user
 from skthermo.fem import FEModel, add_noise, check_noise
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._chain_parts import box_of, clone_parts, learn_frequencies, read_records
+from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
 from skthermo.surrogate._chain_steps import ChainSteps
 from skthermo.surrogate._chain_uncertainty import ChainUncertainty
 from skthermo.surrogate._report import mode_warnings
@@ -58,8 +57,8 @@ class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimato
         there; without refining, they do not train M2.
     coordinates : {"frequencies", "parameters"}, default="frequencies"
         What a `TemperatureMapper` learns: parameters in coordinates in which their errors count as those of frequencies
-        do (see its ``sensitivities``), or parameters themselves. In coordinates of frequencies, complete records also
-        teach what the prior of a refined inverse keeps from its estimates.
+        do (see its ``sensitivities``), free of the shrinkage that an inverse's prior causes; or parameters as the
+        inverse gives them. Without refining, the latter.
     weighted : bool, default=True
         Whether rows train M2 with weights that are their posterior precision, so that rows with missing modes count
         less. Weights need an inverse that refines, and a mapper whose ``fit`` takes ``sample_weight``; other rows
@@ -84,8 +83,6 @@ class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimato
         Multipliers that M1 found in the training data, eq. (5).
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
-    sensitivities_ : ndarray of shape (n_modes, n_parameters) or None
-        d ln f / d ln theta of the model at its nominal state, where the mapper learns in coordinates of frequencies.
     training_range_ : TrainingRange
         Lowest and highest value of each input of M2, lags included.
     box_ : Box or None
@@ -196,13 +193,11 @@ class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimato
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
-        in_frequencies = self.coordinates == "frequencies"
-        self.sensitivities_ = learn_frequencies(self.mapper_, self.model) if in_frequencies else None
         self.box_ = box_of(self.inverse_)
         warn_each(mode_warnings(self.model, F))
-        theta, targets, weights = self._fit_inverse(self._completed(T, F))
+        theta, residuals, weights = self._fit_inverse(self._completed(T, F))
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
-        self.mapper_.fit(T, frame_like(T, targets, self.parameter_names_), **weights_for(self.mapper_, weights))
+        targets = self._fit_mapper(T, theta, residuals, weights)
         self._records, self._residuals = (T, F, targets, weights), None
         self._report(T, F, theta)
         return self

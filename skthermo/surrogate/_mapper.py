@@ -1,12 +1,14 @@
 """The temperature mapper M2: temperatures to parameters."""
 
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from skthermo._arrays import Array, real_array
 from skthermo._frames import check_columns, check_temperatures, frame_like
-from skthermo._validation import HasMethods, _check_sample_weight, _fit_context, seeded
+from skthermo._validation import HasMethods, Interval, _check_sample_weight, _fit_context, seeded
 from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
 
@@ -25,7 +27,10 @@ class TemperatureMapper(MultiplierRegressor):
     sensitivities : array-like of shape (n_modes, n_parameters), optional
         d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change of
         ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
-        by the pseudo-inverse. `DataInformedFEM` gives those of its model.
+        by damped least squares. `DataInformedFEM` gives those of its model.
+    damping : float or array-like of shape (n_parameters,), default=0.0
+        What damped least squares adds to the diagonal of sensitivities' sensitivities. It keeps parameters that hardly
+        change the frequencies near their means.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -69,6 +74,7 @@ class TemperatureMapper(MultiplierRegressor):
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
         "sensitivities": ["array-like", None],
+        "damping": [Interval(Real, 0, None, closed="left"), "array-like"],
         "random_state": ["random_state"],
     }
 
@@ -77,10 +83,12 @@ class TemperatureMapper(MultiplierRegressor):
         regressor: BaseEstimator | None = None,
         *,
         sensitivities: ArrayLike | None = None,
+        damping: ArrayLike = 0.0,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.regressor = regressor
         self.sensitivities = sensitivities
+        self.damping = damping
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
@@ -119,6 +127,7 @@ class TemperatureMapper(MultiplierRegressor):
             seeded(self.random_state),
             log_inputs=False,
             coordinates=self._coordinates(theta),
+            damping=self._damping(theta),
             sample_weight=weights,
         )
         return self
@@ -135,3 +144,11 @@ class TemperatureMapper(MultiplierRegressor):
         if (theta <= 0).any():
             raise ValueError(f"theta falls to {np.nanmin(theta):g}; expected positive multipliers with sensitivities")
         return sensitivities
+
+    def _damping(self, theta: Array) -> Array:
+        damping = real_array(self.damping, "damping")
+        if damping.shape not in ((), theta.shape[1:]) or not ((damping >= 0) & np.isfinite(damping)).all():
+            raise ValueError(
+                f"damping is {damping}; expected a number from 0, or one for each of {theta.shape[1]} columns"
+            )
+        return damping

@@ -42,8 +42,9 @@ class RefinedInverse(MultiplierRegressor):
               ``scatter_`` and the prior; those of the prior in rows that have not converged;
             - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
               missing and in rows that have not converged;
-            - ``converged`` (n_samples,): whether the refinement has converged. Other rows keep the regressor's
-              estimate.
+            - ``converged`` (n_samples,): whether the refinement has converged;
+            - ``stalled`` (n_samples,): whether it has not, although there are frequencies. Such rows keep the
+              regressor's estimate.
 
         Raises
         ------
@@ -80,7 +81,7 @@ class RefinedInverse(MultiplierRegressor):
             What `invert` has given.
         """
         theta = as_floats(found.theta)
-        stalled = np.flatnonzero(~found.converged & ~np.isnan(as_floats(found.std)).all(axis=1))
+        stalled = np.flatnonzero(found.stalled)
         if stalled.size:
             warn_user(
                 f"{stalled.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {stalled[0]} the "

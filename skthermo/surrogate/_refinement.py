@@ -76,12 +76,10 @@ class Refinement:
             found, done = refine(objective, np.clip(start, prior.lowest, prior.highest), self.n_steps, sorts=sorts)
             deviations = prior.deviations(found.sensitivity, np.maximum(noise, scatter))
             theta[some] = np.where(done[:, np.newaxis], np.exp(found.x), guess[some])
-            std[some] = np.where(done[:, np.newaxis], deviations, prior.width) * np.where(
-                np.isnan(theta[some]), np.exp(prior.mean), theta[some]
-            )
+            std[some] = np.where(done[:, np.newaxis], deviations, prior.width) * theta[some]
             residuals[some] = np.where(np.isnan(measured) | ~done[:, np.newaxis], np.nan, found.residual)
             converged[some] = done
-        return Bunch(theta=theta, std=std, residuals=residuals, converged=converged)
+        return Bunch(theta=theta, std=std, residuals=residuals, converged=converged, stalled=some & ~converged)
 
     def estimated_scatter(self, frequencies: Array, guess: Array) -> Array:
         """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.

@@ -98,6 +98,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         *,
         log_inputs: bool,
         coordinates: Array | None = None,
+        damping: Array | float = 0.0,
         sample_weight: Array | None = None,
     ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
@@ -110,7 +111,9 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         weights = None if sample_weight is None else sample_weight[complete]
         self.n_parameters_ = y.shape[1]
         self.inputs_ = Standardiser.fitted(X, log=log_inputs and is_positive(X), sample_weight=weights)
-        self.targets_ = Standardiser.fitted(y, log=is_positive(y), coordinates=coordinates, sample_weight=weights)
+        self.targets_ = Standardiser.fitted(
+            y, log=is_positive(y), coordinates=coordinates, damping=damping, sample_weight=weights
+        )
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
         targets = self.targets_.transform(y)

@@ -22,6 +22,8 @@ class Standardiser:
         Mean of x, which the inverse keeps in directions that A does not see.
     coordinates : ndarray of shape (n_coordinates, n_columns) or None
         The matrix A; None is the identity.
+    damping : float or ndarray of shape (n_columns,)
+        What damped least squares adds to the diagonal of A'A to find x again.
     """
 
     mean: Array
@@ -29,17 +31,24 @@ class Standardiser:
     log: bool
     middle: Array
     coordinates: Array | None = None
+    damping: Array | float = 0.0
 
     @classmethod
     def fitted(
-        cls, values: Array, *, log: bool, coordinates: Array | None = None, sample_weight: Array | None = None
+        cls,
+        values: Array,
+        *,
+        log: bool,
+        coordinates: Array | None = None,
+        damping: Array | float = 0.0,
+        sample_weight: Array | None = None,
     ) -> "Standardiser":
         """Mean and standard deviation of some values; the scale of a constant column is 1."""
         x = np.log(values) if log else values
         z = x if coordinates is None else x @ coordinates.T
         scaler = StandardScaler().fit(z, sample_weight=sample_weight)
         middle = np.average(x, axis=0, weights=sample_weight)
-        return cls(scaler.mean_, scaler.scale_, log, middle, coordinates)
+        return cls(scaler.mean_, scaler.scale_, log, middle, coordinates, damping)
 
     def transform(self, values: Array) -> Array:
         """Standardised values."""
@@ -49,7 +58,7 @@ class Standardiser:
     def inverse_transform(self, standardised: Array) -> Array:
         """Values from standardised values; a logarithm too large for a float becomes infinity."""
         deviation = standardised * self.scale
-        x = self.mean + deviation if self.coordinates is None else self.middle + deviation @ self._pseudo_inverse.T
+        x = self.mean + deviation if self.coordinates is None else self.middle + deviation @ self._inverse.T
         with np.errstate(over="ignore"):
             return np.exp(x) if self.log else x
 
@@ -60,12 +69,15 @@ class Standardiser:
         """
         std = deviations * self.scale
         if self.coordinates is not None:
-            std = np.sqrt(std**2 @ self._pseudo_inverse.T**2)
+            std = np.sqrt(std**2 @ self._inverse.T**2)
         return std * (values if self.log else 1)
 
     @property
-    def _pseudo_inverse(self) -> Array:
-        return np.linalg.pinv(self.coordinates)
+    def _inverse(self) -> Array:
+        """(A'A + damping)^-1 A', the pseudo-inverse without damping."""
+        A = self.coordinates
+        damping = np.broadcast_to(self.damping, (A.shape[1],))
+        return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
 
 
 def is_positive(values: Array) -> bool:

@@ -52,7 +52,8 @@ def test_equals_scikit_learns_transformed_target_regressor(seeded):
     )
     transformer = make_pipeline(BiasAligner(TRUSS), parts[0])
     words = TransformedTargetRegressor(parts[1], transformer=transformer, check_inverse=False).fit(T, F)
-    whole = chain(inverse=parts[0], mapper=parts[1]).fit(T, F)
+    alike = {"coordinates": "parameters", "weighted": False}
+    whole = chain(inverse=parts[0], mapper=parts[1], **alike).fit(T, F)
     np.testing.assert_allclose(whole.predict(LATER.temperatures), words.predict(LATER.temperatures), rtol=1e-12)
 
 
