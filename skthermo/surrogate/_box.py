@@ -37,10 +37,16 @@ class Box:
         """Which parameters of each row are not even near the box; NaN is not."""
         return _beyond(theta, self.near)
 
-    def warning(self, theta: Array, std: Array | float = 0.0) -> str:
-        """Text of the warning if many rows are far outside the box by two standard deviations, else an empty one."""
+    def warning(self, theta: Array, doubt: Array | float = 0.0) -> str:
+        """Text of the warning if many rows are far outside the box, else an empty string.
+
+        A row counts if two standard deviations of ln theta, its doubt, do not bring it back.
+        """
         known = ~np.isnan(theta).any(axis=1)
-        far = (_beyond(theta + 2 * std, self.near) & _beyond(theta - 2 * std, self.near))[known]
+        lowest, highest = self.near.T
+        with np.errstate(over="ignore"):
+            reach = np.exp(2 * np.asarray(doubt))
+            far = ((theta * reach < lowest) | (theta / reach > highest))[known]
         rows = far.any(axis=1)
         if not rows.size or rows.mean() <= MANY:
             return ""

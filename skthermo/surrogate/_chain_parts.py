@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from sklearn.base import BaseEstimator, clone
+from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arrays import Array, as_floats
@@ -16,7 +17,7 @@ from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 
 ROWS_PER_DEGREE = 10
-"""Records whose share of a mapper's predictions is about one record's, as many mappers have tens of degrees of freedom."""
+"""Training records for each record whose mean a prediction is as sure as: mappers have tens of degrees of freedom."""
 
 
 class Parts(NamedTuple):
@@ -91,16 +92,22 @@ def clone_parts(chain: Any) -> Parts:
     return parts
 
 
-def learn_frequencies(mapper: BaseEstimator, inverse: Any, n_rows: int) -> Array | None:
+def refining_step(inverse: Any) -> InverseSurrogate | None:
+    """The fitted `InverseSurrogate` that an inverse is or ends with, if it refines its estimates."""
+    last = inverse[-1] if isinstance(inverse, Pipeline) else inverse
+    return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+
+
+def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: int) -> Array | None:
     """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies; these coordinates.
 
     They are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, (n_modes,
     n_parameters). A prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does
-    the damping. None if there is no such mapper, or its coordinates are given, or the inverse does not refine.
+    the damping. None if there is no such mapper, or its coordinates are given.
     """
     mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
     is_given = any(part.sensitivities is not None for part in mappers)
-    if not mappers or is_given or not getattr(inverse, "n_steps_", 0):
+    if not mappers or is_given:
         return None
     frequencies, jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))))
     sensitivities = jacobian[0] / frequencies[0][:, np.newaxis] / inverse.scatter_[:, np.newaxis]

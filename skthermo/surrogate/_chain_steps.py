@@ -12,7 +12,7 @@ from skthermo._regressors import weights_for
 from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
-from skthermo.surrogate._chain_parts import learn_frequencies
+from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
 from skthermo.surrogate._report import fit_report, spread_rows
 from skthermo.surrogate._simulator import Simulator, tolerance
 
@@ -91,11 +91,12 @@ class ChainSteps:
         """Fit aligner and M1: parameters of the training data, residuals and weights where they are refined."""
         aligned = self.aligner_.fit(F).transform(F)
         self.inverse_.fit(aligned)
-        if getattr(self.inverse_, "n_steps_", 0):
-            found = self.inverse_.invert(aligned)
-            self.inverse_.warn_of(found)
-            theta = as_floats(found.theta)
-            return theta, found.residuals, precision(found) if self.weighted else None
+        last = refining_step(self.inverse_)
+        if last is not None:
+            inputs = aligned if last is self.inverse_ else self.inverse_[:-1].transform(aligned)
+            found = last.invert(inputs)
+            last.warn_of(found)
+            return as_floats(found.theta), found.residuals, found.weight if self.weighted else None
         theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self.parameter_names_):
             raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
@@ -108,18 +109,11 @@ class ChainSteps:
         Gauss-Newton step, without the prior, with the derivatives that define these coordinates. Parameters that hardly
         move the frequencies may then scatter widely, but not their effects, which are all that the mapper sees.
         """
-        if self.coordinates == "frequencies":
-            n_rows = np.count_nonzero(~np.isnan(theta).any(axis=1))
-            sensitivities = learn_frequencies(self.mapper_, self.inverse_, n_rows)
+        last = refining_step(self.inverse_)
+        if self.coordinates == "frequencies" and last is not None:
+            sensitivities = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
             if sensitivities is not None:
-                theta = theta * np.exp(
-                    np.nan_to_num(residuals / self.inverse_.scatter_) @ np.linalg.pinv(sensitivities).T
-                )
+                weighted = np.nan_to_num(residuals / last.scatter_)
+                theta = theta * np.exp(weighted @ np.linalg.pinv(sensitivities).T)
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta
-
-
-def precision(found: Any) -> Array:
-    """Mean precision of the parameters of each row, as a share of the highest; 0 where they are unknown."""
-    precisions = (as_floats(found.theta) / as_floats(found.std)) ** 2
-    return np.nan_to_num((precisions / np.nanmax(precisions, axis=0)).mean(axis=1))

@@ -148,7 +148,5 @@ class TemperatureMapper(MultiplierRegressor):
     def _damping(self, theta: Array) -> Array:
         damping = real_array(self.damping, "damping")
         if damping.shape not in ((), theta.shape[1:]) or not ((damping >= 0) & np.isfinite(damping)).all():
-            raise ValueError(
-                f"damping is {damping}; expected a number from 0, or one for each of {theta.shape[1]} columns"
-            )
+            raise ValueError(f"damping is {damping}; expected one number from 0, or {theta.shape[1]}, one a parameter")
         return damping

@@ -35,7 +35,7 @@ class Prior:
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
     def information(self, sensitivity: Array, noise: Array) -> Array:
-        """Precision of ln theta given d ln f / d ln theta and the noise of each row, with that of the prior."""
+        """Precision of ln theta given d ln f / d ln theta and the noise, which is infinite where a mode is missing."""
         scaled = sensitivity / noise[:, :, np.newaxis]
         return scaled.swapaxes(1, 2) @ scaled + np.diag(self.width**-2.0)
 
@@ -71,12 +71,11 @@ class Objective:
         frequencies, jacobian = self.linearise(theta)
         missing = np.isnan(self.log_measured)
         sensitivity = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
-        sensitivity = np.where(missing[:, :, np.newaxis], 0.0, sensitivity)
         residual = np.where(missing, 0.0, self.log_measured - np.log(frequencies))
         distance = (x - self.prior.mean) / self.prior.width
         value = 0.5 * (((residual / self.noise) ** 2).sum(axis=1) + (distance**2).sum(axis=1))
         gradient = -np.einsum("smp,sm->sp", sensitivity, residual / self.noise**2) + distance / self.prior.width
-        hessian = self.prior.information(sensitivity, self.noise)
+        hessian = self.prior.information(sensitivity, np.where(missing, np.inf, self.noise))
         return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
 
     def of(self, rows: NDArray) -> "Objective":
@@ -100,17 +99,30 @@ class Local:
     sensitivity: Array
 
     def step(self, prior: Prior, damping: Array) -> Array:
-        """Damped Gauss-Newton step, at most to the limits; a parameter that would leave its limit stays."""
+        """Damped Gauss-Newton step within the limits; parameters that it would carry beyond stop there."""
         held = ((self.x <= prior.lowest) & (self.gradient > 0)) | ((self.x >= prior.highest) & (self.gradient < 0))
-        free = ~held
         n_parameters = self.x.shape[1]
         diagonal = np.einsum("spp->sp", self.hessian)
-        matrix = self.hessian * (free[:, :, np.newaxis] & free[:, np.newaxis])
-        matrix += np.eye(n_parameters) * (damping[:, np.newaxis] * diagonal + held * diagonal)[:, np.newaxis]
-        step = -np.linalg.solve(matrix, np.where(free, self.gradient, 0.0)[:, :, np.newaxis])[:, :, 0]
+        damped = self.hessian + np.eye(n_parameters) * (damping[:, np.newaxis] * diagonal)[:, np.newaxis]
+        fixed, step = np.zeros_like(self.x), np.zeros_like(self.x)
+        for _ in range(n_parameters):
+            free = ~held
+            pull = -self.gradient - np.einsum("spq,sq->sp", damped, fixed)
+            matrix = damped * (free[:, :, np.newaxis] & free[:, np.newaxis])
+            matrix += np.eye(n_parameters) * (held * diagonal)[:, np.newaxis]
+            step = np.where(held, fixed, np.linalg.solve(matrix, np.where(free, pull, 0.0)[:, :, np.newaxis])[:, :, 0])
+            reached = np.clip(self.x + step, prior.lowest, prior.highest) - self.x
+            beyond = free & (reached != step)
+            if not beyond.any():
+                break
+            held, fixed = held | beyond, np.where(beyond, reached, fixed)
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
         return np.clip(self.x + step, prior.lowest, prior.highest) - self.x
+
+    def gain(self, step: Array) -> Array:
+        """How much a step would lower the objective if it were quadratic."""
+        return -(self.gradient * step).sum(axis=1) - 0.5 * np.einsum("sp,spq,sq->s", step, self.hessian, step)
 
     def put(self, rows: NDArray, other: "Local") -> None:
         """Replace some rows."""

@@ -37,14 +37,17 @@ class RefinedInverse(MultiplierRegressor):
         -------
         Bunch
             - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode, and in rows with a
-              missing mode that have not converged;
+              missing mode that have stalled;
             - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation, given
-              ``scatter_`` and the prior; those of the prior in rows that have not converged;
+              ``scatter_`` and the prior; those of the prior in rows that have stalled;
             - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
-              missing and in rows that have not converged;
-            - ``converged`` (n_samples,): whether the refinement has converged;
-            - ``stalled`` (n_samples,): whether it has not, although there are frequencies. Such rows keep the
-              regressor's estimate.
+              missing and in rows that have stalled;
+            - ``weight`` (n_samples,): mean precision of the parameters as a share of what all modes would give, 1 in
+              complete rows and 0 in rows without any mode;
+            - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
+              they have reached; rows that have stalled keep the regressor's estimate;
+            - ``likeliest`` and ``doubt`` (n_samples, n_parameters): multipliers after one more Gauss-Newton step that
+              leaves the prior out, and standard deviations of their logarithms; NaN in rows where a mode is missing.
 
         Raises
         ------
@@ -81,17 +84,17 @@ class RefinedInverse(MultiplierRegressor):
             What `invert` has given.
         """
         theta = as_floats(found.theta)
-        stalled = np.flatnonzero(found.stalled)
-        if stalled.size:
+        rows = np.flatnonzero(~found.converged & (found.weight > 0))
+        if rows.size:
             warn_user(
-                f"{stalled.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {stalled[0]} the "
-                "first: they keep the regressor's estimate, NaN where a mode is missing",
+                f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
+                "they keep what they reached, or the regressor's estimate",
                 "not converged",
             )
-        self._warn_of_box(theta, as_floats(found.std))
+        self._warn_of_box(found.likeliest, found.doubt)
 
-    def _warn_of_box(self, theta: Array, std: Array | float = 0.0) -> None:
-        message = "" if self.box_ is None else self.box_.warning(theta, std)
+    def _warn_of_box(self, theta: Array, doubt: Array | float = 0.0) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta, doubt)
         if message:
             warn_user(message, "outside the bounds")
 

@@ -9,7 +9,7 @@ from sklearn.utils import Bunch
 
 from skthermo._arrays import Array
 from skthermo.fem import check_bounds, check_noise, check_prior
-from skthermo.surrogate._posterior import Objective, Prior
+from skthermo.surrogate._posterior import Local, Objective, Prior
 from skthermo.surrogate._refine import refine
 from skthermo.surrogate._simulator import Simulator
 
@@ -21,6 +21,12 @@ ENOUGH = 365
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, the parameters that fit the
 others lie on a curve, which steps cannot follow if nothing may leave it."""
+
+FARTHEST = 5.0
+"""Largest step of ln theta without the prior; beyond it only its direction matters."""
+
+LARGEST = 0.02
+"""Scatter above which a misfit counts as a wrong model rather than noise."""
 
 ASSUMED = 1e-3
 """Noise on which standard deviations are based where it is neither given nor can be estimated."""
@@ -60,26 +66,39 @@ class Refinement:
         return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs)
 
     def refined(self, frequencies: Array, guess: Array, scatter: Array) -> Bunch:
-        """Parameters, standard deviations given the scatter, residuals and convergence of rows of frequencies.
-
-        A row that does not converge keeps its guess, if it has one, and the standard deviation of the prior.
-        """
+        """What `InverseSurrogate.invert` gives, for rows of frequencies and the regressor's guess."""
         some, gaps = ~np.isnan(frequencies).all(axis=1), np.isnan(frequencies).any(axis=1)
-        theta, std = np.full((2, *guess.shape), np.nan)
-        residuals, converged = np.full(frequencies.shape, np.nan), np.zeros(len(guess), dtype=bool)
-        if some.any():
-            prior, measured = self.prior, np.log(frequencies[some])
-            noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
-            start = np.where(np.isnan(guess[some]), prior.mean, np.log(guess[some]))
-            objective = Objective(partial(self.simulator.linearise, n_jobs=self.n_jobs), measured, noise, prior)
-            sorts = not getattr(self.simulator.model, "track", False)
-            found, done = refine(objective, np.clip(start, prior.lowest, prior.highest), self.n_steps, sorts=sorts)
-            deviations = prior.deviations(found.sensitivity, np.maximum(noise, scatter))
-            theta[some] = np.where(done[:, np.newaxis], np.exp(found.x), guess[some])
-            std[some] = np.where(done[:, np.newaxis], deviations, prior.width) * theta[some]
-            residuals[some] = np.where(np.isnan(measured) | ~done[:, np.newaxis], np.nan, found.residual)
-            converged[some] = done
-        return Bunch(theta=theta, std=std, residuals=residuals, converged=converged, stalled=some & ~converged)
+        result = Bunch(
+            theta=np.full_like(guess, np.nan),
+            std=np.full_like(guess, np.nan),
+            residuals=np.full_like(frequencies, np.nan),
+            weight=np.zeros(len(guess)),
+            converged=np.zeros(len(guess), dtype=bool),
+            likeliest=np.full_like(guess, np.nan),
+            doubt=np.full_like(guess, np.nan),
+        )
+        if not some.any():
+            return result
+        prior, measured, guess = self.prior, np.log(frequencies[some]), guess[some]
+        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
+        start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
+        objective = Objective(partial(self.simulator.linearise, n_jobs=self.n_jobs), measured, noise, prior)
+        sorts = not getattr(self.simulator.model, "track", False)
+        found, converged, stalled = refine(objective, start, self.n_steps, sorts=sorts)
+        lost, complete = stalled[:, np.newaxis], np.maximum(noise, scatter)
+        deviations, at_best = (
+            prior.deviations(found.sensitivity, spread)
+            for spread in (np.where(np.isnan(measured), np.inf, complete), complete)
+        )
+        result.theta[some] = np.where(lost, guess, np.exp(found.x))
+        result.std[some] = np.where(lost, prior.width, deviations) * result.theta[some]
+        result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, found.residual)
+        result.weight[some] = ((at_best / deviations) ** 2).mean(axis=1)
+        result.converged[some] = converged
+        step, result.doubt[some] = without_prior(found, scatter)
+        result.likeliest[some] = np.exp(found.x + step)
+        result.likeliest[gaps] = np.nan
+        return result
 
     def estimated_scatter(self, frequencies: Array, guess: Array) -> Array:
         """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
@@ -93,6 +112,15 @@ class Refinement:
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), ENOUGH)).astype(int))] if rows.size else rows
         scatter = ASSUMED
         if n_modes > n_parameters and len(rows) > n_parameters:
-            residuals = self.refined(frequencies[rows], guess[rows], self.noise).residuals
+            residuals = self.refined(frequencies[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
             scatter = np.sqrt(np.nanvar(residuals, axis=0).sum() / (n_modes - n_parameters))
+            scatter = min(max(scatter, EXACT), LARGEST)
         return np.where(self.noise > 0, self.noise, scatter)
+
+
+def without_prior(found: Local, scatter: Array) -> tuple[Array, Array]:
+    """A Gauss-Newton step of ln theta that leaves the prior out, and standard deviations of where it leads."""
+    weighted = found.sensitivity / scatter[:, np.newaxis]
+    inverse = np.linalg.pinv(np.nan_to_num(weighted))
+    step = (inverse @ (found.residual / scatter)[:, :, np.newaxis])[:, :, 0]
+    return np.clip(step, -FARTHEST, FARTHEST), np.sqrt((inverse**2).sum(axis=2))

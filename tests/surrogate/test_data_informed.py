@@ -84,7 +84,9 @@ def test_gaps_flow_through_fit_predict_and_score():
     model = chain(mapper=mapper(lags=1)).fit(holed_T, holed_F)
     predicted = model.predict(holed_T)
     np.testing.assert_array_equal(predicted.isna().any(axis=1), holed_T.isna().any(axis=1))
-    np.testing.assert_array_equal(model.parameters_.isna().any(axis=1), holed_F.isna().any(axis=1))
+    np.testing.assert_array_equal(model.parameters_.isna().any(axis=1), holed_F.isna().all(axis=1))
+    unrefined = chain(inverse=inverse(refine=0)).fit(holed_T, holed_F)
+    np.testing.assert_array_equal(unrefined.parameters_.isna().any(axis=1), holed_F.isna().any(axis=1))
     assert 0.5 < model.score(holed_T, holed_F) < 1
 
 
