@@ -1,0 +1,187 @@
+"""How exactly the inverse surrogate finds parameters, how well it knows its own errors, and how long it takes to train.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/inversion.py
+
+On the truss (box of 20 %) and on the bridge KW51 (box of 30 %) with modes followed by shape and sorted by frequency.
+"""
+
+import argparse
+import time
+import warnings
+
+import numpy as np
+import pandas as pd
+from sklearn.linear_model import Ridge
+
+from skthermo.datasets import kw51_structure, make_kw51, make_truss
+from skthermo.fem import add_noise, linearise, sample
+from skthermo.surrogate import InverseSurrogate, paper_network
+from skthermo.updating import cramer_rao
+
+EXACT = 1e-5
+NORMAL_90 = 1.645
+FEW_ROWS = 0.1
+"""Share of the rows with a Cramer-Rao deviation within the box up to which they are too few for a mean."""
+MEMBERS = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
+
+
+def models():
+    """FE models, and half-widths of their boxes."""
+    by_rank = kw51_structure().assemble(MEMBERS, n_modes=6)
+    return {
+        "truss": (make_truss(), 0.2),
+        "KW51, tracked": (make_kw51().reduced(0.3, random_state=0), 0.3),
+        "KW51, sorted": (by_rank.reduced(0.3, random_state=0), 0.3),
+    }
+
+
+class Inversion:
+    """Surrogates of one model, and fresh rows of parameters and frequencies to test them on."""
+
+    def __init__(self, model, bounds, options):
+        self.model, self.bounds, self.options = model, bounds, options
+        self.test = sample(model, bounds, options.rows, random_state=1)
+        self.names = list(model.parameter_names)
+
+    def surrogate(self, regressor=None, **settings):
+        """A surrogate, fitted."""
+        settings = {"n_samples": self.options.simulations, "random_state": 0} | settings
+        return InverseSurrogate(self.model, regressor, bounds=self.bounds, **settings).fit()
+
+    def relative_errors(self, inverse):
+        """Errors of theta without noise, (n_rows, n_parameters)."""
+        return np.abs(inverse.predict(self.test.frequencies) / self.test.theta - 1)
+
+    def print_exactness(self):
+        """Rows found exactly, rows that have not converged, and rows that converged elsewhere."""
+        start = time.perf_counter()
+        inverse = self.surrogate()
+        fitted = time.perf_counter()
+        found = inverse.invert(self.test.frequencies)
+        seconds = time.perf_counter() - fitted
+        exact = (np.abs(found.theta / self.test.theta - 1) < EXACT).all(axis=1)
+        wrong = found.converged & ~exact
+        fits = wrong & (found.misfit < EXACT)
+        print(f"rows with every parameter within 0.001 %, at least 99 %: {exact.mean():.1%}")
+        print(f"rows counted as not converged: {(~found.converged).mean():.1%}")
+        print(
+            f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}, of which {fits.sum()} reproduce"
+        )
+        print("  the frequencies to 0.001 %, so that frequencies alone cannot tell them from the true ones")
+        print(f"training {fitted - start:.2f} s, prediction {1e3 * seconds / len(exact):.2f} ms a row")
+
+    def print_calibration(self):
+        """Errors against the Cramer-Rao deviation, and coverage of intervals, with noise and with gaps."""
+        noise, random = self.options.noise, np.random.RandomState(2)
+        inverse = self.surrogate(noise=noise)
+        measured = add_noise(self.test.frequencies, noise, random_state=random)
+        gappy = measured.copy()
+        n_modes = measured.shape[1]
+        for row in gappy:
+            row[random.permutation(n_modes)[: n_modes // 2]] = np.nan
+        table = {}
+        for name, frequencies in (("complete", measured), ("half of the modes missing", gappy)):
+            table |= {(name, title): values for title, values in self.accuracy(inverse, frequencies).items()}
+        print(pd.DataFrame(table, index=self.names).round(3).T.to_string(na_rep="-"))
+
+    def accuracy(self, inverse, frequencies):
+        """Measures of accuracy by parameter."""
+        found = inverse.invert(frequencies)
+        deviations = self.cramer_rao_deviations(frequencies)
+        errors = np.log(found.theta / self.test.theta)
+        informed = pd.DataFrame(deviations < self.bounds)
+        informed &= informed.mean() > FEW_ROWS
+        typical = pd.DataFrame(deviations).where(informed).median()
+        ratios = pd.DataFrame(errors / deviations).where(informed)
+        reported = pd.DataFrame(errors * found.theta / found.std)
+        held = np.abs(found.theta - self.test.theta) < NORMAL_90 * found.std
+        return {
+            "share of rows where the Cramer-Rao deviation is within the box": informed.mean().to_numpy(),
+            "median of that deviation there, %": 100 * typical.to_numpy(),
+            "rms error over that deviation, at most 1.2": rms(ratios),
+            "rms error over the reported deviation": rms(reported),
+            "coverage of 90 % intervals, 0.85 to 0.95": held.mean(axis=0),
+            "share of rows that converged": np.full(len(self.names), found.converged.mean()),
+        }
+
+    def cramer_rao_deviations(self, frequencies):
+        """Least deviations of ln theta at the true parameters, from the modes that are there."""
+        nominal, jacobian = linearise(self.model, self.test.theta)
+        slopes = jacobian * self.test.theta[:, np.newaxis] / nominal[:, :, np.newaxis] / self.options.noise
+        slopes = np.where(np.isnan(frequencies)[:, :, np.newaxis], 0.0, slopes)
+        return np.sqrt([np.diag(cramer_rao(row.T @ row)) for row in slopes])
+
+    def print_time(self):
+        """The paper's network of Table 4 against a linear guess from few simulations that is refined."""
+        seconds, network = timed(lambda: self.surrogate(paper_network("kw51-inverse", **self.options.epochs), refine=0))
+        goal = self.relative_errors(network).mean()
+        predicting, _ = timed(lambda: network.predict(self.test.frequencies))
+        errors = 100 * self.relative_errors(network).mean(axis=0)
+        print("the paper's network (Table 4), 1000 epochs at most, mean errors of the parameters without noise:")
+        print("  " + ", ".join(f"{name} {error:.2f} %" for name, error in zip(self.names, errors, strict=True)))
+        print("  its Table 5 states 0.02 to 0.03 %")
+        print(f"  training {seconds:.1f} s, prediction {1e3 * predicting / self.options.rows:.3f} ms a row")
+        rows = {}
+        for n_samples in self.options.few:
+            for refine in (1, 2, 3, 5, 10, None):
+                rows[n_samples, refine or "default"] = self.refined_guess(n_samples, refine)
+        table = pd.DataFrame(rows, index=["mean error, %", "training, s", "prediction, ms a row", "converged"]).T
+        table.insert(2, "times less", seconds / table["training, s"])
+        table.index.names = ["simulations", "refine"]
+        print("the same from a linear guess (ridge regression in logarithms) that is refined:")
+        print(table.to_string(float_format=lambda value: f"{value:.3g}"))
+        good = table[table["mean error, %"] <= 100 * goal]
+        if good.empty:
+            print("no such guess reaches the network's accuracy")
+            return
+        best = good["training, s"].idxmin()
+        print(f"as accurate as the network ({100 * goal:.2f} %) with {best[0]} simulations and refine={best[1]}:")
+        print(f"  training takes this many times less, at least 100: {good.loc[best, 'times less']:.0f}")
+
+    def refined_guess(self, n_samples, refine):
+        """Mean error, median seconds of training over rounds, milliseconds a prediction, share of converged rows."""
+        ways = [timed(lambda: self.surrogate(Ridge(1e-6), n_samples=n_samples, refine=refine)) for _ in range(5)]
+        predicting, found = timed(lambda: ways[0][1].invert(self.test.frequencies))
+        error = np.abs(found.theta / self.test.theta - 1).mean()
+        training = np.median([seconds for seconds, _ in ways])
+        return [100 * error, training, 1e3 * predicting / len(found.theta), found.converged.mean()]
+
+
+def rms(values):
+    """Root mean square of every column of a frame, without NaN."""
+    return np.sqrt((values**2).mean()).to_numpy()
+
+
+def timed(way):
+    """Seconds that a call takes, and what it gives."""
+    start = time.perf_counter()
+    result = way()
+    return time.perf_counter() - start, result
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--simulations", type=int, default=1000, help="training rows")
+    parser.add_argument("--rows", type=int, default=1000, help="test rows")
+    parser.add_argument("--noise", type=float, default=0.001, help="relative deviation of the noise of frequencies")
+    parser.add_argument("--few", type=int, nargs="+", default=[20, 50, 200, 1000], help="training rows of the guess")
+    parser.add_argument("--epochs", type=int, help="epochs of the paper's network; by default as in the paper")
+    parser.add_argument("--models", nargs="+", default=["truss", "KW51, tracked", "KW51, sorted"])
+    options = parser.parse_args()
+    options.epochs = {} if options.epochs is None else {"max_iter": options.epochs}
+    warnings.filterwarnings("ignore", r".*(did not converge|change their order|hasn't converged)")
+    chosen = {name: value for name, value in models().items() if name in options.models}
+    for name, (model, bounds) in chosen.items():
+        inversion = Inversion(model, bounds, options)
+        print(f"\n{name}, box of {bounds:.0%}, {options.simulations} simulations, {options.rows} test rows")
+        print("\nwithout noise")
+        inversion.print_exactness()
+        print(f"\nwith {options.noise:.1%} noise")
+        inversion.print_calibration()
+        if name == "KW51, tracked":
+            print("\ntime")
+            inversion.print_time()
+
+
+if __name__ == "__main__":
+    main()
