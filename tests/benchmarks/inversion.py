@@ -14,12 +14,13 @@ import pandas as pd
 from sklearn.linear_model import Ridge
 
 from skthermo.datasets import kw51_structure, make_kw51, make_truss
-from skthermo.fem import add_noise, linearise, sample
+from skthermo.fem import add_noise, evaluate, linearise, sample
 from skthermo.surrogate import InverseSurrogate, paper_network
 from skthermo.updating import cramer_rao
 
 EXACT = 1e-5
 NORMAL_90 = 1.645
+FAR = 4
 FEW_ROWS = 0.1
 """Share of the rows with a Cramer-Rao deviation within the box up to which they are too few for a mean."""
 MEMBERS = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
@@ -77,12 +78,26 @@ class Inversion:
             row[random.permutation(n_modes)[: n_modes // 2]] = np.nan
         table = {}
         for name, frequencies in (("complete", measured), ("half of the modes missing", gappy)):
-            table |= {(name, title): values for title, values in self.accuracy(inverse, frequencies).items()}
+            found = inverse.invert(frequencies)
+            table |= {(name, title): values for title, values in self.accuracy(found, frequencies).items()}
+            far = (np.abs(found.theta - self.test.theta) > FAR * found.std).any(axis=1)
+            here, truth = (self.surprise(inverse, theta, frequencies) for theta in (found.theta, self.test.theta))
+            missed = far & (here > truth)
+            print(
+                f"{name}: rows off by more than {FAR} reported deviations in some parameter: {far.sum()} of {len(far)},"
+            )
+            print(f"  of which the true parameters would have been more probable in {missed.sum()}")
         print(pd.DataFrame(table, index=self.names).round(3).T.to_string(na_rep="-"))
 
-    def accuracy(self, inverse, frequencies):
+    def surprise(self, inverse, theta, frequencies):
+        """Minus the logarithm of the posterior density of each row of parameters, up to a constant."""
+        prior = inverse.refinement_.prior
+        misfits = np.log(frequencies / evaluate(self.model, theta)) / self.options.noise
+        distances = (np.log(theta) - prior.mean) / prior.width
+        return np.nansum(misfits**2, axis=1) / 2 + (distances**2).sum(axis=1) / 2
+
+    def accuracy(self, found, frequencies):
         """Measures of accuracy by parameter."""
-        found = inverse.invert(frequencies)
         deviations = self.cramer_rao_deviations(frequencies)
         errors = np.log(found.theta / self.test.theta)
         informed = pd.DataFrame(deviations < self.bounds)
