@@ -191,7 +191,7 @@ def main():
     parser.add_argument("--epochs", type=int, default=1000, help="epochs of the paper's network")
     parser.add_argument("--models", nargs="+", default=["truss", "KW51, tracked", "KW51, sorted"])
     options = parser.parse_args()
-    warnings.filterwarnings("ignore", r".*(did not converge|change their order|hasn't converged)")
+    warnings.filterwarnings("ignore", r".*(did not converge|change their order|hasn't converged|was reduced)")
     chosen = {name: value for name, value in models().items() if name in options.models}
     for name, (model, bounds) in chosen.items():
         inversion = Inversion(model, bounds, options)

@@ -178,7 +178,7 @@ def main():
     options = parser.parse_args()
     if options.data is None:
         parser.error("no data: pass the path of z24_monitoring.csv or of its folder, or set SKTHERMO_DATA")
-    warnings.filterwarnings("ignore", r".*(far outside|changes their order|not converge|outside the box)")
+    warnings.filterwarnings("ignore", r".*(far outside|change their order|did not converge|outside the box)")
     records = Records(Path(options.data))
     print_time(records)
     print_tenths(records)
