@@ -62,9 +62,9 @@ class Inversion:
         print(f"rows with every parameter within 0.001 %, at least 99 %: {exact.mean():.1%}")
         print(f"rows counted as not converged: {(~found.converged).mean():.1%}")
         print(
-            f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}, of which {fits.sum()} reproduce"
+            f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}; {fits.sum()} of them reproduce the"
         )
-        print("  the frequencies to 0.001 %, so that frequencies alone cannot tell them from the true ones")
+        print("  frequencies to 0.001 %, so that frequencies alone cannot tell them from the true ones")
         print(f"training {fitted - start:.2f} s, prediction {1e3 * seconds / len(exact):.2f} ms a row")
 
     def print_calibration(self):
@@ -80,14 +80,18 @@ class Inversion:
         for name, frequencies in (("complete", measured), ("half of the modes missing", gappy)):
             found = inverse.invert(frequencies)
             table |= {(name, title): values for title, values in self.accuracy(found, frequencies).items()}
-            far = (np.abs(found.theta - self.test.theta) > FAR * found.std).any(axis=1)
+            far = self.far(found)
             here, truth = (self.surprise(inverse, theta, frequencies) for theta in (found.theta, self.test.theta))
             missed = far & (here > truth)
             print(
-                f"{name}: rows off by more than {FAR} reported deviations in some parameter: {far.sum()} of {len(far)},"
+                f"{name}: rows with a parameter off by more than {FAR} reported deviations: {far.sum()} of {len(far)};"
             )
-            print(f"  of which the true parameters would have been more probable in {missed.sum()}")
+            print(f"  in {missed.sum()} of them the true parameters are more probable than those found")
         print(pd.DataFrame(table, index=self.names).round(3).T.to_string(na_rep="-"))
+
+    def far(self, found):
+        """Which rows are off by many reported deviations in some parameter."""
+        return (np.abs(found.theta - self.test.theta) > FAR * found.std).any(axis=1)
 
     def surprise(self, inverse, theta, frequencies):
         """Minus the logarithm of the posterior density of each row of parameters, up to a constant."""
@@ -98,7 +102,7 @@ class Inversion:
 
     def accuracy(self, found, frequencies):
         """Measures of accuracy by parameter."""
-        deviations = self.cramer_rao_deviations(frequencies)
+        deviations, far = self.cramer_rao_deviations(frequencies), self.far(found)
         errors = np.log(found.theta / self.test.theta)
         informed = pd.DataFrame(deviations < self.bounds)
         informed &= informed.mean() > FEW_ROWS
@@ -110,6 +114,7 @@ class Inversion:
             "share of rows where the Cramer-Rao deviation is within the box": informed.mean().to_numpy(),
             "median of that deviation there, %": 100 * typical.to_numpy(),
             "rms error over that deviation, at most 1.2": rms(ratios),
+            f"the same without rows off by more than {FAR} reported deviations": rms(ratios[~far]),
             "rms error over the reported deviation": rms(reported),
             "coverage of 90 % intervals, 0.85 to 0.95": held.mean(axis=0),
             "share of rows that converged": np.full(len(self.names), found.converged.mean()),
