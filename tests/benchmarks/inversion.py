@@ -61,10 +61,8 @@ class Inversion:
         fits = wrong & (found.misfit < EXACT)
         print(f"rows with every parameter within 0.001 %, at least 99 %: {exact.mean():.1%}")
         print(f"rows counted as not converged: {(~found.converged).mean():.1%}")
-        print(
-            f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}; {fits.sum()} of them reproduce the"
-        )
-        print("  frequencies to 0.001 %, so that frequencies alone cannot tell them from the true ones")
+        print(f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}; {fits.sum()} of them reproduce")
+        print("  the frequencies to 0.001 %, so that frequencies alone cannot tell them from the true ones")
         print(f"training {fitted - start:.2f} s, prediction {1e3 * seconds / len(exact):.2f} ms a row")
 
     def print_calibration(self):
