@@ -21,6 +21,7 @@ import argparse
 import os
 import time
 import warnings
+from collections import namedtuple
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,17 +61,8 @@ STYLES = {
     "Gaussian process": ("#E69F00", "P"),
     "boosting": ("#777777", "X"),
 }
-
-
-class Size(NamedTuple):
-    """Numbers of simulations, of fresh rows, and of days in a made-up year."""
-
-    simulations: int = 1000
-    fresh: int = 500
-    days: int = 365
-
-
-SMALL = Size(simulations=200, fresh=50, days=180)
+Size = namedtuple("Size", "simulations fresh days")  # rows to learn M1 from and to test it on; days of made-up weather
+FULL, SMALL = Size(1000, 500, 365), Size(200, 50, 180)
 
 
 class FewRows(GaussianProcessRegressor):
@@ -113,7 +105,7 @@ def timed(function: Callable, *arguments) -> tuple[Any, float]:
 
 
 def inverse_results(model, bounds, network, noise, seed, size=SMALL):
-    """Errors in percent, and times, of every regressor as the inverse surrogate: a row each."""
+    """Mean absolute error of ln theta in percent, and times, of every regressor as the inverse surrogate."""
     drawn = sample(model, bounds, size.simulations, random_state=seed)
     fresh = sample(model, bounds, size.fresh, random_state=1000 + seed)
     learned = add_noise(drawn.frequencies, noise, random_state=seed)
@@ -127,19 +119,14 @@ def inverse_results(model, bounds, network, noise, seed, size=SMALL):
         guess, guessing = timed(plain.predict, measured)
         found, refining = timed(refined.invert, measured)
         rows[name] = {
-            "error": error(guess, fresh.theta),
-            "refined": error(found.theta, fresh.theta),
+            "error": 100 * np.abs(np.log(guess / fresh.theta)).mean(),
+            "refined": 100 * np.abs(np.log(found.theta / fresh.theta)).mean(),
             "converged": 100 * found.converged.mean(),
             "training, s": training,
             "prediction, ms": 1e6 * guessing / size.fresh,
             "refined, ms": 1e6 * refining / size.fresh,
         }
     return pd.DataFrame(rows).T.rename_axis("regressor")
-
-
-def error(found, truth):
-    """Mean absolute error of ln theta over rows and parameters, in percent."""
-    return 100 * np.abs(np.log(found / truth)).mean()
 
 
 class Campaign(NamedTuple):
@@ -168,8 +155,7 @@ def weather(days, seed):
     random = np.random.default_rng(seed)
     day = np.arange(4 * days) / 4
     spell = lfilter([1], [1, -0.95], random.normal(0, 3.5 * np.sqrt(1 - 0.95**2), len(day)))
-    season = 11 - 9 * np.cos(2 * np.pi * day / days)
-    return pd.DataFrame({"steel": season + spell - 4 * np.cos(2 * np.pi * day)})
+    return pd.DataFrame({"steel": 11 - 9 * np.cos(2 * np.pi * day / days) + spell - 4 * np.cos(2 * np.pi * day)})
 
 
 def kw51_parameters(T):
@@ -233,7 +219,7 @@ def beyond(predict, T, sign):
 
 
 def mapper_results(campaign, seed):
-    """Errors in percent, times and behaviour beyond the data of every regressor as the mapper: a row each."""
+    """Errors in percent, times, and behaviour beyond the data of every regressor as the temperature mapper."""
     chain, (T, _), (T_test, F_test) = Chain(campaign, seed), campaign.train, campaign.test
     rows = {}
     for name, regressor in regressors(campaign.network).items():
@@ -253,7 +239,7 @@ def mapper_results(campaign, seed):
 def limits(campaign):
     """What the results compare with, in percent: the range of the training data and, where it is known, the truth."""
     (T, F), law = campaign.train, campaign.law
-    spread = (100 * (F.quantile(0.99) - F.quantile(0.01)) / F.mean()).max()
+    spread = 100 * ((F.quantile(0.99) - F.quantile(0.01)) / F.mean()).max()
     print(f"The middle 98 % of the training records span {spread:.1f} % of the mean in the mode that varies most.")
     if law is not None:
         best = Chain(campaign, seed=0).inverse.invert(campaign.test[1]).theta
@@ -307,15 +293,16 @@ def plot_beyond(campaign, seed):
         colour, marker = STYLES[name]
         curve = chain.fit(regressor)(grid)[:, mode]
         ax.plot(grid, curve, color=colour, marker=marker, markevery=10, ms=5, lw=1.2, label=name)
-    ax.set(xlabel="temperature of the steel (°C); shaded: of the training records", ylabel=f"$f_{mode + 1}$ (Hz)")
+    ax.set(
+        xlabel="temperature of the steel (°C); shaded: the range of the training records", ylabel=f"$f_{mode + 1}$ (Hz)"
+    )
     ax.legend(ncols=2)
     return fig
 
 
 def find(path):
-    """The file of Z24's data at a path, or None."""
-    files = [] if path is None else [path, *(path / name for name in Z24_FILES)]
-    return next((file for file in files if file.is_file()), None)
+    """The file of Z24's data at a path, a file or a folder, or None."""
+    return next((file for file in (path, *(path / name for name in Z24_FILES)) if file.is_file()), None)
 
 
 def main():
@@ -325,7 +312,7 @@ def main():
     parser.add_argument("--small", action="store_true", help="few simulations and records, to see that all works")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
     options = parser.parse_args()
-    size, seeds = SMALL if options.small else Size(), range(options.seeds)
+    size, seeds = SMALL if options.small else FULL, range(options.seeds)
     warnings.filterwarnings("ignore")  # of optimisers that stop early, and of foreign weather, which is the point here
 
     models, inverse = structures(), {}
@@ -341,7 +328,7 @@ def main():
         "truss": lambda seed: truss_campaign(seed, size),
         "KW51": lambda seed: kw51_campaign(models["KW51"][0], seed, size),
     }
-    if file := find(options.data and Path(options.data)):
+    if file := options.data and find(Path(options.data)):
         makers["Z24"] = lambda seed: z24_campaign(models["Z24"][0], file)
     else:
         print("No data of Z24: its part of M2 is left out. Pass the file or folder, or set SKTHERMO_DATA.\n")
