@@ -1,0 +1,95 @@
+"""Laws of the study of regressors, at its smallest size."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from tests.examples.frozen_bridge import frozen_bridge
+
+pytest.importorskip("matplotlib").use("Agg")
+
+PATH = Path(__file__).parents[2] / "examples" / "plot_regressors.py"
+SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
+EXAMPLE = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(EXAMPLE)
+SIZE = EXAMPLE.Size(simulations=100, fresh=20, days=60)
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::sklearn.exceptions.ConvergenceWarning",
+    "ignore:Got `batch_size` less than 1 or larger",
+    r"ignore:\d+ of \d+ (theta are outside|rows have temperatures far outside)",
+)
+
+
+@pytest.fixture(scope="module")
+def models():
+    return EXAMPLE.structures()
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return EXAMPLE.truss_campaign(0, SIZE)
+
+
+@pytest.fixture(scope="module")
+def chain(campaign):
+    return EXAMPLE.Chain(campaign, seed=0)
+
+
+@pytest.mark.parametrize("name", ["truss", "KW51", "Z24"])
+def test_refining_makes_every_inverse_exact(models, name):
+    table = EXAMPLE.inverse_results(*models[name], noise=0.0, seed=0, size=SIZE)
+    assert list(table.index) == list(EXAMPLE.STYLES)
+    assert table.notna().all(axis=None)
+    assert (table["converged"] == 100).all()
+    assert (table["refined"] < 1e-3).all()
+    assert (table["refined"] < table["error"] / 100).all()
+
+
+def test_with_noise_all_inverses_end_at_the_same_estimate(models):
+    table = EXAMPLE.inverse_results(*models["Z24"], noise=0.005, seed=0, size=SIZE)
+    np.testing.assert_allclose(table["refined"], table["refined"].mean(), rtol=5e-3)
+    assert table["error"].std() > 0.1
+
+
+def test_the_chain_by_its_parts_is_the_chain(campaign, chain):
+    regressor = EXAMPLE.regressors("truss")["broken lines"]
+    whole = DataInformedFEM(
+        campaign.model, inverse=chain.inverse, mapper=TemperatureMapper(regressor), weighted=False, random_state=0
+    )
+    T, later = campaign.train[0], campaign.test[0]
+    whole.fit(*campaign.train)
+    np.testing.assert_allclose(chain.fit(regressor)(later), whole.predict(later), rtol=1e-6)
+    np.testing.assert_allclose(chain.fit(regressor)(T), whole.predict(T), rtol=1e-6)
+
+
+def test_trees_stay_at_their_last_value_and_lines_go_on(campaign, chain):
+    T, found = campaign.train[0], EXAMPLE.regressors("truss")
+    changes = {name: EXAMPLE.beyond(chain.fit(found[name]), T, -1) for name in ("random forest", "broken lines")}
+    assert EXAMPLE.beyond(campaign.law, T, -1) > 5
+    assert changes["random forest"] < 2 < changes["broken lines"]
+
+
+def test_mappers_have_complete_tables(models, tmp_path):
+    path = tmp_path / "z24_monitoring.csv"
+    frozen_bridge(n_healthy=100, n_damaged=20).to_csv(path, index=False)
+    assert EXAMPLE.find(tmp_path) == path
+    assert EXAMPLE.find(tmp_path / "elsewhere") is None
+    for campaign in (
+        EXAMPLE.kw51_campaign(models["KW51"][0], 0, EXAMPLE.Size(100, 20, 20)),
+        EXAMPLE.z24_campaign(models["Z24"][0], path),
+    ):
+        table = EXAMPLE.averaged([EXAMPLE.mapper_results(campaign, seed=0)])
+        assert list(table.index) == list(EXAMPLE.STYLES)
+        assert np.isfinite(table).all(axis=None)
+        assert (table["± over seeds"] == 0).all()
+
+
+def test_frost_stiffens_the_first_parameter():
+    theta = EXAMPLE.kw51_parameters([[-10.0], [11.0], [21.0]])
+    np.testing.assert_allclose(theta[1], 1)
+    np.testing.assert_allclose(theta[2], 0.996)
+    np.testing.assert_allclose(theta[0], [1.0584, 1.0084, 1.0084, 1.0084, 1.0084])
