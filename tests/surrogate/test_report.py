@@ -65,7 +65,9 @@ class TestTheReport:
         air, measured = T.copy(), F.copy()
         air.iloc[5:8, 1] = np.nan
         measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
-        report = chain(mapper=make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))).fit(air, measured).report_
+        lagged = make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))
+        assert chain(mapper=lagged).fit(air, measured).report_.n_trained == 365 - 3 - 1
+        report = chain(inverse=InverseSurrogate(refine=0), mapper=lagged).fit(air, measured).report_
         assert report.left_out.to_dict() == {
             "temperature 'T2' is missing": 3,
             "frequency 'f4' is missing": 2,
