@@ -21,7 +21,7 @@ TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 NOMINAL = TRUSS.frequencies(np.ones((1, 4)))[0]
-INVERSE = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=100, random_state=0)
+INVERSE = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=100, noise=0.01, random_state=0)
 CHAIN = DataInformedFEM(TRUSS, inverse=INVERSE, mapper=TemperatureMapper(Ridge()), aligner=BiasAligner(NOMINAL))
 
 CASES = [

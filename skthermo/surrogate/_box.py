@@ -37,16 +37,10 @@ class Box:
         """Which parameters of each row are not even near the box; NaN is not."""
         return _beyond(theta, self.near)
 
-    def warning(self, theta: Array, doubt: Array | float = 0.0) -> str:
-        """Text of the warning if many rows are far outside the box, else an empty string.
-
-        A row counts if two standard deviations of ln theta, its doubt, do not bring it back.
-        """
+    def warning(self, theta: Array, far: NDArray[np.bool_]) -> str:
+        """Text of the warning if parameters are far outside the box in many rows, else an empty string."""
         known = ~np.isnan(theta).any(axis=1)
-        lowest, highest = self.near.T
-        with np.errstate(over="ignore"):
-            reach = np.exp(2 * np.asarray(doubt))
-            far = ((theta * reach < lowest) | (theta / reach > highest))[known]
+        far = far[known]
         rows = far.any(axis=1)
         if not rows.size or rows.mean() <= MANY:
             return ""
@@ -56,8 +50,8 @@ class Box:
         return (
             f"{rows.sum()} of {rows.size} rows give parameters far outside the bounds that the inverse was trained in: "
             f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, trained in "
-            f"{lowest:.6g} to {highest:.6g}; expected frequencies in Hz in the order of the model's modes, or wider "
-            "bounds"
+            f"{lowest:.6g} to {highest:.6g}; expected frequencies in Hz in the order of the model's modes, wider "
+            "bounds, or the noise of the measurement"
         )
 
 

@@ -93,7 +93,9 @@ class ChainSteps:
         self.inverse_.fit(aligned)
         last = refining_step(self.inverse_)
         if last is not None:
-            inputs = aligned if last is self.inverse_ else self.inverse_[:-1].transform(aligned)
+            inputs = aligned
+            for _, step in getattr(self.inverse_, "steps", [])[:-1]:
+                inputs = step.transform(inputs)
             found = last.invert(inputs)
             last.warn_of(found)
             return as_floats(found.theta), found.residuals, found.weight if self.weighted else None

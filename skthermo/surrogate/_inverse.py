@@ -56,7 +56,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     refine : int, optional
         Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row,
         until the model has the measured frequencies (or, with ``noise``, until the posterior is largest). Rows with
-        some modes missing are estimated from the others. By default 40 for a model that gives exact derivatives
+        some modes missing are estimated from the others. By default 100 for a model that gives exact derivatives
         (``linearised`` or ``jacobian``), else 0. With a number above 0, other models are differentiated by central
         differences: 2 n_parameters + 1 solutions a step and row.
     prior : float, array-like of shape (n_parameters,) or mapping, optional
@@ -248,8 +248,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
             the box.
         """
         theta = self._predict_arrays(X)[0]
-        if not self.n_steps_:
-            self._warn_of_box(theta)
+        if not self.n_steps_ and self.box_ is not None:
+            self._warn_of_box(theta, self.box_.far_outside(theta))
         return frame_like(X, theta, self.get_feature_names_out())
 
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:

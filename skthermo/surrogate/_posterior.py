@@ -111,11 +111,12 @@ class Local:
             matrix = damped * (free[:, :, np.newaxis] & free[:, np.newaxis])
             matrix += np.eye(n_parameters) * (held * diagonal)[:, np.newaxis]
             step = np.where(held, fixed, np.linalg.solve(matrix, np.where(free, pull, 0.0)[:, :, np.newaxis])[:, :, 0])
-            reached = np.clip(self.x + step, prior.lowest, prior.highest) - self.x
-            beyond = free & (reached != step)
+            there = self.x + step
+            beyond = free & ((there < prior.lowest) | (there > prior.highest))
             if not beyond.any():
                 break
-            held, fixed = held | beyond, np.where(beyond, reached, fixed)
+            at_limit = np.clip(there, prior.lowest, prior.highest) - self.x
+            held, fixed = held | beyond, np.where(beyond, at_limit, fixed)
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
         return np.clip(self.x + step, prior.lowest, prior.highest) - self.x

@@ -9,10 +9,10 @@ from skthermo.surrogate._posterior import Local, Objective
 SMALL_STEP = 1e-6
 """A Gauss-Newton step of ln theta below which a row has converged."""
 
-SMALL_SHARE = 1e-4
+SMALL_SHARE = 1e-3
 """The same as a share of the posterior standard deviation."""
 
-SMALL_GAIN = 1e-8
+SMALL_GAIN = 1e-10
 """The share of the objective that a Gauss-Newton step would gain, below which rounding errors hide it."""
 
 FIRST_DAMPING, LAST_DAMPING = 1e-4, 1e8

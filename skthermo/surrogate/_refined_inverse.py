@@ -46,8 +46,8 @@ class RefinedInverse(MultiplierRegressor):
               complete rows and 0 in rows without any mode;
             - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
               they have reached; rows that have stalled keep the regressor's estimate;
-            - ``likeliest`` and ``doubt`` (n_samples, n_parameters): multipliers after one more Gauss-Newton step that
-              leaves the prior out, and standard deviations of their logarithms; NaN in rows where a mode is missing.
+            - ``outside`` (n_samples, n_parameters): whether a parameter contradicts the prior: farther from the middle
+              of the bounds than their whole width, and by more than its uncertainty explains.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class RefinedInverse(MultiplierRegressor):
         >>> inverse = InverseSurrogate(model, bounds=0.2, noise=0.001, random_state=0).fit()
         >>> found = inverse.invert(model.frequencies([[0.95, 1.05, 0.9, 1.0]]))
         >>> found.theta.round(3), found.std.round(3)
-        (array([[0.951, 1.048, 0.9  , 0.986]]), array([[0.006, 0.008, 0.002, 0.087]]))
+        (array([[0.95 , 1.05 , 0.9  , 0.988]]), array([[0.006, 0.008, 0.002, 0.093]]))
         """
         check_is_fitted(self)
         if not self.n_steps_:
@@ -91,10 +91,10 @@ class RefinedInverse(MultiplierRegressor):
                 "they keep what they reached, or the regressor's estimate",
                 "not converged",
             )
-        self._warn_of_box(found.likeliest, found.doubt)
+        self._warn_of_box(theta, found.outside)
 
-    def _warn_of_box(self, theta: Array, doubt: Array | float = 0.0) -> None:
-        message = "" if self.box_ is None else self.box_.warning(theta, doubt)
+    def _warn_of_box(self, theta: Array, far: NDArray[np.bool_]) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta, far)
         if message:
             warn_user(message, "outside the bounds")
 

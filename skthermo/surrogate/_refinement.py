@@ -5,15 +5,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._arrays import Array
 from skthermo.fem import check_bounds, check_noise, check_prior
-from skthermo.surrogate._posterior import Local, Objective, Prior
+from skthermo.surrogate._posterior import Objective, Prior
 from skthermo.surrogate._refine import refine
 from skthermo.surrogate._simulator import Simulator
 
-DEFAULT_STEPS = 40
+DEFAULT_STEPS = 100
 
 ENOUGH = 365
 """Number of records that an estimate of their scatter needs at most."""
@@ -22,8 +23,8 @@ EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, the parameters that fit the
 others lie on a curve, which steps cannot follow if nothing may leave it."""
 
-FARTHEST = 5.0
-"""Largest step of ln theta without the prior; beyond it only its direction matters."""
+FAR, TINY = 2 * np.sqrt(3), 1e-12
+"""Prior's standard deviations that are two half-widths of a box, beyond which parameters are far outside it."""
 
 LARGEST = 0.02
 """Scatter above which a misfit counts as a wrong model rather than noise."""
@@ -74,8 +75,7 @@ class Refinement:
             residuals=np.full_like(frequencies, np.nan),
             weight=np.zeros(len(guess)),
             converged=np.zeros(len(guess), dtype=bool),
-            likeliest=np.full_like(guess, np.nan),
-            doubt=np.full_like(guess, np.nan),
+            outside=np.zeros(guess.shape, dtype=bool),
         )
         if not some.any():
             return result
@@ -95,10 +95,18 @@ class Refinement:
         result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, found.residual)
         result.weight[some] = ((at_best / deviations) ** 2).mean(axis=1)
         result.converged[some] = converged
-        step, result.doubt[some] = without_prior(found, scatter)
-        result.likeliest[some] = np.exp(found.x + step)
-        result.likeliest[gaps] = np.nan
+        result.outside[some] = self._contradicts(found.x, deviations)
         return result
+
+    def _contradicts(self, x: Array, deviations: Array) -> NDArray[np.bool_]:
+        """Whether ln theta is farther from the prior's mean than data from the prior can bring it.
+
+        The share of the prior's variance that a row explains is 1 - (deviation / width)^2. The variance of posterior
+        modes is that share of the prior's; the variance of exact inversions is the prior's over that share.
+        """
+        explained = np.maximum(1 - (deviations / self.prior.width) ** 2, TINY)
+        expected = self.prior.width * (np.sqrt(explained) if self.noise.all() else 1 / np.sqrt(explained))
+        return np.abs(x - self.prior.mean) > FAR * expected
 
     def estimated_scatter(self, frequencies: Array, guess: Array) -> Array:
         """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
@@ -111,16 +119,10 @@ class Refinement:
         rows = np.flatnonzero(~np.isnan(frequencies).any(axis=1))
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), ENOUGH)).astype(int))] if rows.size else rows
         scatter = ASSUMED
-        if n_modes > n_parameters and len(rows) > n_parameters:
+        if n_modes > n_parameters and rows.size:
             residuals = self.refined(frequencies[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
-            scatter = np.sqrt(np.nanvar(residuals, axis=0).sum() / (n_modes - n_parameters))
-            scatter = min(max(scatter, EXACT), LARGEST)
+            residuals = residuals[~np.isnan(residuals).any(axis=1)]
+            if len(residuals) > n_parameters:
+                estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))
+                scatter = min(max(estimate, EXACT), LARGEST)
         return np.where(self.noise > 0, self.noise, scatter)
-
-
-def without_prior(found: Local, scatter: Array) -> tuple[Array, Array]:
-    """A Gauss-Newton step of ln theta that leaves the prior out, and standard deviations of where it leads."""
-    weighted = found.sensitivity / scatter[:, np.newaxis]
-    inverse = np.linalg.pinv(np.nan_to_num(weighted))
-    step = (inverse @ (found.residual / scatter)[:, :, np.newaxis])[:, :, 0]
-    return np.clip(step, -FARTHEST, FARTHEST), np.sqrt((inverse**2).sum(axis=2))

@@ -36,11 +36,13 @@ def test_tables_2_and_3(tables):
 
 
 def test_oracle_bounds_what_is_learned(tables):
-    mapes, rates = tables
-    mean = mapes.groupby("source").mean().mean(axis=1)
-    assert 1.128 < mean["oracle"] < mean["informed"]
-    gaps = rates.sub(rates["thermo"], axis=0).abs().mean()
-    assert gaps["oracle"] < gaps["informed"]
+    """No parameters fit the truth better in each row; noise hides most of the difference."""
+    study = STUDY.Study(0)
+    truth, *fitted = (model.frequencies(theta) for model, theta in study.sources(study.unseen).values())
+    informed, oracle = (np.sqrt(np.mean((frequencies / truth - 1) ** 2)) for frequencies in fitted)
+    assert 0.003 < oracle < informed < 1.3 * oracle
+    mean = tables[0].groupby("source").mean().mean(axis=1)
+    assert mean.to_numpy() == pytest.approx(1.2, abs=0.03)
 
 
 def test_minimum_detectable_damage_is_the_same_for_simulated_weather(tables):

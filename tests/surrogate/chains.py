@@ -15,7 +15,9 @@ T, F = YEAR.temperatures, YEAR.frequencies
 
 def inverse(**options):
     quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    return InverseSurrogate(TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "random_state": 3} | options))
+    return InverseSurrogate(
+        TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "noise": 0.01, "random_state": 3} | options)
+    )
 
 
 def mapper(lags=2):
