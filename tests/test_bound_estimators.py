@@ -87,8 +87,9 @@ class TestLaws:
         fitted = clone(estimator).fit(*data)
         whole = getattr(fitted, method)(data[0])
         shuffled = data[0].sample(frac=1, random_state=0)
-        np.testing.assert_allclose(getattr(fitted, method)(shuffled), whole.loc[shuffled.index], rtol=1e-12)
-        np.testing.assert_allclose(getattr(fitted, method)(data[0].iloc[:1]), whole.iloc[:1], rtol=1e-12)
+        rtol = 1e-10  # rounding errors of one row and of many differ, and steps of a refinement carry them on
+        np.testing.assert_allclose(getattr(fitted, method)(shuffled), whole.loc[shuffled.index], rtol=rtol)
+        np.testing.assert_allclose(getattr(fitted, method)(data[0].iloc[:1]), whole.iloc[:1], rtol=rtol)
 
     def test_read_only_input_serves(self, estimator, data, method):
         arrays = [table.to_numpy(copy=True) for table in data]

@@ -13,11 +13,15 @@ from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
+from skthermo.surrogate._refined_inverse import unconverged
 from skthermo.surrogate._report import fit_report, spread_rows
 from skthermo.surrogate._simulator import Simulator, tolerance
 
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
+
+NOT_NOISE = 6.0
+"""Standard deviations of the noise beyond which a residual is that of a wrong model or a wrong record."""
 
 POSSIBLE = (1e-6, 1e6)
 """Range of multipliers; outside it rounding errors swamp the model's matrices."""
@@ -76,7 +80,9 @@ class ChainSteps:
         self.simulator_ = self._simulator(learned)
         predicted = self.simulator_.frequencies(learned[rows], self.n_jobs, warn=False)
         predicted = as_floats(self.aligner_.inverse_transform(predicted))
-        self.report_ = fit_report(self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted)
+        self.report_ = fit_report(
+            self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted, self._n_unconverged
+        )
         warn_each(self.report_.warnings())
 
     def _completed(self, T: Any, F: Any) -> Any:
@@ -91,13 +97,14 @@ class ChainSteps:
         """Fit aligner and M1: parameters of the training data, residuals and weights where they are refined."""
         aligned = self.aligner_.fit(F).transform(F)
         self.inverse_.fit(aligned)
-        last = refining_step(self.inverse_)
+        last, self._n_unconverged = refining_step(self.inverse_), None
         if last is not None:
             inputs = aligned
             for _, step in getattr(self.inverse_, "steps", [])[:-1]:
                 inputs = step.transform(inputs)
             found = last.invert(inputs)
             last.warn_of(found)
+            self._n_unconverged = int(unconverged(found).sum())
             return as_floats(found.theta), found.residuals, found.weight if self.weighted else None
         theta = as_floats(self.inverse_.transform(aligned))
         if theta.shape[1] != len(self.parameter_names_):
@@ -116,6 +123,7 @@ class ChainSteps:
             sensitivities = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
             if sensitivities is not None:
                 weighted = np.nan_to_num(residuals / last.scatter_)
+                weighted[np.abs(weighted).max(axis=1) > NOT_NOISE] = 0.0
                 theta = theta * np.exp(weighted @ np.linalg.pinv(sensitivities).T)
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta

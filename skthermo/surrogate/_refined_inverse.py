@@ -14,6 +14,14 @@ from skthermo.surrogate._box import Box
 from skthermo.surrogate._refinement import DEFAULT_STEPS, Refinement
 from skthermo.surrogate._regression import MultiplierRegressor
 
+MANY_UNCONVERGED = 0.01
+"""Share of rows that have not converged above which a warning is given; the report of a chain always counts them."""
+
+
+def unconverged(found: Bunch) -> NDArray[np.bool_]:
+    """Rows with frequencies whose refinement has not converged."""
+    return ~found.converged & (found.weight > 0)
+
 
 class RefinedInverse(MultiplierRegressor):
     """Methods of `InverseSurrogate` that refine estimates, and their private steps."""
@@ -76,7 +84,7 @@ class RefinedInverse(MultiplierRegressor):
         return found
 
     def warn_of(self, found: Bunch) -> None:
-        """Warn of rows that have not converged, and if many are far outside the bounds.
+        """Warn if many rows have not converged or are far outside the bounds.
 
         Parameters
         ----------
@@ -84,8 +92,8 @@ class RefinedInverse(MultiplierRegressor):
             What `invert` has given.
         """
         theta = as_floats(found.theta)
-        rows = np.flatnonzero(~found.converged & (found.weight > 0))
-        if rows.size:
+        rows = np.flatnonzero(unconverged(found))
+        if rows.size > MANY_UNCONVERGED * len(theta):
             warn_user(
                 f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
                 "they keep what they reached, or the regressor's estimate",

@@ -53,6 +53,8 @@ class FitReport:
         Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
         from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
         determine a parameter.
+    n_unconverged : int or None
+        Rows whose parameters have not converged in refining; None without refining.
     errors : DataFrame
         MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
     n_scored : int
@@ -78,6 +80,7 @@ class FitReport:
     deviations: pd.Series
     errors: pd.DataFrame
     n_scored: int
+    n_unconverged: int | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -92,6 +95,8 @@ class FitReport:
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
+        if self.n_unconverged:
+            lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
 
     def _modes(self) -> pd.DataFrame:
@@ -133,6 +138,7 @@ def fit_report(
     box: Box | None,
     rows: NDArray[np.intp],
     predicted: Array,
+    n_unconverged: int | None,
 ) -> FitReport:
     """The report of a fit, from its records, estimates and the frequencies predicted for some rows."""
     names = list(model.parameter_names)
@@ -152,6 +158,7 @@ def fit_report(
         deviations=pd.Series(smallest_deviations(model, theta[known], scatter), index=names),
         errors=pd.DataFrame(errors, index=column_names(F, "f")),
         n_scored=len(rows),
+        n_unconverged=n_unconverged,
     )
 
 
