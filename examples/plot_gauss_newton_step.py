@@ -4,10 +4,13 @@ A Gauss-Newton step between the stages
 
 Each stage of the method can be used alone, and you may change its result before the next stage. As an example, the
 inverse surrogate's own refinement is switched off with ``refine=0``; its estimates are improved by one Gauss-Newton
-step on the FE model's frequencies and derivatives, and the temperature mapper learns from the improved parameters. By
-default the surrogate does this itself, until the steps converge, and the last line that is printed compares with it.
-No parameters can remove the misfit that is left after a second step: the six modes are noisy, and temperature acts on
-zones that cut across the model's four parameters.
+step on the FE model's frequencies and derivatives, and the temperature mapper learns from the improved parameters. A
+second step changes little: the misfit that is left is noise, and the effect of temperature on zones that cut across the
+model's four parameters.
+
+You need not do this. By default the surrogate takes such steps itself until they converge, and the mapper learns the
+result in coordinates of frequencies, without the part that the prior keeps back. The last line that is printed compares
+with it.
 
 Run it with ``python examples/plot_gauss_newton_step.py``; the figure goes to the folder ``figures``.
 """

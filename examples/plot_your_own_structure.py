@@ -5,8 +5,8 @@ Your own structure: from a logger's file to a fitted chain
 A tower is logged every half hour for a month: two temperatures and seven frequencies, with time stamps that are not
 round, one stamp that goes back, and gaps of hours and days. Here the log becomes tidy frames, a tower of beams on
 rocking springs is updated to the mean frequencies and learns the effect of temperature, predictions get intervals, and
-typical defects of records are introduced on purpose. The measured modes are not identified: they are paired with those of the model by frequency
-alone, one of them with a vertical mode.
+typical defects of records are introduced on purpose. The measured modes are not identified: they are paired with those
+of the model by frequency alone, one of them with a vertical mode.
 
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``, or set ``SKTHERMO_DATA`` to
 the folder that holds ``tower/tower.csv``. Without either it makes a synthetic log with the same defects. The log has
@@ -102,10 +102,7 @@ def update(F):
 
 
 def chain(model, *, lags=LAGS, bounds=0.3):
-    """An inverse whose guess is quadratic, ridge on lagged temperatures, frequencies aligned to the model by their means.
-
-    The inverse refines its guess on the model: given the scatter of a record, to the most probable parameters.
-    """
+    """Quadratic inverse, refined on the model; ridge on lagged temperatures; frequencies aligned by their means."""
     quadratic = make_pipeline(PolynomialFeatures(2), LinearRegression())
     return DataInformedFEM(
         model,
@@ -137,7 +134,7 @@ def hold_out_table(fem, T, F, n_train):
 def share_held(fem, T, F):
     """Share of the measured frequencies that are within their 90 % intervals, where both are known."""
     lowest, highest = quietly(fem.predict_interval, T)
-    held = (F > lowest) & (F < highest)
+    held = F.gt(lowest) & F.lt(highest)
     return held.to_numpy()[(F.notna() & lowest.notna()).to_numpy()].mean()
 
 
