@@ -4,9 +4,9 @@ Your own structure: from a logger's file to a fitted chain
 
 A tower is logged every half hour for a month: two temperatures and seven frequencies, with time stamps that are not
 round, one stamp that goes back, and gaps of hours and days. Here the log becomes tidy frames, a tower of beams on
-rocking springs is updated to the mean frequencies and learns the effect of temperature, and typical defects of records
-are introduced on purpose. The measured modes are not identified: they are paired with those of the model by frequency
-alone, one of them with a vertical mode.
+rocking springs is updated to the mean frequencies and learns the effect of temperature, predictions get intervals, and
+typical defects of records are introduced on purpose. The measured modes are not identified: they are paired with those
+of the model by frequency alone, one of them with a vertical mode.
 
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``, or set ``SKTHERMO_DATA`` to
 the folder that holds ``tower/tower.csv``. Without either it makes a synthetic log with the same defects. The log has
@@ -102,7 +102,7 @@ def update(F):
 
 
 def chain(model, *, lags=LAGS, bounds=0.3):
-    """Quadratic inverse, ridge on lagged temperatures, frequencies aligned to the model by their means."""
+    """Quadratic inverse, refined on the model; ridge on lagged temperatures; frequencies aligned by their means."""
     quadratic = make_pipeline(PolynomialFeatures(2), LinearRegression())
     return DataInformedFEM(
         model,
@@ -129,6 +129,13 @@ def hold_out_table(fem, T, F, n_train):
     }
     table = pd.DataFrame({name: mape(test, values) for name, values in predicted.items()}, index=F.columns).T
     return table.assign(mean=table.mean(axis=1)).round(3)
+
+
+def share_held(fem, T, F):
+    """Share of the measured frequencies that are within their 90 % intervals, where both are known."""
+    lowest, highest = quietly(fem.predict_interval, T)
+    held = F.gt(lowest) & F.lt(highest)
+    return held.to_numpy()[(F.notna() & lowest.notna()).to_numpy()].mean()
 
 
 def quietly(function, *arguments):
@@ -229,7 +236,8 @@ def main():
     beyond = fem.applicability(T[n_train:]).drop(columns="outside_bounds").max(axis=1)
     print(f"\n{(beyond > 0.25).mean():.0%} of the last fifth lie a quarter of the training range or more outside it")
     print(f"\nMAPE on the last {len(T) - n_train} records, where lags are known, in %")
-    print(hold_out_table(fem, T, F, n_train), end="\n\n")
+    print(hold_out_table(fem, T, F, n_train))
+    print(f"Intervals of 90 % hold {share_held(fem, T[n_train:], F[n_train:]):.1%} of these frequencies\n")
     for mistake, messages in provoked(model, fem, T[:n_train], F[:n_train]).items():
         print(f"{mistake}:", *(messages or ["no warning"]), sep="\n  ")
 

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pandas.testing import assert_frame_equal
+from sklearn.base import clone
 
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 from tests.examples.frozen_bridge import frozen_bridge
 
 pytest.importorskip("matplotlib").use("Agg")
@@ -34,11 +36,6 @@ def campaign():
     return EXAMPLE.truss_campaign(0, SIZE)
 
 
-@pytest.fixture(scope="module")
-def chain(campaign):
-    return EXAMPLE.Chain(campaign, seed=0)
-
-
 @pytest.mark.parametrize("name", ["truss", "KW51", "Z24"])
 def test_refining_makes_every_inverse_exact(models, name):
     table = EXAMPLE.inverse_results(*models[name], noise=0.0, seed=0, size=SIZE)
@@ -55,20 +52,26 @@ def test_with_noise_all_inverses_end_at_the_same_estimate(models):
     assert table["error"].std() > 0.1
 
 
-def test_the_chain_by_its_parts_is_the_chain(campaign, chain):
-    regressor = EXAMPLE.regressors("truss")["broken lines"]
-    whole = DataInformedFEM(
-        campaign.model, inverse=chain.inverse, mapper=TemperatureMapper(regressor), weighted=False, random_state=0
-    )
+def test_broken_lines_are_the_default_of_the_mapper(campaign):
     T, later = campaign.train[0], campaign.test[0]
-    whole.fit(*campaign.train)
-    np.testing.assert_allclose(chain.fit(regressor)(later), whole.predict(later), rtol=1e-6)
-    np.testing.assert_allclose(chain.fit(regressor)(T), whole.predict(T), rtol=1e-6)
+    lines = EXAMPLE.fitted_chain(campaign, EXAMPLE.regressors("truss")["broken lines"], seed=0)
+    default = clone(lines).set_params(mapper=TemperatureMapper()).fit(*campaign.train)
+    assert_frame_equal(lines.predict(T), default.predict(T))
+    assert_frame_equal(lines.predict(later), default.predict(later))
 
 
-def test_trees_stay_at_their_last_value_and_lines_go_on(campaign, chain):
+def test_the_small_network_is_the_default_of_the_inverse(campaign):
+    default = InverseSurrogate(campaign.model, n_samples=10, refine=0, random_state=0).fit()
+    small = clone(default).set_params(regressor=EXAMPLE.regressors("truss")["small network"]).fit()
+    np.testing.assert_array_equal(default.transform(campaign.train[1]), small.transform(campaign.train[1]))
+
+
+def test_trees_stay_at_their_last_value_and_lines_go_on(campaign):
     T, found = campaign.train[0], EXAMPLE.regressors("truss")
-    changes = {name: EXAMPLE.beyond(chain.fit(found[name]), T, -1) for name in ("random forest", "broken lines")}
+    changes = {
+        name: EXAMPLE.beyond(EXAMPLE.fitted_chain(campaign, found[name], seed=0).predict, T, -1)
+        for name in ("random forest", "broken lines")
+    }
     assert EXAMPLE.beyond(campaign.law, T, -1) > 5
     assert changes["random forest"] < 2 < changes["broken lines"]
 
