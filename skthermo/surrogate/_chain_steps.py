@@ -20,8 +20,8 @@ from skthermo.surrogate._simulator import Simulator, tolerance
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
 
-NOT_NOISE = 6.0
-"""Standard deviations of the noise beyond which a residual is that of a wrong model or a wrong record."""
+NOT_NOISE = 0.1
+"""Relative residual of a frequency from which it is that of a wrong model or a wrong record."""
 
 POSSIBLE = (1e-6, 1e6)
 """Range of multipliers; outside it rounding errors swamp the model's matrices."""
@@ -122,8 +122,8 @@ class ChainSteps:
         if self.coordinates == "frequencies" and last is not None:
             sensitivities = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
             if sensitivities is not None:
-                weighted = np.nan_to_num(residuals / last.scatter_)
-                weighted[np.abs(weighted).max(axis=1) > NOT_NOISE] = 0.0
+                noise = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0)
+                weighted = noise / last.scatter_
                 theta = theta * np.exp(weighted @ np.linalg.pinv(sensitivities).T)
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta
