@@ -9,10 +9,11 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.neighbors import KNeighborsRegressor
 
 from skthermo.datasets import make_truss_campaign, make_z24
-from skthermo.fem import AffineModel, CallableModel
+from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.surrogate._posterior import Prior
+from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 
 LOWEST, HIGHEST = 0.7, 1.3
@@ -178,6 +179,14 @@ def test_parallel_jobs_give_the_same_bits():
     one, two = (surrogate(noise=0.01, n_jobs=n_jobs).invert(measured) for n_jobs in (1, 2))
     for name in ("theta", "std", "residuals"):
         np.testing.assert_array_equal(two[name], one[name])
+
+
+@pytest.mark.parametrize("model", [portal(track=True), CallableModel(FRAME.frequencies, list("abcd"), 6)])
+def test_derivatives_in_parallel_are_the_same(model):
+    theta = drawn(3)
+    theta[1, 2] = np.nan
+    for one, two in zip(linearise(model, theta, n_jobs=1), linearise(model, theta, n_jobs=2), strict=True):
+        np.testing.assert_array_equal(two, one)
 
 
 # Gaps
