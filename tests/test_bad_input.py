@@ -139,6 +139,7 @@ def truss_of(members=BARS, supports=SUPPORTS, groups=None, nodes=NODES):
 
 
 INVERSE = InverseSurrogate(TRUSS, Ridge(), n_samples=50, random_state=0).fit()
+SEEDED = {"bounds": 0.2, "n_samples": 50, "random_state": 0}
 QUICK = {
     "inverse": InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01),
     "mapper": TemperatureMapper(Ridge()),
@@ -923,7 +924,7 @@ SURROGATE = [
     ("steps without a model", lambda: InverseSurrogate(refine=5).fit(ONES, ONES), "error", "refine is 5 without a mod"),
     (
         "inverted without steps",
-        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, n_samples=10).fit().invert(F.to_numpy()),
+        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, **SEEDED).fit().invert(F.to_numpy()),
         "error",
         "refine is 0, which means no steps",
     ),
@@ -931,21 +932,21 @@ SURROGATE = [
     ("inverted too few modes", lambda: INVERSE.invert(F.to_numpy()[:, :5]), "error", "5 features"),
     (
         "standard deviations that the regressor has not",
-        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, n_samples=10).fit().predict(F.to_numpy(), return_std=True),
+        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, **SEEDED).fit().predict(F.to_numpy(), return_std=True),
         "error",
         "gives no standard deviations",
     ),
     ("prior of zero", lambda: InverseSurrogate(TRUSS, prior=0, n_samples=10).fit(), "error", "'prior'"),
-    ("prior as text", lambda: InverseSurrogate(TRUSS, prior="wide", n_samples=10).fit(), "error", "prior"),
+    ("prior as text", lambda: InverseSurrogate(TRUSS, prior="wide", **SEEDED).fit(), "error", "prior"),
     (
         "prior of two parameters",
-        lambda: InverseSurrogate(TRUSS, Ridge(), prior=[0.1, 0.1], n_samples=10).fit(),
+        lambda: InverseSurrogate(TRUSS, Ridge(), prior=[0.1, 0.1], **SEEDED).fit(),
         "error",
         r"prior is \[0.1 0.1\]; expected",
     ),
     (
         "prior of other names",
-        lambda: InverseSurrogate(TRUSS, Ridge(), prior={"E": 0.1}, n_samples=10).fit(),
+        lambda: InverseSurrogate(TRUSS, Ridge(), prior={"E": 0.1}, **SEEDED).fit(),
         "error",
         r"prior: \['E'\] are unknown",
     ),
