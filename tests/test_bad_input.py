@@ -42,6 +42,7 @@ from skthermo.fem import (
     check_bounds,
     check_dofs,
     check_noise,
+    check_prior,
     check_theta,
     evaluate,
     linearise,
@@ -62,7 +63,7 @@ from skthermo.metrics import (
     probability_of_detection,
     probability_of_false_alarm,
 )
-from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
 from skthermo.updating import ModelUpdater, cramer_rao, identifiability, select_parameters, sensitivity
 
@@ -138,6 +139,7 @@ def truss_of(members=BARS, supports=SUPPORTS, groups=None, nodes=NODES):
 
 
 INVERSE = InverseSurrogate(TRUSS, Ridge(), n_samples=50, random_state=0).fit()
+SEEDED = {"bounds": 0.2, "n_samples": 50, "random_state": 0}
 QUICK = {
     "inverse": InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01),
     "mapper": TemperatureMapper(Ridge()),
@@ -222,6 +224,18 @@ BOUNDS = [
         "'bottom' are 30; expected",
     ),
     ("text pair", lambda: check_bounds(dict.fromkeys(NAMES, ("a", "b")), NAMES), "error", "bounds.*expected"),
+    ("prior None", lambda: check_prior(None, NAMES), "error", "prior is None; expected numbers"),
+    ("prior of text", lambda: check_prior("wide", NAMES), "error", "prior is 'wide'; expected"),
+    ("prior zero", lambda: check_prior(0, NAMES), "error", r"prior is 0.* above 0, a number or one for each"),
+    ("prior negative", lambda: check_prior([0.1, -0.1, 0.1, 0.1], NAMES), "error", "standard deviations above 0"),
+    ("prior NaN", lambda: check_prior(NAN, NAMES), "error", "prior is nan; expected"),
+    ("prior infinite", lambda: check_prior(INF, NAMES), "error", "prior is inf; expected"),
+    ("prior of other width", lambda: check_prior([0.1, 0.1], NAMES), "error", r"prior is \[0.1 0.1\]; expected"),
+    ("prior a table", lambda: check_prior([[0.1] * 4], NAMES), "error", "one for each of"),
+    ("prior complex", lambda: check_prior(0.1j, NAMES), "error", "prior is complex"),
+    ("prior of one parameter", lambda: check_prior({"top": 0.1}, NAMES), "error", "prior: .*'bottom'.* are missing"),
+    ("prior of a group", lambda: check_prior(dict.fromkeys([*NAMES, "deck"], 0.1), NAMES), "error", "'deck'.* unknown"),
+    ("prior of pairs", lambda: check_prior(dict.fromkeys(NAMES, (0.1, 0.2)), NAMES), "error", "one for each of"),
     ("dofs negative", lambda: check_dofs([-1], 23), "error", "dofs holds -1; expected 0 to 22"),
     ("dofs too high", lambda: check_dofs([23], 23), "error", "dofs holds 23; expected 0 to 22"),
     ("dofs twice", lambda: check_dofs([1, 1], 23), "error", "dofs holds 1 more than once"),
@@ -467,6 +481,11 @@ MODAL = [
 ]
 
 PREPROCESSING = [
+    ("no knots", lambda: HingeFeatures(0).fit(HOURLY), "error", "'n_knots'.*Got 0"),
+    ("knots as a list", lambda: HingeFeatures([0.0]).fit(HOURLY), "error", r"'n_knots'.*Got \[0.0\]"),
+    ("knots of NaN", lambda: HingeFeatures().fit(HOURLY * NAN), "error", "'T1' is NaN in every row; expected"),
+    ("hinges of others", lambda: HingeFeatures().fit(T).transform(F), "error", "feature names"),
+    ("hinges before fit", lambda: HingeFeatures().transform(T), "error", "not fitted"),
     ("no lags", lambda: LagFeatures(0).fit(HOURLY), "error", "'lags'.*Got 0"),
     ("negative lags", lambda: LagFeatures([0, -1]).fit(HOURLY), "error", r"lags is \[0, -1\]"),
     ("an empty list of lags", lambda: LagFeatures([]).fit(HOURLY), "error", r"lags is \[\]"),
@@ -898,6 +917,39 @@ SURROGATE = [
     ("frequencies negative", lambda: INVERSE.transform(-NOMINAL), "error", "expected"),
     ("frequencies in rad/s", lambda: INVERSE.transform(F * 2 * np.pi), "warning", "365 of 365 rows.*far outside"),
     ("before fit", lambda: InverseSurrogate(TRUSS).transform(F), "error", "not fitted"),
+    ("inverted before fit", lambda: InverseSurrogate(TRUSS).invert(F), "error", "not fitted"),
+    ("negative steps", lambda: InverseSurrogate(TRUSS, refine=-1).fit(), "error", "'refine'"),
+    ("steps as text", lambda: InverseSurrogate(TRUSS, refine="yes").fit(), "error", "'refine'"),
+    ("half a step", lambda: InverseSurrogate(TRUSS, refine=0.5).fit(), "error", "'refine'"),
+    ("steps without a model", lambda: InverseSurrogate(refine=5).fit(ONES, ONES), "error", "refine is 5 without a mod"),
+    (
+        "inverted without steps",
+        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, **SEEDED).fit().invert(F.to_numpy()),
+        "error",
+        "refine is 0, which means no steps",
+    ),
+    ("inverted frequency of zero", lambda: INVERSE.invert(F.to_numpy() * 0), "error", "'f1' is 0; expected positive"),
+    ("inverted too few modes", lambda: INVERSE.invert(F.to_numpy()[:, :5]), "error", "5 features"),
+    (
+        "standard deviations that the regressor has not",
+        lambda: InverseSurrogate(TRUSS, Ridge(), refine=0, **SEEDED).fit().predict(F.to_numpy(), return_std=True),
+        "error",
+        "gives no standard deviations",
+    ),
+    ("prior of zero", lambda: InverseSurrogate(TRUSS, prior=0, n_samples=10).fit(), "error", "'prior'"),
+    ("prior as text", lambda: InverseSurrogate(TRUSS, prior="wide", **SEEDED).fit(), "error", "prior"),
+    (
+        "prior of two parameters",
+        lambda: InverseSurrogate(TRUSS, Ridge(), prior=[0.1, 0.1], **SEEDED).fit(),
+        "error",
+        r"prior is \[0.1 0.1\]; expected",
+    ),
+    (
+        "prior of other names",
+        lambda: InverseSurrogate(TRUSS, Ridge(), prior={"E": 0.1}, **SEEDED).fit(),
+        "error",
+        r"prior: \['E'\] are unknown",
+    ),
     ("theta of other width", lambda: INVERSE.inverse_transform([[1.0, 1.0]]), "error", r"shape \(1, 2\)"),
     ("fewer theta than F", lambda: InverseSurrogate().fit(F.to_numpy(), ONES), "error", "365|inconsistent"),
     ("mapper, no theta", lambda: TemperatureMapper(Ridge()).fit(T, None), "error", "y"),
@@ -915,6 +967,42 @@ SURROGATE = [
         lambda: TemperatureMapper(Ridge()).fit(T, YEAR.frequencies).predict(F),
         "error",
         "feature names",
+    ),
+    (
+        "sensitivities of other parameters",
+        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(3)).fit(T, np.ones((365, 4))),
+        "error",
+        r"shape \(3, 3\); expected finite numbers, \(n_modes, 4\)",
+    ),
+    (
+        "sensitivities of NaN",
+        lambda: TemperatureMapper(Ridge(), sensitivities=NAN * np.eye(4)).fit(T, np.ones((365, 4))),
+        "error",
+        "sensitivities have shape .*finite numbers",
+    ),
+    (
+        "sensitivities of negative parameters",
+        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(4)).fit(T, -np.ones((365, 4))),
+        "error",
+        "theta falls to -1; expected positive multipliers",
+    ),
+    (
+        "damping negative",
+        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(4), damping=[-1.0] * 4).fit(T, np.ones((365, 4))),
+        "error",
+        "damping is .*; expected one number from 0, or 4",
+    ),
+    (
+        "damping of other parameters",
+        lambda: TemperatureMapper(Ridge(), damping=[1.0, 1.0]).fit(T, np.ones((365, 4))),
+        "error",
+        r"damping is \[1. 1.\]; expected one number from 0, or 4",
+    ),
+    (
+        "weights of other rows",
+        lambda: TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=[1.0, 2.0]),
+        "error",
+        r"sample_weight.shape == \(2,\), expected \(365,\)",
     ),
     ("a network of text", lambda: paper_network("big"), "error", "'big'"),
     ("no model", lambda: chain(None).fit(T, F), "error", "'model'"),
@@ -945,6 +1033,23 @@ SURROGATE = [
     ("before fit", lambda: DataInformedFEM(TRUSS).predict(T), "error", "not fitted"),
     ("other sensors", lambda: CHAIN.predict(T.iloc[:, :2]), "error", "feature names"),
     ("text later", lambda: CHAIN.predict(changed(T.astype(object), 0, 0, "cold")), "error", "'cold'.*expected numbers"),
+    (
+        "confidence in percent",
+        lambda: CHAIN.predict_interval(T, 90),
+        "error",
+        "confidence is 90; expected a probability",
+    ),
+    ("confidence of one", lambda: CHAIN.predict_interval(T, 1.0), "error", "confidence is 1.0; expected"),
+    ("confidence of text", lambda: CHAIN.predict_interval(T, "high"), "error", "confidence is 'high'; expected"),
+    ("confidence NaN", lambda: CHAIN.predict_interval(T, NAN), "error", "confidence is nan; expected"),
+    ("confidence a boolean", lambda: CHAIN.predict_interval(T, True), "error", "confidence is True; expected"),
+    ("two confidences", lambda: CHAIN.predict_interval(T, [0.5, 0.9]), "error", "confidence is .*; expected"),
+    ("interval before fit", lambda: chain().predict_interval(T), "error", "not fitted"),
+    ("residuals before fit", lambda: chain().residuals_, "error", "not fitted"),
+    ("interval of other sensors", lambda: CHAIN.predict_interval(T.iloc[:, :2]), "error", "feature names"),
+    ("unknown coordinates", lambda: chain(coordinates="modes").fit(T, F), "error", "'coordinates'"),
+    ("weighted by text", lambda: chain(weighted="yes").fit(T, F), "error", "'weighted'"),
+    ("fitted noise misspelt", lambda: CHAIN.simulate(T, noise="fit"), "error", "noise is 'fit'; expected \"fitted\""),
     ("unknown damage", lambda: CHAIN.simulate(T, damage={"deck": 0.1}), "error", "'deck'"),
     ("damage in percent", lambda: CHAIN.simulate(T, damage={"top": 30}), "error", "30"),
     (

@@ -1,4 +1,4 @@
-"""Whether the tests notice mistakes in the numerics of modal analysis, tracking and model updating.
+"""Whether the tests notice mistakes in the numerics of modal analysis, tracking, model updating and the surrogates.
 
     OMP_NUM_THREADS=1 python tools/mutations.py [WORD ...]
 
@@ -74,6 +74,53 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_report.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
+    ],
+    ("surrogate/_posterior.py", "surrogate/test_refinement.py"): [
+        ("width of the prior of a box", "half / np.sqrt(3)", "half"),
+        ("pull of the prior", "+ distance / self.prior.width", "+ distance"),
+        ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
+        ("limits of estimates", "REACH = 3.0", "REACH = 1.0"),
+        ("parameters at their limits", "held, fixed = held | beyond", "held, fixed = held"),
+    ],
+    ("surrogate/_refine.py", "surrogate/test_refinement.py"): [
+        ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
+        (
+            "steps that fail",
+            "found.put(active[there.value < here.value], there.of(there.value < here.value))",
+            "found.put(active, there)",
+        ),
+        ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
+    ],
+    ("surrogate/_refinement.py", "surrogate/test_refinement.py"): [
+        ("rows that stall", "np.where(lost, guess, np.exp(found.x))", "np.exp(found.x)"),
+        ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
+        ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
+    ],
+    ("surrogate/_standardiser.py", "surrogate/test_coordinates.py"): [
+        ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
+        ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
+    ],
+    ("surrogate/_chain_steps.py", "surrogate/test_coordinates.py"): [
+        ("weights of the chain", "found.weight if self.weighted else None", "None"),
+    ],
+    ("surrogate/_residuals.py", "surrogate/test_uncertainty.py"): [
+        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
+        (
+            "spread of the same period",
+            "self._spread(self.weather[test], ~test)",
+            "self._spread(self.weather[test], test)",
+        ),
+        ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
+        ("correlation time", "time += 2 * correlation", "time += correlation"),
+        ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
+        ("runs of noise", "record += 1", "record += 2"),
+    ],
+    ("surrogate/_chain_uncertainty.py", "surrogate/test_uncertainty.py"): [
+        ("periods of time", 'T.index.argsort(kind="stable")', "np.arange(len(T))"),
+        ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
+    ],
+    ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
+        ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
     ],
 }
 

@@ -1,0 +1,93 @@
+"""Broken lines: what hinges append, and what linear regression makes of them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.pipeline import make_pipeline
+
+from skthermo.preprocessing import HingeFeatures
+
+AIR = pd.DataFrame({"air": np.linspace(-10, 30, 81), "deck": np.linspace(-5, 40, 81) ** 2}, index=range(100, 181))
+
+
+def test_hinges_are_what_is_above_each_knot():
+    hinges = HingeFeatures(n_knots=3).fit(AIR)
+    np.testing.assert_allclose(hinges.knots_, AIR.quantile([0.25, 0.5, 0.75]))
+    features = hinges.transform(AIR)
+    pd.testing.assert_frame_equal(features[["air", "deck"]], AIR)
+    for number, knots in enumerate(hinges.knots_, 1):
+        for name, knot in zip(AIR, knots, strict=True):
+            np.testing.assert_array_equal(features[f"{name}_above{number}"], (AIR[name] - knot).clip(lower=0))
+    assert features.shape == (81, 8)
+    assert features.index.equals(AIR.index)
+
+
+def test_frames_in_frames_out_arrays_in_arrays_out():
+    hinges = HingeFeatures(n_knots=2).fit(AIR)
+    names = ["air", "deck", "air_above1", "deck_above1", "air_above2", "deck_above2"]
+    assert list(hinges.get_feature_names_out()) == list(hinges.transform(AIR)) == names
+    plain = HingeFeatures(n_knots=2).fit(AIR.to_numpy())
+    np.testing.assert_array_equal(plain.transform(AIR.to_numpy()), hinges.transform(AIR))
+    assert isinstance(plain.transform(AIR.to_numpy()), np.ndarray)
+    assert list(plain.get_feature_names_out(["a", "b"]))[2:] == ["a_above1", "b_above1", "a_above2", "b_above2"]
+    assert isinstance(plain.set_output(transform="pandas").transform(AIR.to_numpy()), pd.DataFrame)
+
+
+def test_missing_values_are_ignored_and_stay_missing():
+    holed = AIR.mask(np.random.default_rng(0).random(AIR.shape) < 0.2)
+    hinges = HingeFeatures().fit(holed)
+    np.testing.assert_allclose(hinges.knots_, [holed.quantile(q) for q in (0.2, 0.4, 0.6, 0.8)])
+    features = hinges.transform(holed)
+    for name in AIR:
+        own = features.filter(like=name)
+        assert (own.isna().sum(axis=1).isin([0, 5])).all()
+        np.testing.assert_array_equal(own.isna().all(axis=1), holed[name].isna())
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 6), st.integers(0, 10_000))
+def test_linear_regression_on_hinges_gives_any_broken_line(n_knots, seed):
+    """Any continuous function with straight pieces between the knots, and beyond the data."""
+    rng = np.random.default_rng(seed)
+    x = np.sort(rng.uniform(-15, 35, 200))
+    knots = np.quantile(x, np.linspace(0, 1, n_knots + 2)[1:-1])
+    slopes, start = rng.uniform(-1, 1, n_knots + 1), rng.uniform(-5, 5)
+
+    def broken(t):
+        """The integral of the slope, which changes at each knot."""
+        ends = np.concatenate([[-1e3], knots, [1e3]])
+        return start + sum(
+            slope * (np.clip(t, low, high) - low) for slope, low, high in zip(slopes, ends[:-1], ends[1:], strict=True)
+        )
+
+    model = make_pipeline(HingeFeatures(n_knots), LinearRegression()).fit(x[:, np.newaxis], broken(x))
+    beyond = np.linspace(-60, 80, 300)
+    np.testing.assert_allclose(model.predict(beyond[:, np.newaxis]), broken(beyond), atol=1e-7)
+
+
+def test_lines_of_two_sensors_add_up():
+    rng = np.random.default_rng(0)
+    air, deck = rng.uniform(-10, 30, (2, 500))
+    X = np.column_stack([air, deck])
+    low, high = np.median(X, axis=0)
+    y = 2 - 0.1 * np.maximum(air - low, 0) + 0.3 * np.maximum(deck - high, 0) + 0.05 * deck
+    model = make_pipeline(HingeFeatures(n_knots=1), LinearRegression()).fit(X, y)
+    np.testing.assert_allclose(model.predict([[40.0, -30.0]]), 2 - 0.1 * (40 - low) - 1.5)
+
+
+def test_ridge_regression_goes_on_straight_beyond_the_data():
+    x = np.linspace(-10, 30, 100)[:, np.newaxis]
+    model = make_pipeline(HingeFeatures(), Ridge(10.0)).fit(x, np.sin(x[:, 0] / 5))
+    for end in ([-80.0, -50.0, -20.0], [40.0, 60.0, 80.0]):
+        np.testing.assert_allclose(np.diff(model.predict(np.reshape(end, (-1, 1))), n=2), 0, atol=1e-9)
+
+
+def test_columns_without_values_and_bad_numbers_of_knots_are_errors():
+    with pytest.raises(ValueError, match="'deck' is NaN in every row; expected values to place knots at"):
+        HingeFeatures().fit(AIR.assign(deck=np.nan))
+    for n_knots in (0, 1.5, "many"):
+        with pytest.raises(ValueError, match="'n_knots'"):
+            HingeFeatures(n_knots).fit(AIR)

@@ -1,0 +1,304 @@
+"""Laws of what the chain says about its own errors: spread, intervals, realistic noise."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.base import clone
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.preprocessing import LagFeatures
+from skthermo.surrogate import TemperatureMapper
+from skthermo.surrogate._residuals import WeatherResiduals, correlation_time, order_statistic
+from tests.surrogate.chains import F, T, inverse
+from tests.surrogate.chains import chain as any_chain
+
+# Vertical stiffness hardly moves the frequencies, so that its estimates scatter with the noise.
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows give parameters far outside")
+
+LATER = make_truss_campaign(random_state=1)
+PLAIN = TemperatureMapper(LinearRegression())
+
+
+def chain(mapper=PLAIN, **options):
+    return any_chain(inverse=inverse(noise=0.01), mapper=mapper, **options)
+
+
+FITTED = chain().fit(T, F)
+
+
+def residuals(weather, values, n_folds=5):
+    folds = np.arange(len(values)) * n_folds // len(values)
+    return WeatherResiduals(np.reshape(weather, (len(values), -1)), np.reshape(values, (len(values), -1)), folds)
+
+
+def autoregressive(n_records, rho, seed=0):
+    noise, series = np.random.default_rng(seed).standard_normal(n_records), np.zeros(n_records)
+    for record in range(1, n_records):
+        series[record] = rho * series[record - 1] + np.sqrt(1 - rho**2) * noise[record]
+    return series
+
+
+# Order statistics and correlation times
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
+def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
+    scores = np.array(scores)
+    enough = [score for score in scores if (scores <= score).sum() >= (len(scores) + 1) * confidence]
+    assert order_statistic(scores, confidence) == min(enough, default=np.inf)
+
+
+def test_order_statistic_holds_a_new_score_with_its_probability():
+    drawn = np.random.default_rng(0).exponential(size=(4000, 20))
+    held = [order_statistic(scores[:19], 0.9) >= scores[19] for scores in drawn]
+    assert np.mean(held) == pytest.approx(0.9, abs=0.015)
+
+
+def test_few_scores_cannot_tell():
+    assert order_statistic(np.arange(9.0), 0.9) == 8
+    assert order_statistic(np.arange(8.0), 0.9) == np.inf
+    assert order_statistic(np.array([]), 0.5) == np.inf
+
+
+@pytest.mark.parametrize("share_missing", [0.0, 0.3])
+def test_correlation_time_of_an_autoregressive_series(share_missing):
+    series = autoregressive(20_000, 0.8)
+    series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
+    assert correlation_time(series) == pytest.approx((1 + 0.8) / (1 - 0.8), rel=0.2)
+    assert correlation_time(7 + 3 * series) == pytest.approx(correlation_time(series))
+
+
+def test_correlation_time_of_series_without_memory_is_one():
+    assert correlation_time(np.random.default_rng(0).standard_normal(5000)) == pytest.approx(1, abs=0.1)
+    assert correlation_time(np.full(100, np.nan)) == correlation_time(np.ones(100)) == correlation_time(np.ones(1)) == 1
+
+
+# Spread
+
+
+def test_spread_of_few_records_is_their_root_mean_square():
+    rng = np.random.default_rng(0)
+    weather, values = np.linspace(0, 20, 60), rng.normal(size=(60, 2))
+    values[::3, 1] = np.nan
+    spread = residuals(weather, values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
+    rms = np.sqrt(np.nanmean(values**2, axis=0))
+    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], rms))
+
+
+def test_spread_follows_the_weather():
+    weather = np.random.default_rng(0).uniform(-10, 30, 1500)
+    scale = np.where(weather < 0, 0.02, 0.005)
+    spread = residuals(weather, scale * np.random.default_rng(1).standard_normal(1500)).spread([[-6.0], [20.0]])
+    np.testing.assert_allclose(spread[:, 0], [0.02, 0.005], rtol=0.25)
+
+
+def test_spread_of_a_mode_that_is_always_missing_is_infinite():
+    values = np.column_stack([np.ones(50), np.full(50, np.nan)])
+    np.testing.assert_array_equal(residuals(np.arange(50.0), values).spread([[3.0]]), [[1, np.inf]])
+
+
+def test_quantiles_measure_each_period_by_the_others():
+    """Residuals of one period are twice those of the others, which all have one size."""
+    values = np.ones(50)
+    values[:10] = 2.0
+    found = residuals(np.tile(np.arange(10.0), 5), values)
+    others = np.sqrt((30 + 4 * 10) / 40)
+    np.testing.assert_allclose(found.quantiles(0.5), 1 / others)
+    np.testing.assert_allclose(found.quantiles(0.95), 2.0)
+
+
+# Realistic noise
+
+
+def drawn_records(found, weather, seed=0):
+    """Which record each drawn row is, by the first mode, which has no gaps."""
+    values = found.draw(weather, np.random.RandomState(seed))
+    taken = np.array([np.flatnonzero(found.values[:, 0] == value)[0] for value in values[:, 0]])
+    np.testing.assert_array_equal(values, found.values[taken])
+    return taken
+
+
+def test_noise_is_whole_records_gaps_included():
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(400, 3))
+    values[:, 1:][rng.random((400, 2)) < 0.3] = np.nan
+    found = residuals(rng.uniform(-10, 30, (400, 2)), values)
+    weather = rng.uniform(-10, 30, (500, 2))
+    taken = drawn_records(found, weather)
+    np.testing.assert_array_equal(taken, drawn_records(found, weather))
+    assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
+    assert len(set(taken)) > 150
+
+
+def test_noise_comes_from_similar_weather():
+    rng = np.random.default_rng(0)
+    weather, wanted = rng.uniform(-10, 30, 600), rng.uniform(-10, 30, 300)
+    taken = drawn_records(residuals(weather, rng.normal(size=600)), wanted[:, np.newaxis])
+    distance = np.abs(weather[taken] - wanted)
+    assert distance.mean() < 0.1 * np.abs(rng.permutation(weather)[:300] - wanted).mean()
+    assert distance.max() < 4  # a tenth of the weather
+
+
+def test_noise_keeps_the_serial_correlation_of_the_records():
+    weather = 10 + 15 * np.sin(np.arange(1500) * 2 * np.pi / 500)
+    later = weather[:, np.newaxis]
+    for rho, lowest, highest in ((0.8, 0.7, 1.0), (0.0, 0.0, 0.15)):
+        found = residuals(weather, autoregressive(1500, rho))
+        taken = drawn_records(found, later)
+        assert lowest <= (np.diff(taken) == 1).mean() <= highest
+        drawn = found.values[taken, 0]
+        assert np.corrcoef(drawn[1:], drawn[:-1])[0, 1] == pytest.approx(rho, abs=0.15)
+
+
+def test_simulations_scatter_like_the_training_records():
+    holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
+    fem = chain().fit(T, holed)
+    clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
+    records = fem.residuals_.values
+    for row in (noisy / clean - 1).to_numpy():
+        assert np.isclose(records, row, rtol=0, atol=1e-12, equal_nan=True).all(axis=1).any()
+    pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
+    assert noisy.isna().mean(axis=None) == pytest.approx(0.1, abs=0.03)
+    np.testing.assert_allclose((noisy / clean).std(), np.nanstd(records, axis=0), rtol=0.2)
+    damaged = fem.simulate(T, damage={"top": 0.3}, noise="fitted", random_state=0)
+    np.testing.assert_allclose(damaged / fem.simulate(T, damage={"top": 0.3}), noisy / clean, rtol=1e-12)
+
+
+def test_noise_of_shuffled_records_is_that_of_records_in_order_of_time():
+    shuffled = T.sample(frac=1, random_state=0)
+    expected = FITTED.simulate(T, noise="fitted", random_state=0)
+    pd.testing.assert_frame_equal(
+        FITTED.simulate(shuffled, noise="fitted", random_state=0).sort_index(), expected, check_freq=False
+    )
+
+
+def test_noise_is_fitted_or_a_number():
+    with pytest.raises(ValueError, match="noise is 'measured'; expected \"fitted\""):
+        FITTED.simulate(T, noise="measured")
+
+
+# Residuals of the chain
+
+
+def test_residuals_are_those_of_mappers_fitted_to_other_periods():
+    fem = chain(coordinates="parameters").fit(T, F)
+    np.testing.assert_array_equal(np.bincount(fem.residuals_.folds), [73] * 5)
+    for fold, (train, test) in enumerate(KFold(5).split(T)):
+        theta = clone(fem.mapper_).fit(T.iloc[train], fem.parameters_.iloc[train]).predict(T.iloc[test])
+        predicted = fem.aligner_.inverse_transform(fem.model.frequencies(theta))
+        values = fem.residuals_.values[fem.residuals_.folds == fold]
+        np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
+
+
+@pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
+def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
+    order = np.random.default_rng(0).permutation(len(T))
+    sorted_rows, shuffled = (chain(mapper=mapper).fit(T.iloc[rows], F.iloc[rows]) for rows in (slice(None), order))
+    np.testing.assert_allclose(shuffled.residuals_.values, sorted_rows.residuals_.values, atol=1e-6)
+    np.testing.assert_allclose(shuffled.residuals_.weather, sorted_rows.residuals_.weather)
+
+
+@pytest.mark.parametrize(
+    "mapper",
+    [
+        make_pipeline(LagFeatures(2, padding="nan"), PLAIN),
+        GridSearchCV(TemperatureMapper(Ridge()), {"regressor__alpha": [0.1, 1.0]}, cv=2),
+        LinearRegression(),
+    ],
+)
+def test_any_mapper_has_residuals(mapper):
+    fem = chain(mapper=mapper).fit(T, F)
+    lagged = 1 if hasattr(mapper, "steps") else 0
+    assert fem.residuals_.values.shape == (365 - lagged, 6)
+    std = fem.predict(T, return_std=True)[1]
+    np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
+
+
+def test_chain_at_the_end_of_a_pipeline_has_intervals():
+    lags = make_pipeline(LagFeatures(2), chain()).fit(T, F)
+    lowest, highest = lags[-1].predict_interval(lags[:-1].transform(T))
+    assert 0.85 < ((lowest < F) & (highest > F)).to_numpy().mean() < 0.97
+
+
+def test_few_records_have_no_residuals():
+    with pytest.warns(UserWarning, match="train 4 parameters"):
+        fem = chain().fit(T[:9], F[:9])
+    with pytest.raises(ValueError, match="9 records have parameters; expected at least 10"):
+        fem.predict(T[:9], return_std=True)
+
+
+def test_pickles_keep_residuals_and_clones_do_not():
+    twin = pickle.loads(pickle.dumps(FITTED))
+    np.testing.assert_array_equal(twin.residuals_.values, FITTED.residuals_.values)
+    for one, other in zip(twin.predict_interval(T), FITTED.predict_interval(T), strict=True):
+        pd.testing.assert_frame_equal(one, other)
+    assert not hasattr(clone(FITTED), "_residuals")
+    refitted = pickle.loads(pickle.dumps(FITTED)).fit(T[:200], F[:200])
+    assert len(refitted.residuals_.values) == 200
+
+
+# Standard deviations and intervals
+
+
+def test_standard_deviations_are_spreads_in_hertz():
+    frequencies, std = FITTED.predict(T, return_std=True)
+    pd.testing.assert_frame_equal(frequencies, FITTED.predict(T))
+    np.testing.assert_allclose(std / frequencies, FITTED.residuals_.spread(T.to_numpy()))
+    assert (std > 0).all(axis=None)
+    np.testing.assert_allclose((std / frequencies).mean(), 0.01, rtol=0.2)  # the noise of the campaign
+    assert isinstance(chain().fit(T.to_numpy(), F.to_numpy()).predict(T[:3].to_numpy(), True)[1], np.ndarray)
+
+
+def test_intervals_grow_with_confidence_and_hold_the_prediction():
+    predicted = FITTED.predict(T)
+    inner = (predicted, predicted)
+    for confidence in (0.2, 0.5, 0.8, 0.9, 0.99):
+        outer = FITTED.predict_interval(T, confidence)
+        assert (outer[0] <= inner[0]).all(axis=None)
+        assert (outer[1] >= inner[1]).all(axis=None)
+        assert (outer[0] > 0).all(axis=None)
+        np.testing.assert_allclose(sum(outer) / 2, predicted)
+        inner = outer
+
+
+def test_intervals_are_infinite_where_records_are_too_few():
+    fem = chain().fit(T[::5], F[::5])
+    lowest, highest = fem.predict_interval(T[:3], 0.99)
+    assert (lowest == 0).all(axis=None)
+    assert np.isinf(highest).all(axis=None)
+    assert np.isfinite(fem.predict_interval(T[:3], 0.9)[1]).all(axis=None)
+
+
+def test_rows_without_a_temperature_have_no_interval():
+    holed = T.copy()
+    holed.iloc[3, 1] = np.nan
+    tables = (*FITTED.predict_interval(holed), FITTED.predict(holed, True)[1], FITTED.simulate(holed, noise="fitted"))
+    for table in tables:
+        np.testing.assert_array_equal(table.isna().all(axis=1), np.arange(365) == 3)
+        assert table.notna().all(axis=1).sum() == 364
+
+
+def test_intervals_of_exchangeable_records_hold_the_share_asked():
+    temperatures, frequencies = np.vstack([T, LATER.temperatures]), np.vstack([F, LATER.frequencies])
+    order = np.random.default_rng(0).permutation(len(temperatures))
+    train, test = order[:365], order[365:]
+    fem = chain().fit(temperatures[train], frequencies[train])
+    for confidence in (0.5, 0.9):
+        lowest, highest = fem.predict_interval(temperatures[test], confidence)
+        held = (lowest < frequencies[test]) & (frequencies[test] < highest)
+        assert held.mean() == pytest.approx(confidence, abs=0.05)
+
+
+@pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside")
+def test_intervals_widen_beyond_the_training_weather():
+    middle, beyond = T.mean().to_frame().T, T.max().to_frame().T + 30
+    widths = [(highest / lowest).to_numpy() for lowest, highest in map(FITTED.predict_interval, (middle, beyond))]
+    assert (widths[1] > widths[0]).all()
