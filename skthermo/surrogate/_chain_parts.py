@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from sklearn.base import BaseEstimator, clone
+from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
@@ -103,14 +104,19 @@ def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: 
 
     They are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, (n_modes,
     n_parameters). A prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does
-    the damping. None if there is no such mapper, or its coordinates are given.
+    the damping. None if there is no such mapper, if it is fitted to one parameter at a time, if its
+    coordinates are given, or if the nominal state has no solution.
     """
+    if isinstance(mapper[-1] if isinstance(mapper, Pipeline) else mapper, MultiOutputRegressor):
+        return None
     mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
     is_given = any(part.sensitivities is not None for part in mappers)
     if not mappers or is_given:
         return None
     frequencies, jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))))
     sensitivities = jacobian[0] / frequencies[0][:, np.newaxis] / inverse.scatter_[:, np.newaxis]
+    if not np.isfinite(sensitivities).all():
+        return None
     damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_DEGREE / n_rows
     for part in mappers:
         part.set_params(sensitivities=sensitivities, damping=damping)

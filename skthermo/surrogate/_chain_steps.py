@@ -20,6 +20,9 @@ from skthermo.surrogate._simulator import Simulator, tolerance
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
 
+FARTHEST = 5.0
+"""Largest step of ln theta that takes the prior's shrinkage out."""
+
 NOT_NOISE = 0.1
 """Relative residual of a frequency from which it is that of a wrong model or a wrong record."""
 
@@ -122,8 +125,7 @@ class ChainSteps:
         if self.coordinates == "frequencies" and last is not None:
             sensitivities = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
             if sensitivities is not None:
-                noise = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0)
-                weighted = noise / last.scatter_
-                theta = theta * np.exp(weighted @ np.linalg.pinv(sensitivities).T)
+                weighted = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0) / last.scatter_
+                theta = theta * np.exp(np.clip(weighted @ np.linalg.pinv(sensitivities).T, -FARTHEST, FARTHEST))
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta

@@ -48,10 +48,10 @@ class ChainUncertainty:
         Split-conformal intervals: the training records are divided into five periods of time, and each is predicted by
         a mapper fitted on the others. The width is a multiple of the spread of these residuals in similar weather, so
         that it grows, for example, in frost; the multiple is the order statistic that the periods themselves needed.
-        If new records are exchangeable with the training records, the interval holds a mode with at least the
-        probability asked. Records of one structure are not: they are serially correlated, so that the share of a short
-        period that is held varies much more than that of independent records, and weather beyond the training range
-        has no residuals to learn from (see `applicability`).
+        If new records are exchangeable with the training records, the interval holds a mode with about the probability
+        asked. Records of one structure are not: they are serially correlated, so that the share of a short period that
+        is held varies much more than that of independent records, and weather beyond the training range has no
+        residuals to learn from: there the interval is widened by the distance (see `applicability`).
 
         Examples
         --------
@@ -108,7 +108,8 @@ class ChainUncertainty:
     def _out_of_fold(self) -> WeatherResiduals:
         """Relative residuals of the training records, each predicted by a mapper fitted on other periods of time."""
         T, F, targets, weights = self._records
-        order = T.index.argsort(kind="stable") if isinstance(T, pd.DataFrame) else np.arange(len(T))
+        has_stamps = isinstance(getattr(T, "index", None), pd.DatetimeIndex)
+        order = T.index.argsort(kind="stable") if has_stamps else np.arange(len(T))
         inputs, theta = as_floats(mapper_inputs(self.mapper_, T))[order], targets[order]
         measured = as_floats(F)[order]
         rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1))

@@ -213,7 +213,8 @@ class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimato
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters; NaN where a mode is missing.
+            Multipliers of the nominal parameters; NaN in rows without any mode and, without refining, where one is
+            missing.
 
         Raises
         ------

@@ -120,7 +120,7 @@ class TemperatureMapper(MultiplierRegressor):
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)
-        weights = None if sample_weight is None else _check_sample_weight(sample_weight, T)
+        weights = None if sample_weight is None else _check_sample_weight(sample_weight, T, ensure_non_negative=True)
         self._learn(
             T,
             theta,

@@ -65,6 +65,7 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
         undamped = here.step(objective.prior, np.zeros(len(active)))
         is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * deviations(here))).all(axis=1)
         converged[active] = is_small | (here.gain(undamped) <= SMALL_GAIN * here.value)
+        found.x[active] += np.where(converged[active, np.newaxis], undamped, 0.0)
         active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
         if not active.size or not remaining:
             break

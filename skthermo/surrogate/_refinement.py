@@ -87,7 +87,7 @@ class Refinement:
         found, converged, stalled = refine(objective, start, self.n_steps, sorts=sorts)
         lost, complete = stalled[:, np.newaxis], np.maximum(noise, scatter)
         deviations, at_best = (
-            prior.deviations(found.sensitivity, spread)
+            prior.deviations(np.nan_to_num(found.sensitivity), spread)
             for spread in (np.where(np.isnan(measured), np.inf, complete), complete)
         )
         result.theta[some] = np.where(lost, guess, np.exp(found.x))

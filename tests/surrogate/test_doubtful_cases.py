@@ -1,0 +1,77 @@
+"""Chains with failing models, wrong modes, unusual mappers and unusual labels."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.multioutput import MultiOutputRegressor
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.fem import CallableModel
+from skthermo.preprocessing import BiasAligner
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.surrogate.chains import TRUSS, F, T
+
+PLAIN = TemperatureMapper(LinearRegression())
+
+
+def failing(lowest, highest, track):
+    def program(theta):
+        return np.array([np.nan]) if lowest < theta[0] < highest else 3.0 * np.sqrt(theta)
+
+    model = CallableModel(program, ["k"], 1)
+    model.track = track
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:.*samples are NaN")
+@pytest.mark.parametrize("place", [(0.95, 1.06, False), (1.05, 1.15, True)])
+def test_rows_that_never_had_frequencies_are_counted_and_weigh_a_number(place):
+    inverse = InverseSurrogate(failing(*place), Ridge(1e-2), n_samples=60, refine=5, random_state=0).fit()
+    measured = 3.0 * np.sqrt(np.linspace(0.9, 1.2, 40)[:, np.newaxis])
+    assert np.isfinite(inverse.invert(measured).weight).all()
+    with pytest.warns(UserWarning, match="of 40 rows did not converge"):
+        inverse.transform(measured)
+    chain = DataInformedFEM(
+        inverse.model, inverse=InverseSurrogate(regressor=Ridge(), n_samples=60, refine=5), mapper=PLAIN
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        chain.fit(np.linspace(0, 30, 40)[:, np.newaxis], measured)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_wrong_modes_do_not_make_every_prediction_impossible():
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
+    fem = DataInformedFEM(TRUSS, inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0).fit(
+        T, F.iloc[:, [0, 1, 3, 2, 4, 5]]
+    )
+    assert fem.predict(T).notna().all(axis=None)
+
+
+def test_healthy_campaigns_with_the_right_noise_give_no_warning():
+    for seed in range(20):
+        year = make_truss_campaign(random_state=seed)
+        frequencies = BiasAligner(TRUSS).fit_transform(year.frequencies)
+        inverse = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, random_state=0)
+        inverse.fit(frequencies).transform(frequencies)
+
+
+def test_negative_weights_are_named():
+    with pytest.raises(ValueError, match="Negative values in data passed to `sample_weight`"):
+        TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=-np.ones(365))
+
+
+@pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows give")
+def test_mappers_of_one_parameter_each():
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
+    DataInformedFEM(TRUSS, inverse=inverse, mapper=MultiOutputRegressor(PLAIN), random_state=0).fit(T, F)
+
+
+@pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows give")
+def test_labels_that_have_no_order():
+    labels = [f"r{row}" if row % 2 else row for row in range(365)]
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
+    fem = DataInformedFEM(TRUSS, inverse=inverse, mapper=PLAIN, random_state=0)
+    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).residuals_.values) == 365
