@@ -67,7 +67,7 @@ class Study:
         self.model = make_truss()
         self.random = np.random.RandomState(seed)
         self.baseline = self.campaign(n_years=1)
-        inverse = InverseSurrogate(self.model, **({"bounds": 0.2} | inverse_options))
+        inverse = InverseSurrogate(self.model, **({"bounds": 0.2, "noise": NOISE} | inverse_options))
         self.fem = DataInformedFEM(self.model, inverse=inverse, random_state=seed)
         with warnings.catch_warnings():  # a tenth of the records are far outside the paper's box of 20 %
             warnings.filterwarnings("ignore", message=r"\d+ of \d+ rows give parameters far outside")

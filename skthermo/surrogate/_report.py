@@ -53,12 +53,12 @@ class FitReport:
         Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
         from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
         determine a parameter.
-    n_unconverged : int or None
-        Rows whose parameters have not converged in refining; None without refining.
     errors : DataFrame
         MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
     n_scored : int
         Number of rows used for ``errors``, spread evenly over the training rows.
+    n_unconverged : int or None
+        Rows whose parameters have not converged in refining; None without refining.
 
     Examples
     --------
