@@ -191,7 +191,7 @@ def degrading(study, seeds, **options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--noise", type=float, default=0.0, help="noise while the inverse surrogate learns")
+    parser.add_argument("--noise", type=float, default=0.01, help="noise while the inverse surrogate learns")
     parser.add_argument("--bounds", type=float, default=0.2, help="half-width of the sampled box")
     parser.add_argument("--half-year", action="store_true", help="learn from every other day of the baseline year")
     parser.add_argument("--measured-noise", type=float, default=0.01, help="noise of the measured frequencies")

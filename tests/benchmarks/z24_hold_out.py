@@ -26,7 +26,7 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMap
 from skthermo.surrogate._networks import default_network
 
 REGRESSORS = {
-    "default (splines)": None,
+    "default (broken lines)": None,
     "network": default_network(),
     "gradient boosting": MultiOutputRegressor(GradientBoostingRegressor()),
     "extra trees": ExtraTreesRegressor(),
@@ -139,9 +139,9 @@ def print_false_alarms(records, fem, n_draws):
         for index, regressor in {
             "raw": None,
             "compensated by boosting": BOOSTING,
-            "compensated by splines": TemperatureMapper(),
+            "compensated by broken lines": TemperatureMapper(),
         }.items()
-        for mapper, chain in {"splines (default)": fem, "boosting": boosted}.items()
+        for mapper, chain in {"broken lines (default)": fem, "boosting": boosted}.items()
     }
     columns = ["measured", "simulated", "deviation of draws", "without noise", "difference"]
     table = pd.DataFrame(rows, columns).T

@@ -37,8 +37,10 @@ def test_the_severity_is_found_from_f2_alone_and_the_other_modes_follow(frozen):
 
 def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
     ratio = EXAMPLE.hold_out_table(frozen)["ratio"]
-    assert ratio["chain, tracked, bounds 0.3"] < 1.1
-    assert ratio["chain, sorted, bounds 0.3"] > ratio["chain, tracked, bounds 0.3"]
+    for regressor in ("broken lines", "boosted trees"):
+        tracked, by_rank = (ratio[f"{regressor}, chain, {kind}, bounds 0.5"] for kind in ("tracked", "sorted"))
+        assert tracked < 1.05
+        assert by_rank > tracked
 
 
 @pytest.mark.parametrize(
@@ -58,6 +60,7 @@ def test_the_real_bridge_is_predicted_as_well_as_by_a_direct_regression():
     if "SKTHERMO_DATA" not in os.environ:
         pytest.skip("SKTHERMO_DATA does not name the folder with z24/z24_monitoring.csv")
     table = EXAMPLE.hold_out_table(EXAMPLE.Bridge(EXAMPLE.find(Path(os.environ["SKTHERMO_DATA"]))))
-    tracked = table.index.str.startswith("chain, tracked")
-    assert tracked.sum() == 2
-    assert (table["ratio"][tracked] < 1.10).all()
+    tracked = table.index.str.contains("chain, tracked")
+    assert tracked.sum() == 4
+    assert (table["ratio"][tracked] < 1.03).all()
+    assert table["mean"]["broken lines, chain, tracked, bounds 0.3"] < 0.62
