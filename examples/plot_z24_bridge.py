@@ -277,10 +277,8 @@ def main():
     print(f"Later weather: {share:.0%} of the last {len(T_test)} records have a temperature more than a quarter of the")
     print(f"training range outside it, the warmest {beyond.max():.0%}. Each prediction below would warn of that.\n")
     warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
-    print(
-        f"MAPE in percent on the last {len(bridge.T) - bridge.n_train} of {len(bridge.T)} healthy records, and ratio to"
-    )
-    print("the same regressor from temperatures straight to frequencies\n")
+    print(f"MAPE in percent on the last {len(T_test)} of {len(bridge.T)} healthy records, and ratio to the same")
+    print("regressor from temperatures straight to frequencies\n")
     print(hold_out_table(bridge).to_string(), end="\n\n")
     lowest, highest = fem.predict_interval(T_test)
     held = ((lowest < F_test) & (F_test < highest)).mean()
