@@ -58,7 +58,7 @@ class Inversion:
         seconds = time.perf_counter() - fitted
         exact = (np.abs(found.theta / self.test.theta - 1) < EXACT).all(axis=1)
         wrong = found.converged & ~exact
-        fits = wrong & (found.misfit < EXACT)
+        fits = wrong & (np.sqrt((found.residuals**2).mean(axis=1)) < EXACT)
         print(f"rows with every parameter within 0.001 %, at least 99 %: {exact.mean():.1%}")
         print(f"rows counted as not converged: {(~found.converged).mean():.1%}")
         print(f"rows that converged to other parameters: {wrong.sum()} of {len(wrong)}; {fits.sum()} of them reproduce")
