@@ -309,7 +309,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         n_parameters = len(model.parameter_names)
         if n_parameters > model.n_modes:
             warn_user(
-                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart",
+                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
+                "expected more modes, or the noise of the measurement, so that the prior decides between them",
                 "few modes",
             )
         self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
