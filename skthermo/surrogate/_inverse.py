@@ -105,9 +105,9 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     material property.
 
     Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
-    refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %, a
-    Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``). Alternating M1 with M2's predictions as prior
-    was tried; nested folds confirmed no gain.
+    refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
+    a Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``). Alternating M1 with M2's predictions as
+    prior was tried; nested folds confirmed no gain.
 
     References
     ----------

@@ -55,8 +55,8 @@ class TemperatureMapper(MultiplierRegressor):
     -----
     Rows with a missing temperature or parameter are left out in `fit`, and only there.
 
-    On the last fifth of the healthy records of the bridge Z24, which is warmer than all others, the errors are 0.60 %
-    with broken lines, about 0.7 % with small networks (different for each seed), 0.67 % with random forests, 0.73 % with
+    On the last fifth of the healthy records of the bridge Z24, warmer than all others, the errors are 0.60 % with
+    broken lines, about 0.7 % with small networks (different for each seed), 0.67 % with random forests, 0.73 % with
     boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials (``examples/plot_regressors.py``).
     Trees stay at their last value beyond the data. Where few records show a sharp knee, networks follow it better.
 
