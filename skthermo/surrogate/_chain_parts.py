@@ -13,6 +13,7 @@ from skthermo._frames import check_columns, check_same_rows, check_temperatures,
 from skthermo._models import check_model
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.fem import check_bounds, linearise
+from skthermo.surrogate._applicability import last_step
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
@@ -107,7 +108,7 @@ def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: 
     the damping. None if there is no such mapper, if it is fitted to one parameter at a time, if its
     coordinates are given, or if the nominal state has no solution.
     """
-    if isinstance(mapper[-1] if isinstance(mapper, Pipeline) else mapper, MultiOutputRegressor):
+    if isinstance(last_step(mapper), MultiOutputRegressor):
         return None
     mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
     is_given = any(part.sensitivities is not None for part in mappers)

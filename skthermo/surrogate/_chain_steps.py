@@ -14,8 +14,9 @@ from skthermo._warnings import warn_each, warn_user
 from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
 from skthermo.surrogate._refined_inverse import unconverged
-from skthermo.surrogate._report import fit_report, spread_rows
+from skthermo.surrogate._report import fit_report
 from skthermo.surrogate._simulator import Simulator, tolerance
+from skthermo.surrogate._spread_rows import spread_rows
 
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
@@ -33,9 +34,13 @@ POSSIBLE = (1e-6, 1e6)
 class ChainSteps:
     """Private steps that the public methods of the chain call."""
 
-    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
+    def _temperatures(self, X: ArrayLike) -> Any:
+        """Temperatures, checked; a frame stays a frame."""
         check_is_fitted(self)
-        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+        return frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+
+    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
+        T = self._temperatures(X)
         message = self.training_range_.warning(mapper_inputs(self.mapper_, T))
         if message:
             warn_user(message, "foreign weather")
@@ -102,10 +107,7 @@ class ChainSteps:
         self.inverse_.fit(aligned)
         last, self._n_unconverged = refining_step(self.inverse_), None
         if last is not None:
-            inputs = aligned
-            for _, step in getattr(self.inverse_, "steps", [])[:-1]:
-                inputs = step.transform(inputs)
-            found = last.invert(inputs)
+            found = last.invert(mapper_inputs(self.inverse_, aligned))
             last.warn_of(found)
             self._n_unconverged = int(unconverged(found).sum())
             return as_floats(found.theta), found.residuals, found.weight if self.weighted else None

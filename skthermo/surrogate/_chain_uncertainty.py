@@ -8,13 +8,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 from sklearn.model_selection import KFold
-from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import frame_like
 from skthermo._regressors import weights_for
-from skthermo._validation import check_is_fitted, validate_data
-from skthermo.surrogate._applicability import mapper_inputs
+from skthermo._validation import check_is_fitted
+from skthermo.surrogate._applicability import last_step, mapper_inputs
 from skthermo.surrogate._residuals import WeatherResiduals
 
 N_FOLDS = 5
@@ -88,8 +87,7 @@ class ChainUncertainty:
             training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
             parameter is outside the bounds of the inverse.
         """
-        check_is_fitted(self)
-        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+        T = self._temperatures(X)
         inputs = mapper_inputs(self.mapper_, T)
         excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
@@ -129,8 +127,7 @@ class ChainUncertainty:
 
     def _weather(self, X: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Inputs of the mapper, and which rows are complete."""
-        T = frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
-        inputs = as_floats(mapper_inputs(self.mapper_, T))
+        inputs = as_floats(mapper_inputs(self.mapper_, self._temperatures(X)))
         return inputs, ~np.isnan(inputs).any(axis=1)
 
     def _spread(self, X: ArrayLike) -> Array:
@@ -151,9 +148,3 @@ class ChainUncertainty:
         if order.size:
             noise[order] = self.residuals_.draw(inputs[order], random_state)
         return noise
-
-
-def last_step(mapper: Any) -> Any:
-    """The step of a fitted mapper that learns from the inputs that `mapper_inputs` gives."""
-    mapper = getattr(mapper, "best_estimator_", mapper)
-    return mapper[-1] if isinstance(mapper, Pipeline) else mapper

@@ -18,6 +18,11 @@ LONGEST_STEP = 0.5
 """Largest change of ln theta in one step."""
 
 
+def deviations(information: Array) -> Array:
+    """Standard deviations, (n_samples, n_parameters), of Gaussians with these precision matrices."""
+    return np.sqrt(np.einsum("spp->sp", np.linalg.inv(information)))
+
+
 @dataclass(frozen=True)
 class Prior:
     """Gaussian prior of ln theta, within limits; each (n_parameters,)."""
@@ -41,7 +46,7 @@ class Prior:
 
     def deviations(self, sensitivity: Array, noise: Array) -> Array:
         """Posterior standard deviations of ln theta (Laplace's approximation), (n_samples, n_parameters)."""
-        return np.sqrt(np.einsum("spp->sp", np.linalg.inv(self.information(sensitivity, noise))))
+        return deviations(self.information(sensitivity, noise))
 
 
 @dataclass(frozen=True)

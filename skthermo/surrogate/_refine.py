@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.surrogate._posterior import Local, Objective
+from skthermo.surrogate._posterior import Local, Objective, deviations
 
 SMALL_STEP = 1e-6
 """A Gauss-Newton step of ln theta below which a row has converged."""
@@ -63,7 +63,7 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
     for remaining in range(n_steps, -1, -1):
         here = found.of(active)
         undamped = here.step(objective.prior, np.zeros(len(active)))
-        is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * deviations(here))).all(axis=1)
+        is_small = (np.abs(undamped) <= np.maximum(SMALL_STEP, SMALL_SHARE * deviations(here.hessian))).all(axis=1)
         converged[active] = is_small | (here.gain(undamped) <= SMALL_GAIN * here.value)
         found.x[active] += np.where(converged[active, np.newaxis], undamped, 0.0)
         active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
@@ -72,17 +72,13 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
         here = found.of(active)
         step = here.step(objective.prior, damping[active])
         there = objective.of(active).at(here.x + step)
-        found.put(active[there.value < here.value], there.of(there.value < here.value))
+        better = there.value < here.value
+        found.put(active[better], there.of(better))
         success = (here.value - there.value) / here.gain(step)
         harder, easier = np.maximum(FIRST_DAMPING, 4 * damping[active]), damping[active] / 10
         easier[easier < FIRST_DAMPING] = 0.0
         damping[active] = np.where(success > 0.75, easier, np.where(success > 0.25, damping[active], harder))
     return found, converged, ~converged & ((damping > FIRST_DAMPING) | ~np.isfinite(found.value))
-
-
-def deviations(here: Local) -> Array:
-    """Posterior standard deviations of ln theta."""
-    return np.sqrt(np.einsum("spp->sp", np.linalg.inv(here.hessian)))
 
 
 def normalised_misfit(objective: Objective, found: Local) -> Array:

@@ -13,11 +13,9 @@ from skthermo.fem import check_bounds, check_noise, check_prior
 from skthermo.surrogate._posterior import Objective, Prior
 from skthermo.surrogate._refine import refine
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate._spread_rows import spread_rows
 
 DEFAULT_STEPS = 100
-
-ENOUGH = 365
-"""Number of records that an estimate of their scatter needs at most."""
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, the parameters that fit the
@@ -116,8 +114,7 @@ class Refinement:
         n_modes, n_parameters = len(self.noise), guess.shape[1]
         if self.noise.all():
             return self.noise
-        rows = np.flatnonzero(~np.isnan(frequencies).any(axis=1))
-        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), ENOUGH)).astype(int))] if rows.size else rows
+        rows = spread_rows(~np.isnan(frequencies).any(axis=1))
         scatter = ASSUMED
         if n_modes > n_parameters and rows.size:
             residuals = self.refined(frequencies[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals

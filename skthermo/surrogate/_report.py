@@ -16,7 +16,6 @@ from skthermo.metrics import mape
 from skthermo.surrogate._box import Box
 from skthermo.updating import cramer_rao
 
-SCORED_ROWS = 365
 TINY = 1e-12
 
 ROWS_PER_PARAMETER = 10
@@ -160,12 +159,6 @@ def fit_report(
         n_scored=len(rows),
         n_unconverged=n_unconverged,
     )
-
-
-def spread_rows(trained: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Positions of at most a few hundred rows, spread evenly over the training rows."""
-    rows = np.flatnonzero(trained)
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), SCORED_ROWS)).astype(int))]
 
 
 def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
