@@ -13,10 +13,10 @@ from skthermo._frames import check_columns, check_same_rows, check_temperatures,
 from skthermo._models import check_model
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.fem import check_bounds, linearise
-from skthermo.surrogate._applicability import last_step
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._mapper_inputs import last_step
 
 ROWS_PER_DEGREE = 10
 """Training records for each record whose mean a prediction is as sure as: mappers have tens of degrees of freedom."""

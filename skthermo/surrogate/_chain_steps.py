@@ -11,8 +11,9 @@ from skthermo._frames import frame_like
 from skthermo._regressors import weights_for
 from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
-from skthermo.surrogate._applicability import TrainingRange, mapper_inputs
+from skthermo._weather import TrainingRange
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
+from skthermo.surrogate._mapper_inputs import mapper_inputs
 from skthermo.surrogate._refined_inverse import unconverged
 from skthermo.surrogate._report import fit_report
 from skthermo.surrogate._simulator import Simulator, tolerance

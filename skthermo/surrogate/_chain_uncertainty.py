@@ -13,7 +13,7 @@ from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import frame_like
 from skthermo._regressors import weights_for
 from skthermo._validation import check_is_fitted
-from skthermo.surrogate._applicability import last_step, mapper_inputs
+from skthermo.surrogate._mapper_inputs import last_step, mapper_inputs
 from skthermo.surrogate._residuals import WeatherResiduals
 
 N_FOLDS = 5

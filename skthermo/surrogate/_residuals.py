@@ -5,13 +5,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.decomposition import PCA
-from sklearn.neighbors import NearestNeighbors
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
+from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array
-from skthermo.surrogate._applicability import TrainingRange
+from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
 
 DRAWN_FROM = 25
 """Number of records with the most similar weather that noise is drawn from."""
@@ -21,9 +18,6 @@ SPREAD_OF = 100
 
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a drawn run of records goes on while it lasts."""
-
-EXPLAINED = 0.99
-"""Share of the variance of the weather that its coordinates keep."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +41,7 @@ class WeatherResiduals:
     @cached_property
     def coordinates(self) -> Pipeline:
         """Principal components of the standardised weather."""
-        return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(self.weather)
+        return weather_coordinates(self.weather)
 
     @cached_property
     def places(self) -> Array:
@@ -109,28 +103,3 @@ class WeatherResiduals:
         filled = np.where(np.isnan(self.values), 0.0, self.values)
         means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)
         return max(1.0, 2 * max(correlation_time(column) for column in (self.values - means).T) - 1)
-
-
-def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
-    """Distances and positions of the places nearest to each wanted one."""
-    return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
-
-
-def order_statistic(scores: Array, confidence: float) -> float:
-    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
-    rank = int(np.ceil((len(scores) + 1) * confidence))
-    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
-
-
-def correlation_time(series: Array) -> float:
-    """1 + 2 * the sum of the autocorrelations up to the first that is not clearly above zero."""
-    known = ~np.isnan(series)
-    centred = np.where(known, series - series[known].mean(), 0.0) if known.any() else np.zeros(len(series))
-    variance, time = (centred**2).sum() / max(known.sum(), 1), 1.0
-    for lag in range(1, len(series) // 10 if variance > 0 else 1):
-        pairs = max(np.count_nonzero(known[lag:] & known[:-lag]), 1)
-        correlation = (centred[lag:] @ centred[:-lag]) / pairs / variance
-        if correlation <= 2 / np.sqrt(pairs):
-            break
-        time += 2 * correlation
-    return time

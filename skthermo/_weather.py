@@ -1,17 +1,24 @@
-"""How far inputs lie outside the range that a mapper was trained on."""
+"""How alike the weather of two records is, and statistics of residuals in order of time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sklearn.pipeline import Pipeline
+from numpy.typing import NDArray
+from sklearn.decomposition import PCA
+from sklearn.neighbors import NearestNeighbors
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
 
 FAR = 0.25
-"""An input farther outside the training range than this many times its width counts as unknown weather."""
+"""A temperature farther outside the range of training than this many times its width counts as unknown weather."""
+
+EXPLAINED = 0.99
+"""Share of the variance of the weather that its coordinates keep."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +33,7 @@ class TrainingRange:
     def of(cls, inputs: Any, trained: Array) -> "TrainingRange":
         """The range of a mapper's inputs, over the rows that trained it."""
         values = as_floats(inputs)[trained]
-        return cls(values.min(axis=0), values.max(axis=0), column_names(inputs, "T"))
+        return cls(np.nanmin(values, axis=0), np.nanmax(values, axis=0), column_names(inputs, "T"))
 
     def excess(self, inputs: Any) -> Array:
         """How far each value is outside, in units of the range of its column; 0 inside, NaN where it is missing."""
@@ -55,13 +62,31 @@ class TrainingRange:
         )
 
 
-def mapper_inputs(mapper: Any, T: Any) -> Any:
-    """Inputs of the last step of a fitted mapper, such as lagged temperatures."""
-    mapper = getattr(mapper, "best_estimator_", mapper)
-    return mapper[:-1].transform(T) if isinstance(mapper, Pipeline) and len(mapper) > 1 else T
+def weather_coordinates(weather: Array) -> Pipeline:
+    """Principal components of the standardised weather, in which similar records are near each other."""
+    return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(weather)
 
 
-def last_step(mapper: Any) -> Any:
-    """The step of a fitted mapper that learns from the inputs that `mapper_inputs` gives."""
-    mapper = getattr(mapper, "best_estimator_", mapper)
-    return mapper[-1] if isinstance(mapper, Pipeline) else mapper
+def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
+    """Distances and positions of the places nearest to each wanted one."""
+    return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
+
+
+def order_statistic(scores: Array, confidence: float) -> float:
+    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
+    rank = int(np.ceil((len(scores) + 1) * confidence))
+    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
+
+
+def correlation_time(series: Array) -> float:
+    """1 + 2 * the sum of the autocorrelations up to the first that is not clearly above zero."""
+    known = ~np.isnan(series)
+    centred = np.where(known, series - series[known].mean(), 0.0) if known.any() else np.zeros(len(series))
+    variance, time = (centred**2).sum() / max(known.sum(), 1), 1.0
+    for lag in range(1, len(series) // 10 if variance > 0 else 1):
+        pairs = max(np.count_nonzero(known[lag:] & known[:-lag]), 1)
+        correlation = (centred[lag:] @ centred[:-lag]) / pairs / variance
+        if correlation <= 2 / np.sqrt(pairs):
+            break
+        time += 2 * correlation
+    return time
