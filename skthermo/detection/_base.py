@@ -18,19 +18,19 @@ from skthermo._warnings import warn_user
 class DamageDetector(OutlierMixin, BaseEstimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
-    A detector has the parameter ``contamination`` and two methods: `_learn` and `_index`. Both
-    get rows in which every mode is present.
+    A detector has the parameter ``contamination`` and two methods: `_learn` and `_index`. Both get rows in which
+    modes may be missing.
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
 
     @abstractmethod
-    def _learn(self, complete: Array) -> None:
-        """Learn the baseline from its complete rows."""
+    def _learn(self, F: Array) -> float:
+        """Learn the baseline, and give the threshold."""
 
     @abstractmethod
-    def _index(self, complete: Array) -> Array:
-        """Damage index of complete rows; higher is more damaged."""
+    def _index(self, F: Array) -> Array:
+        """Damage index of rows; higher is more damaged, NaN where there is none."""
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> Self:
@@ -39,7 +39,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz; rows with NaN are left out.
+            Frequencies in Hz, or residuals; NaN where a mode is missing.
         y : None
             Ignored.
 
@@ -60,11 +60,10 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         """
         F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
-        complete = F[_is_complete(F)]
-        if len(complete) < 2:
-            raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
-        self._learn(complete)
-        self.threshold_ = np.quantile(self._index(complete), 1 - self.contamination)
+        n_rows = int((~np.isnan(F)).any(axis=1).sum())
+        if n_rows < 2:
+            raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
+        self.threshold_ = self._learn(F)
         self.offset_ = -self.threshold_
         return self
 
@@ -83,10 +82,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         """
         check_is_fitted(self)
         F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        index = np.full(len(F), np.nan)
-        complete = _is_complete(F)
-        if complete.any():
-            index[complete] = self._index(F[complete])
+        index = self._index(F)
         return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
@@ -145,7 +141,3 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
-
-
-def _is_complete(F: Array) -> NDArray[np.bool_]:
-    return ~np.isnan(F).any(axis=1)

@@ -1,12 +1,25 @@
 """Damage index and alarm by Mahalanobis distance."""
 
+from typing import Literal
+
 import numpy as np
+from scipy.stats import chi2
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
+from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
-from skthermo._validation import HasMethods
+from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._gaussian import Gaussian, patterns, precisions
+from skthermo.detection._patterns import PatternScale, as_if_complete
+from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+
+ROWS = 20_000
+"""Number of rows whose distances are computed at a time, which bounds memory."""
+
+FOLDS = 10
+"""Periods of the baseline whose distances are computed with a covariance of the others, if it has no closed form."""
 
 
 class MahalanobisDetector(DamageDetector):
@@ -67,36 +80,119 @@ class MahalanobisDetector(DamageDetector):
     _parameter_constraints: dict = {
         **DamageDetector._parameter_constraints,
         "covariance": [HasMethods(["fit", "mahalanobis"]), None],
+        "threshold": [StrOptions({"quantile", "conformal", "chi2"})],
     }
 
-    def __init__(self, contamination: float = 0.02, *, covariance: BaseEstimator | None = None):
+    def __init__(
+        self,
+        contamination: float = 0.02,
+        *,
+        covariance: BaseEstimator | None = None,
+        threshold: Literal["quantile", "conformal", "chi2"] = "conformal",
+    ):
         self.contamination = contamination
         self.covariance = covariance
+        self.threshold = threshold
 
-    def _learn(self, complete: Array) -> None:
-        covariance = EmpiricalCovariance() if self.covariance is None else clone(self.covariance)
-        self.covariance_ = covariance.fit(complete)
-        scale = _scale(self.covariance_.covariance_, complete)
+    def _learn(self, F: Array) -> float:
+        present = ~np.isnan(F)
+        self.covariance_ = _most_likely(F) if self.covariance is None else _fit_complete(self.covariance, F)
+        distances = self._distances(F)
+        if self.threshold == "conformal":
+            distances = self._left_out(F, distances)
+        index = as_if_complete(distances, present.sum(axis=1), F.shape[1])
+        self.pattern_scale_ = PatternScale.of(index, present, self.contamination)
+        if self.threshold == "chi2":
+            return float(np.sqrt(chi2.isf(self.contamination, F.shape[1])))
+        choose = quantile_threshold if self.threshold == "quantile" else conformal_threshold
+        return choose(index * self.pattern_scale_(present), self.contamination)
+
+    def _index(self, F: Array) -> Array:
+        index = np.empty(len(F))
+        for first in range(0, len(F), ROWS):
+            rows = F[first : first + ROWS]
+            distances, present = self._distances(rows), ~np.isnan(rows)
+            if not present.all():
+                distances = as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
+            index[first : first + ROWS] = distances
+        return index
+
+    def _distances(self, F: Array) -> Array:
+        """Distances of rows in the modes that they have; NaN where there is none."""
+        scale = np.sqrt(np.diag(self.covariance_.covariance_))
         correlation = self.covariance_.covariance_ / np.outer(scale, scale)
-        _check_invertible(correlation, len(complete))
-        if self.covariance is None:  # its own inverse loses modes in a small unit beside others in a large one
-            self.covariance_.precision_ = np.linalg.inv(correlation) / np.outer(scale, scale)
+        standard = (F - self.covariance_.location_) / scale
+        present = ~np.isnan(F)
+        if present.all():
+            if self.covariance is not None:
+                return np.sqrt(self.covariance_.mahalanobis(F))
+            standard = standard @ np.linalg.cholesky(np.linalg.inv(correlation))
+            return np.sqrt(np.einsum("ij,ij->i", standard, standard))
+        masks, of_row = patterns(present)
+        inverses = precisions(np.broadcast_to(correlation, (len(masks), *correlation.shape)), masks)
+        standard = np.nan_to_num(standard)
+        squared = np.einsum("ij,ijk,ik->i", standard, inverses[of_row], standard)
+        return np.where(present.any(axis=1), np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
-    def _index(self, complete: Array) -> Array:
-        return np.sqrt(self.covariance_.mahalanobis(complete))
+    def _left_out(self, F: Array, distances: Array) -> Array:
+        """Distances of baseline rows from the other rows."""
+        if self.covariance is None:
+            present = ~np.isnan(F)
+            n_rows = np.where(present, present.sum(axis=0), len(F)).min(axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                left_out = np.sqrt(n_rows * distances**2 / (n_rows - 1 - distances**2))
+            return np.where(distances**2 < n_rows - 1, left_out, np.where(np.isnan(distances), np.nan, np.inf))
+        complete, left_out = np.flatnonzero(~np.isnan(F).any(axis=1)), distances.copy()
+        for rest, fold in KFold(min(FOLDS, len(complete))).split(complete):
+            others = clone(self.covariance).fit(F[complete[rest]])
+            left_out[complete[fold]] = np.sqrt(others.mahalanobis(F[complete[fold]]))
+        return left_out
 
 
-def _scale(covariance: Array, complete: Array) -> Array:
-    """Standard deviations of the modes; infinite where a mode is constant, and its deviation only rounding."""
-    deviations = np.sqrt(np.diag(covariance))
-    return np.where(deviations <= 1e-14 * np.abs(complete).max(axis=0), np.inf, deviations)
+def _most_likely(F: Array) -> EmpiricalCovariance:
+    """Mean and covariance of rows with or without gaps."""
+    empty = np.isnan(F).all(axis=0)
+    if empty.any():
+        raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(F)} rows")
+    try:
+        learned = Gaussian.of(F)
+    except np.linalg.LinAlgError:
+        raise ValueError(_singular(F, "too low")) from None
+    scale = _check_invertible(learned.covariance, F)
+    fitted = EmpiricalCovariance()
+    fitted.location_, fitted.covariance_, fitted.n_features_in_ = learned.mean, learned.covariance, F.shape[1]
+    # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
+    fitted.precision_ = np.linalg.inv(learned.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
+    return fitted
 
 
-def _check_invertible(correlation: Array, n_rows: int) -> None:
-    rank = np.linalg.matrix_rank(correlation, hermitian=True)
-    if rank < len(correlation):
+def _fit_complete(covariance: BaseEstimator, F: Array) -> BaseEstimator:
+    """A clone of a covariance estimator, which takes only complete rows."""
+    complete = F[~np.isnan(F).any(axis=1)]
+    if len(complete) < 2:
         raise ValueError(
-            f"the covariance of {n_rows} complete baseline rows and {len(correlation)} modes is singular "
-            f"(rank {rank}); expected more than {len(correlation)} rows, no mode that is constant or a copy "
-            "of others, or a shrunk covariance such as LedoitWolf()"
+            f"{len(complete)} of {len(F)} rows have every mode; expected at least 2 for the covariance "
+            f"{covariance!r} (covariance=None takes rows with gaps)"
         )
+    fitted = clone(covariance).fit(complete)
+    _check_invertible(fitted.covariance_, complete)
+    return fitted
+
+
+def _check_invertible(covariance: Array, F: Array) -> Array:
+    """Standard deviations of the modes, if no mode is constant or a combination of others."""
+    deviations = np.sqrt(np.diag(covariance))
+    # A deviation of a constant mode is only rounding.
+    scale = np.where(deviations <= 1e-14 * np.nanmax(np.abs(F), axis=0), np.inf, deviations)
+    rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), hermitian=True)
+    if rank < len(covariance):
+        raise ValueError(_singular(F, str(rank)))
+    return scale
+
+
+def _singular(F: Array, rank: str) -> str:
+    return (
+        f"the covariance of {len(F)} baseline rows and {F.shape[1]} modes is singular (rank {rank}); expected more "
+        f"than {F.shape[1]} rows, no mode that is constant or a copy of others, or a shrunk covariance such as "
+        "LedoitWolf()"
+    )

@@ -1,10 +1,12 @@
 """Damage index and alarm by any of scikit-learn's outlier detectors."""
 
+import numpy as np
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._arrays import Array
 from skthermo._validation import HasMethods
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._thresholds import quantile_threshold
 
 
 class OutlierDetector(DamageDetector):
@@ -85,13 +87,20 @@ class OutlierDetector(DamageDetector):
         self.estimator = estimator
         self.contamination = contamination
 
-    def _learn(self, complete: Array) -> None:
+    def _learn(self, F: Array) -> float:
         if not hasattr(self.estimator, "score_samples"):
             raise ValueError(
                 f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "
                 "scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)"
             )
+        complete = F[~np.isnan(F).any(axis=1)]
+        if len(complete) < 2:
+            raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
         self.estimator_ = clone(self.estimator).fit(complete)
+        return quantile_threshold(self._index(complete), self.contamination)
 
-    def _index(self, complete: Array) -> Array:
-        return -self.estimator_.score_samples(complete)
+    def _index(self, F: Array) -> Array:
+        index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)
+        if complete.any():
+            index[complete] = -self.estimator_.score_samples(F[complete])
+        return index

@@ -1,0 +1,115 @@
+"""Normal distributions of rows in which modes may be missing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+
+Mask = NDArray[np.bool_]
+MOST_STEPS = 1000
+TOLERANCE = 1e-9
+"""Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Mean and covariance of all modes; a row's distance is that of the modes that it has.
+
+    Attributes
+    ----------
+    mean : ndarray of shape (n_modes,)
+    covariance : ndarray of shape (n_modes, n_modes)
+    """
+
+    mean: Array
+    covariance: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> "Gaussian":
+        """The most likely one, by expectation maximisation where modes are missing."""
+        present = ~np.isnan(rows)
+        centre = np.nanmean(rows, axis=0)
+        deviations = np.nanstd(rows, axis=0)
+        scale = np.where(deviations > 0, deviations, 1.0)
+        standard = np.where(present, (rows - centre) / scale, 0.0)
+        mean, covariance = _expectation_maximisation(standard, present)
+        return cls(centre + scale * mean, covariance * np.outer(scale, scale))
+
+    def centred(self, rows: Array) -> Array:
+        """Rows minus the mean; zero where a mode is missing."""
+        return np.nan_to_num(rows - self.mean)
+
+    def second_moments(self, rows: Array) -> Array:
+        """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
+        present = ~np.isnan(rows)
+        masks, of_row = patterns(present)
+        fill, rest = _conditionals(self.covariance, masks)
+        complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
+        return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
+
+
+def patterns(present: Mask) -> tuple[Mask, NDArray[np.intp]]:
+    """Different rows of a mask, and which of them each row is."""
+    if present.all():
+        return present[:1], np.zeros(len(present), dtype=np.intp)
+    packed = np.packbits(present, axis=1)
+    keys = np.ascontiguousarray(packed).view(np.dtype((np.void, packed.shape[1]))).ravel()
+    first, of_row = np.unique(keys, return_index=True, return_inverse=True)[1:]
+    return present[first], of_row.ravel()
+
+
+def precisions(covariances: Array, masks: Mask) -> Array:
+    """Inverses of the covariances of the modes in each mask; zero elsewhere."""
+    both = masks[..., :, np.newaxis] & masks[..., np.newaxis, :]
+    return np.where(both, np.linalg.inv(_alone(covariances, masks, both)), 0.0)
+
+
+def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
+    """Symmetric roots of the `precisions`, and the logarithms of the determinants of the covariances."""
+    both = masks[..., :, np.newaxis] & masks[..., np.newaxis, :]
+    values, vectors = np.linalg.eigh(_alone(covariances, masks, both))
+    roots = np.einsum("...ij,...j,...kj->...ik", vectors, 1 / np.sqrt(values), vectors)
+    return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
+
+
+def _alone(covariances: Array, masks: Mask, both: Mask) -> Array:
+    """Covariances in which missing modes have unit variance and no correlation."""
+    return np.where(both, covariances, 0.0) + np.eye(masks.shape[-1]) * ~masks[..., np.newaxis, :]
+
+
+def _conditionals(covariance: Array, masks: Mask) -> tuple[Array, Array]:
+    """Matrices that complete centred rows of each mask, and the covariance of what they fill in."""
+    fill = covariance @ precisions(np.broadcast_to(covariance, (len(masks), *covariance.shape)), masks)
+    return fill, covariance - fill @ covariance
+
+
+def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]:
+    """Mean and covariance of standardised rows that hold zeros where a mode is missing."""
+    n_modes = rows.shape[1]
+    if present.all():
+        mean = rows.mean(axis=0)
+        return mean, (rows - mean).T @ (rows - mean) / len(rows)
+    masks, of_row = patterns(present)
+    counts = np.bincount(of_row).astype(float)
+    sums, products = np.zeros((len(masks), n_modes)), np.zeros((len(masks), n_modes, n_modes))
+    for pattern in range(len(masks)):
+        group = rows[of_row == pattern]
+        sums[pattern], products[pattern] = group.sum(axis=0), group.T @ group
+    mean, covariance = np.zeros(n_modes), np.eye(n_modes)
+    for _ in range(MOST_STEPS):
+        shift = masks * mean
+        cross = sums[:, :, np.newaxis] * shift[:, np.newaxis, :]
+        centred_sums = sums - counts[:, np.newaxis] * shift
+        centred = products - cross - cross.transpose(0, 2, 1)
+        centred += counts[:, np.newaxis, np.newaxis] * shift[:, :, np.newaxis] * shift[:, np.newaxis, :]
+        fill, rest = _conditionals(covariance, masks)
+        step = np.einsum("ijk,ik->j", fill, centred_sums) / len(rows)
+        moments = fill @ centred @ fill.transpose(0, 2, 1) + counts[:, np.newaxis, np.newaxis] * rest
+        updated = moments.sum(axis=0) / len(rows) - np.outer(step, step)
+        moved = max(np.abs(step).max(), np.abs(updated - covariance).max())
+        mean, covariance = mean + step, (updated + updated.T) / 2
+        if moved < TOLERANCE:
+            break
+    return mean, covariance

@@ -1,0 +1,40 @@
+"""Thresholds of damage indices that keep a rate of false alarms."""
+
+import numpy as np
+
+from skthermo._arrays import Array
+from skthermo._warnings import warn_user
+
+
+def quantile_threshold(index: Array, contamination: float) -> float:
+    """The (1 - contamination) quantile of a baseline's indices, NaN left out."""
+    return float(np.nanquantile(index, 1 - contamination))
+
+
+def conformal_threshold(index: Array, contamination: float, share: float = 1.0) -> float:
+    """The ceil((n + 1)(1 - contamination))-th smallest index, which a new one exceeds with that probability at most.
+
+    Parameters
+    ----------
+    index : ndarray of shape (n_samples,)
+        Indices of baseline records, each by a detector that was not fitted on it; NaN is left out.
+    contamination : float
+    share : float
+        Number of independent records for each record, where they depend on their neighbours in time.
+
+    Returns
+    -------
+    float
+        The largest index, with a warning, if there are too few records for the rate.
+    """
+    ordered = np.sort(index[~np.isnan(index)])
+    n_independent = share * len(ordered)
+    rank = int(np.ceil((n_independent + 1) * (1 - contamination) / share - 1e-9))
+    if rank > len(ordered):
+        warn_user(
+            f"{n_independent:.0f} independent baseline records are too few for a rate of false alarms of "
+            f"{contamination:.2g}: the threshold is the largest index, which later records exceed at a rate of about "
+            f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
+            "few records for a threshold",
+        )
+    return float(ordered[min(rank, len(ordered)) - 1])
