@@ -3,14 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from skthermo._arrays import Array
-from skthermo._weather import order_statistic
 from skthermo.detection._gaussian import Mask, patterns
 
 CHANCE = 0.95
-"""Patterns get thresholds of their own only if they differ by more than chance would with this probability."""
+"""Groups of rows get factors of their own only if they differ by more than chance would with this probability."""
+
+TENTH = 0.1
+"""Share of a pattern's rows above the level by which its factor is learned: a rare one has too few alarms for that."""
+
+FEWEST = 50
+"""Number of rows from which a group gets a factor of its own."""
 
 
 def as_if_complete(distances: Array, n_present: Array, n_modes: int) -> Array:
@@ -30,55 +36,63 @@ def as_if_complete(distances: Array, n_present: Array, n_modes: int) -> Array:
 class PatternScale:
     """Factors that make the indices of every pattern of missing modes exceed one threshold equally often.
 
+    A pattern's factor is that of all rows with as many modes, at the threshold, times its own, at the highest tenth of
+    its rows. Both are drawn to 1 as far as groups differ no more than by chance. Complete rows have the factor 1.
+
     Attributes
     ----------
+    by_number : ndarray of shape (n_modes + 1,)
+        Factors by the number of modes that are there.
     masks : ndarray of shape (n_patterns, n_modes)
-        Patterns of modes that are there.
-    factors : ndarray of shape (n_patterns,)
-    elsewhere : float
-        Factor of all other patterns.
+        Patterns with factors of their own.
+    by_pattern : ndarray of shape (n_patterns,)
     """
 
+    by_number: Array
     masks: Mask
-    factors: Array
-    elsewhere: float
+    by_pattern: Array
 
     @classmethod
     def of(cls, index: Array, present: Mask, contamination: float) -> "PatternScale":
-        """Learned from a baseline, shrunk to one common factor where a pattern is rare or the patterns are alike."""
+        """Learned from the indices of a baseline."""
+        known = np.isfinite(index)
+        index, present = index[known], present[known]
+        by_number = _factors(index, present.sum(axis=1), present.shape[1] + 1, contamination)
         masks, of_row = patterns(present)
-        known = ~np.isnan(index)
-        thresholds = np.array(
-            [order_statistic(index[known & (of_row == pattern)], 1 - contamination) for pattern in range(len(masks))]
-        )
-        enough = np.isfinite(thresholds)
-        masks, counts = masks[enough], np.bincount(of_row[known], minlength=len(enough))[enough]
-        if len(masks) < 2:
-            return cls(masks[:0], np.empty(0), 1.0)
-        steepness = _steepness(np.log(index[known]), contamination)
-        logs, common = _shrunk(np.log(thresholds[enough]), contamination * (1 - contamination) * steepness**2 / counts)
-        complete = masks.all(axis=1)
-        reference = logs[complete][0] if complete.any() else common
-        return cls(masks, np.exp(reference - logs), float(np.exp(reference - common)))
+        by_pattern = _factors(index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, TENTH))
+        scale = cls(by_number, masks, by_pattern)
+        complete = scale._raw(np.ones((1, present.shape[1]), dtype=bool))[0]
+        return cls(by_number / complete, masks, by_pattern)
 
     def __call__(self, present: Mask) -> Array:
         """Factors of rows, by which of their modes are there."""
         masks, of_row = patterns(present)
+        return self._raw(masks)[of_row]
+
+    def _raw(self, masks: Mask) -> Array:
         same = (masks[:, np.newaxis] == self.masks).all(axis=2)
-        factors = np.where(same.any(axis=1), same @ self.factors, self.elsewhere)
-        return np.where(masks.all(axis=1), 1.0, factors)[of_row]
+        return self.by_number[masks.sum(axis=1)] * np.where(same.any(axis=1), same @ self.by_pattern, 1.0)
 
 
-def _steepness(log_index: Array, contamination: float) -> float:
-    """How fast the logarithm of a quantile grows with its probability, near the threshold."""
-    low, high = 1 - min(2 * contamination, 0.9), 1 - contamination / 2
-    return float(np.diff(np.quantile(log_index, [low, high]))[0] / (high - low))
+def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float) -> Array:
+    """Factors that make the groups exceed one level equally often, 1 where a group is small."""
+    counts = np.bincount(group, minlength=n_groups)
+    large = np.flatnonzero(counts >= max(FEWEST, 1 / share))
+    if len(large) < 2:
+        return np.ones(n_groups)
+    logs = np.log(index)
+    values = np.array([np.quantile(logs[group == one], 1 - share) for one in large])
+    low, high = 1 - min(2 * share, 0.9), 1 - share / 2
+    steepness = np.diff(np.quantile(logs, [low, high]))[0] / (high - low)
+    factors = np.ones(n_groups)
+    factors[large] = np.exp(-_effects(values, share * (1 - share) * steepness**2 / counts[large]))
+    return factors
 
 
-def _shrunk(values: Array, variances: Array) -> tuple[Array, float]:
-    """Values drawn towards their common mean as in a random-effects model, and that mean."""
+def _effects(values: Array, variances: Array) -> Array:
+    """Differences from the mean, shrunk as in a random-effects model; zero if chance may have caused them."""
     weights = 1 / variances
-    mean = float(np.average(values, weights=weights))
-    scatter = (weights * (values - mean) ** 2).sum() - chi2.ppf(CHANCE, len(values) - 1)
-    between = max(scatter / (weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
-    return mean + (values - mean) * between / (between + variances), mean
+    differences = values - np.average(values, weights=weights)
+    excess = (weights * differences**2).sum() - chi2.ppf(CHANCE, len(values) - 1)
+    between = max(excess / (weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
+    return differences * between / (between + variances)
