@@ -33,7 +33,7 @@ class TrainingRange:
     def of(cls, inputs: Any, trained: Array) -> "TrainingRange":
         """The range of a mapper's inputs, over the rows that trained it."""
         values = as_floats(inputs)[trained]
-        return cls(np.nanmin(values, axis=0), np.nanmax(values, axis=0), column_names(inputs, "T"))
+        return cls(np.fmin.reduce(values), np.fmax.reduce(values), column_names(inputs, "T"))
 
     def excess(self, inputs: Any) -> Array:
         """How far each value is outside, in units of the range of its column; 0 inside, NaN where it is missing."""
@@ -56,7 +56,7 @@ class TrainingRange:
         kelvin = " (these look like kelvin)" if np.nanmin(values[known]) > 150 else ""
         value, lowest, highest = values[row, column], self.lowest[column], self.highest[column]
         return (
-            f"{rows.sum()} of {len(rows)} rows have temperatures far outside those that the mapper was trained on: "
+            f"{rows.sum()} of {len(rows)} rows have temperatures far outside those of the training records: "
             f"{self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} to {highest:.4g}; expected "
             f"degrees Celsius{kelvin}, and records of such weather to train on"
         )

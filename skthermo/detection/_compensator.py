@@ -1,8 +1,7 @@
 """Removes the effect of temperature from frequencies by regression."""
 
 from collections.abc import Iterable, Sequence
-from numbers import Integral
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -10,16 +9,21 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
+from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_temperatures, frame_like
 from skthermo._validation import (
     HasMethods,
+    StrOptions,
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
     validate_data,
 )
 from skthermo._warnings import warn_user
+from skthermo._weather import TrainingRange
 from skthermo.detection._complete_rows import CompleteRowsRegressor
+from skthermo.detection._targets import check_positions_are_names, positions_of
+from skthermo.detection._whitening import Spread
 
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
@@ -111,6 +115,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
         "cv": ["cv_object"],
+        "scale": [StrOptions({"global", "local"}), None],
     }
 
     def __init__(
@@ -119,10 +124,12 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         *,
         targets: Sequence[str] | Sequence[int],
         cv: int | BaseCrossValidator | Iterable | None = None,
+        scale: Literal["global", "local"] | None = None,
     ):
         self.estimator = estimator
         self.targets = targets
         self.cv = cv
+        self.scale = scale
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> "TemperatureCompensator":
@@ -151,7 +158,12 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         UserWarning
             If another column looks like kelvin, or holds numbers that stand for a missing value, such as -999.
         """
-        return self._learn(*self._read_baseline(X))
+        temperatures, frequencies = self._read_baseline(X)
+        if self.scale is None:
+            self._learn(temperatures, frequencies)
+        else:
+            self._out_of_fold(temperatures, frequencies)
+        return self
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
@@ -180,10 +192,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
             As in `fit`.
         """
         temperatures, frequencies = self._read_baseline(X)
-        folds = self._folds(temperatures)
-        self._learn(temperatures, frequencies)
-        predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=folds)
-        return self._residuals(frequencies, predicted)
+        return frame_like(frequencies, self._out_of_fold(temperatures, frequencies))
 
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Residuals of new records.
@@ -210,7 +219,30 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
-        return self._residuals(frequencies, self.regression_.predict(temperatures))
+        weather = as_floats(temperatures)
+        known = ~np.isnan(weather).any(axis=1)
+        message = self.training_range_.warning(weather[known]) if known.any() else ""
+        if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
+            warn_user(message, "foreign weather")
+        residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
+        return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
+
+    def applicability(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """How far the temperatures of records lie outside those of the baseline.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features - n_targets)
+            In units of the range of each column in the baseline; 0 inside it, NaN where the value is missing.
+        """
+        check_is_fitted(self)
+        temperatures, _ = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
+        return frame_like(temperatures, self.training_range_.excess(temperatures))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the targets.
@@ -231,19 +263,29 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         if isinstance(self.estimator, type):
             raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
-        _check_positions_are_names(self.targets, getattr(X, "columns", ()))
-        self.targets_ = _positions(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+        check_positions_are_names(self.targets, getattr(X, "columns", ()))
+        self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         return self._split(X, values)
 
-    def _residuals(self, frequencies: Any, predicted: NDArray) -> NDArray[np.float64] | pd.DataFrame:
-        return frame_like(frequencies, np.asarray(frequencies) - predicted)
-
-    def _learn(self, temperatures: Any, frequencies: Any) -> "TemperatureCompensator":
+    def _learn(self, temperatures: Any, frequencies: Any) -> None:
         self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
         self.estimator_ = self.regression_.estimator_
-        return self
+        self.training_range_ = TrainingRange.of(temperatures, ~np.isnan(as_floats(frequencies)).all(axis=1))
+
+    def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
+        """Learn from all rows, and give residuals of each by what the other folds teach."""
+        folds, untested = self._folds(temperatures)
+        self._learn(temperatures, frequencies)
+        partition = [*folds, (untested, untested)] if untested.size else folds
+        predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=partition)
+        residuals, weather = as_floats(frequencies) - predicted, as_floats(temperatures)
+        residuals[untested] = np.nan
+        if self.scale is None:
+            return residuals
+        self.spread_, white = Spread.of(weather, residuals, local=self.scale == "local")
+        return white
 
     def _split(self, X: Any, values: NDArray) -> tuple[Any, Any]:
         """The other columns and the targets, as frames if X is one."""
@@ -256,56 +298,21 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
             warn_user(str(error), "temperatures")
         return temperatures, frequencies
 
-    def _folds(self, X: Any) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    def _folds(self, X: Any) -> tuple[list[tuple[NDArray[np.intp], NDArray[np.intp]]], NDArray[np.intp]]:
+        """The folds, and the rows before the first of them, which a splitter that goes forward in time leaves out."""
         folds = list(check_cv(self.cv).split(X))
         tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
-        wrong = np.flatnonzero(tested != 1)
+        untested = np.arange(tested.argmax())
+        wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
         if wrong.size:
             raise ValueError(
                 f"cv is {self.cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
-                "rows not exactly once); expected a partition of the rows, such as KFold makes"
+                "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
+                "first, as TimeSeriesSplit does"
             )
-        return folds
+        return folds, untested
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
-
-
-def _check_positions_are_names(targets: Any, columns: Any) -> None:
-    """Refuse integer targets where they could be names of columns as well as positions."""
-    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
-    if integers and list(columns) not in ([], list(range(len(columns)))):
-        raise ValueError(
-            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
-            "; expected columns named by text, or 0, 1, 2, ..."
-        )
-
-
-def _positions(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
-    """Positions of the targets, which are given by name or by position."""
-    targets = list(targets)
-    if targets and all(isinstance(target, str) for target in targets):
-        if names is None:
-            raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
-        columns = list(names)
-        unknown = [target for target in targets if columns.count(target) != 1]
-        if unknown:
-            raise ValueError(f"targets {unknown} are not columns of X, or more than one; expected some of {columns}")
-        positions = [columns.index(target) for target in targets]
-    elif all(isinstance(target, Integral) and not isinstance(target, bool) for target in targets):
-        positions = [int(target) for target in targets]
-        outside = [position for position in positions if not 0 <= position < n_columns]
-        if outside:
-            raise ValueError(f"targets {outside} are not columns of X; expected indexes from 0 to {n_columns - 1}")
-    else:
-        raise ValueError(f"targets is {targets}; expected names of columns or their indexes, not both")
-    if len(set(positions)) < len(positions):
-        raise ValueError(f"targets {targets} repeat a column; expected each once")
-    if not 0 < len(positions) < n_columns:
-        raise ValueError(
-            f"targets are {len(positions)} of the {n_columns} columns of X; expected at least one, and at least one "
-            "other column to predict them from"
-        )
-    return np.array(positions, dtype=np.intp)

@@ -13,6 +13,10 @@ TOLERANCE = 1e-9
 """Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
 
 
+JITTER = 1e-12
+"""Added to the variances of standardised modes, so that copies of a mode have inverses until `check_invertible`."""
+
+
 @dataclass(frozen=True)
 class Gaussian:
     """Mean and covariance of all modes; a row's distance is that of the modes that it has.
@@ -74,6 +78,22 @@ def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
     return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
 
 
+def check_invertible(covariance: Array, rows: Array) -> Array:
+    """Standard deviations of the modes, if no mode is constant or a combination of others."""
+    deviations = np.sqrt(np.diag(covariance))
+    # A deviation of a constant mode is only rounding.
+    scale = np.where(deviations <= 1e-14 * np.nanmax(np.abs(rows), axis=0), np.inf, deviations)
+    rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), hermitian=True)
+    if rank < len(covariance):
+        n_rows = int((~np.isnan(rows)).any(axis=1).sum())
+        raise ValueError(
+            f"the covariance of {n_rows} baseline rows and {len(covariance)} modes is singular (rank {rank}); expected "
+            f"more than {len(covariance)} rows, no mode that is constant or a copy of others, or a shrunk covariance "
+            "such as LedoitWolf()"
+        )
+    return scale
+
+
 def _alone(covariances: Array, masks: Mask, both: Mask) -> Array:
     """Covariances in which missing modes have unit variance and no correlation."""
     return np.where(both, covariances, 0.0) + np.eye(masks.shape[-1]) * ~masks[..., np.newaxis, :]
@@ -104,7 +124,7 @@ def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]
         centred_sums = sums - counts[:, np.newaxis] * shift
         centred = products - cross - cross.transpose(0, 2, 1)
         centred += counts[:, np.newaxis, np.newaxis] * shift[:, :, np.newaxis] * shift[:, np.newaxis, :]
-        fill, rest = _conditionals(covariance, masks)
+        fill, rest = _conditionals(covariance + JITTER * np.eye(n_modes), masks)
         step = np.einsum("ijk,ik->j", fill, centred_sums) / len(rows)
         moments = fill @ centred @ fill.transpose(0, 2, 1) + counts[:, np.newaxis, np.newaxis] * rest
         updated = moments.sum(axis=0) / len(rows) - np.outer(step, step)

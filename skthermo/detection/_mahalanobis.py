@@ -11,7 +11,7 @@ from sklearn.model_selection import KFold
 from skthermo._arrays import Array
 from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._gaussian import Gaussian, patterns, precisions
+from skthermo.detection._gaussian import Gaussian, check_invertible, patterns, precisions
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
@@ -154,11 +154,8 @@ def _most_likely(F: Array) -> EmpiricalCovariance:
     empty = np.isnan(F).all(axis=0)
     if empty.any():
         raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(F)} rows")
-    try:
-        learned = Gaussian.of(F)
-    except np.linalg.LinAlgError:
-        raise ValueError(_singular(F, "too low")) from None
-    scale = _check_invertible(learned.covariance, F)
+    learned = Gaussian.of(F)
+    scale = check_invertible(learned.covariance, F)
     fitted = EmpiricalCovariance()
     fitted.location_, fitted.covariance_, fitted.n_features_in_ = learned.mean, learned.covariance, F.shape[1]
     # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
@@ -175,24 +172,5 @@ def _fit_complete(covariance: BaseEstimator, F: Array) -> BaseEstimator:
             f"{covariance!r} (covariance=None takes rows with gaps)"
         )
     fitted = clone(covariance).fit(complete)
-    _check_invertible(fitted.covariance_, complete)
+    check_invertible(fitted.covariance_, complete)
     return fitted
-
-
-def _check_invertible(covariance: Array, F: Array) -> Array:
-    """Standard deviations of the modes, if no mode is constant or a combination of others."""
-    deviations = np.sqrt(np.diag(covariance))
-    # A deviation of a constant mode is only rounding.
-    scale = np.where(deviations <= 1e-14 * np.nanmax(np.abs(F), axis=0), np.inf, deviations)
-    rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), hermitian=True)
-    if rank < len(covariance):
-        raise ValueError(_singular(F, str(rank)))
-    return scale
-
-
-def _singular(F: Array, rank: str) -> str:
-    return (
-        f"the covariance of {len(F)} baseline rows and {F.shape[1]} modes is singular (rank {rank}); expected more "
-        f"than {F.shape[1]} rows, no mode that is constant or a copy of others, or a shrunk covariance such as "
-        "LedoitWolf()"
-    )
