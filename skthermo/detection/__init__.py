@@ -3,5 +3,6 @@
 from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
+from skthermo.detection._windowed_alarm import WindowedAlarm
 
-__all__ = ["MahalanobisDetector", "OutlierDetector", "TemperatureCompensator"]
+__all__ = ["MahalanobisDetector", "OutlierDetector", "TemperatureCompensator", "WindowedAlarm"]

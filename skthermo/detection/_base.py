@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from numbers import Real
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -24,12 +24,16 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
 
+    def _records(self, X: Any, F: Array) -> Any:
+        """What is learned from and judged: the rows, or what a detector makes of them."""
+        return F
+
     @abstractmethod
-    def _learn(self, F: Array) -> float:
+    def _learn(self, F: Any) -> float:
         """Learn the baseline, and give the threshold."""
 
     @abstractmethod
-    def _index(self, F: Array) -> Array:
+    def _index(self, F: Any) -> Array:
         """Damage index of rows; higher is more damaged, NaN where there is none."""
 
     @_fit_context(prefer_skip_nested_validation=False)
@@ -63,7 +67,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
-        self.threshold_ = self._learn(F)
+        self.threshold_ = self._learn(self._records(X, F))
         self.offset_ = -self.threshold_
         return self
 
@@ -82,7 +86,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         """
         check_is_fitted(self)
         F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
-        index = self._index(F)
+        index = self._index(self._records(X, F))
         return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:

@@ -1,0 +1,164 @@
+"""Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import betainc, betaincinv
+from scipy.stats import chi
+
+from skthermo._arrays import Array
+from skthermo.detection._mahalanobis import MahalanobisDetector
+
+SMALLEST = 1e-300
+"""Probabilities are not followed below this."""
+
+NUMBERS = 2_000_000
+"""Numbers that are sorted at a time."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Records in order of time, and the first record of the window that ends with each.
+
+    Attributes
+    ----------
+    rows : ndarray of shape (n_records, n_modes)
+    first : ndarray of shape (n_records,)
+    """
+
+    rows: Array
+    first: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, X: Any, rows: Array, window: int | str) -> "Windows":
+        """Windows of a number of records, or of a time on the index of a frame."""
+        if not isinstance(window, str):
+            return cls(rows, np.maximum(np.arange(len(rows)) - window + 1, 0))
+        times = getattr(X, "index", None)
+        if not isinstance(times, pd.DatetimeIndex):
+            raise ValueError(
+                f"window is {window!r}, a time; expected a frame on a DatetimeIndex, or a number of records"
+            )
+        if not times.is_monotonic_increasing:
+            raise ValueError(f"window is {window!r}, a time; expected records in order of time")
+        return cls(rows, times.searchsorted(times - pd.Timedelta(window), side="right"))
+
+    def sums(self, values: Array) -> Array:
+        """Sums of the values of the records in every window."""
+        totals = np.concatenate([np.zeros((1, *values.shape[1:])), values.cumsum(axis=0)])
+        return totals[1:] - totals[self.first]
+
+    @property
+    def sizes(self) -> NDArray[np.intp]:
+        """Number of records in every window."""
+        return np.arange(len(self.rows)) - self.first + 1
+
+    @property
+    def longest(self) -> int:
+        """Largest number of records in a window."""
+        return int(self.sizes.max())
+
+
+class WindowLaw(Protocol):
+    """What a baseline teaches about windows."""
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window; NaN where no record has a mode."""
+
+
+@dataclass(frozen=True)
+class MeanLaw:
+    """Distance of the mean of a window, whose variance grows with the correlation of records in it.
+
+    Attributes
+    ----------
+    centre : ndarray of shape (n_modes,)
+    correlation : ndarray of shape (n_modes,)
+        Mean correlation of two records in one window.
+    detector : MahalanobisDetector
+        Judges means over their standard deviation.
+    """
+
+    centre: Array
+    correlation: Array
+    detector: MahalanobisDetector
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "MeanLaw":
+        """Learned from the windows that end at some rows."""
+        centre = np.nanmean(windows.rows[rows], axis=0)
+        centred = np.nan_to_num(windows.rows - centre)
+        sums, squares = windows.sums(centred)[rows], windows.sums(centred**2)[rows]
+        counts = windows.sums(~np.isnan(windows.rows))[rows]
+        variance = squares.sum(axis=0) / counts.sum(axis=0)
+        pairs = np.maximum((counts * (counts - 1)).sum(axis=0), 1)
+        correlation = np.clip((sums**2 - squares).sum(axis=0) / pairs / variance, 0.0, 1.0)
+        detector = MahalanobisDetector(contamination, threshold="quantile")
+        law = cls(centre, correlation, detector)
+        detector.fit(law._standard_means(windows)[rows])
+        return law
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window."""
+        return self.detector.damage_index(self._standard_means(windows))
+
+    def _standard_means(self, windows: Windows) -> Array:
+        counts = windows.sums(~np.isnan(windows.rows))
+        deviations = np.sqrt(counts * (1 + (counts - 1) * self.correlation))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return windows.sums(np.nan_to_num(windows.rows - self.centre)) / deviations
+
+
+@dataclass(frozen=True)
+class CountLaw:
+    """The m-th largest damage index of the records in a window: it exceeds a threshold where m records do.
+
+    In a window with gaps, the index is the one that is as unlikely in a window of ``n`` independent records, by the
+    binomial law.
+
+    Attributes
+    ----------
+    detector : MahalanobisDetector
+        Judges single records.
+    n : int
+        Number of records in a full window.
+    m : int
+    """
+
+    detector: MahalanobisDetector
+    n: int
+    m: int
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "CountLaw":
+        """Learned from the records in some rows."""
+        detector = MahalanobisDetector(contamination, threshold="quantile").fit(windows.rows[rows])
+        n = int(np.median(windows.sizes))
+        return cls(detector, n, (n + 1) // 2 if m is None else min(m, n))
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window."""
+        single, n_modes = self.detector.damage_index(windows.rows), windows.rows.shape[1]
+        index = np.empty(len(single))
+        longest = windows.longest
+        padded = np.concatenate([np.full(longest - 1, np.nan), single])
+        step = max(NUMBERS // longest, 1)
+        for first in range(0, len(single), step):
+            block = np.arange(first, min(first + step, len(single)))
+            last = np.lib.stride_tricks.sliding_window_view(padded, longest)[block]
+            inside = np.arange(longest) >= longest - windows.sizes[block, np.newaxis]
+            index[block] = self._as_if_full(np.where(inside, last, np.nan), n_modes)
+        return index
+
+    def _as_if_full(self, single: Array, n_modes: int) -> Array:
+        count = (~np.isnan(single)).sum(axis=1)
+        m = np.maximum(np.rint(self.m * count / self.n), 1).astype(int)
+        value = -np.take_along_axis(np.sort(-single, axis=1), np.minimum(m, single.shape[1])[:, np.newaxis] - 1, axis=1)
+        value, partial = value[:, 0], (count != self.n) & (count > 0)
+        m, count = m[partial], count[partial]
+        chance = np.maximum(betainc(m, count - m + 1, chi.sf(value[partial], n_modes)), SMALLEST)
+        value[partial] = chi.isf(np.maximum(betaincinv(self.m, self.n - self.m + 1, chance), SMALLEST), n_modes)
+        return value
