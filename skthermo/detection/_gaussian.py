@@ -45,6 +45,15 @@ class Gaussian:
         """Rows minus the mean; zero where a mode is missing."""
         return np.nan_to_num(rows - self.mean)
 
+    def whiten(self, rows: Array) -> Array:
+        """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
+        present = ~np.isnan(rows)
+        masks, of_row = patterns(present)
+        roots = whitenings(np.broadcast_to(self.covariance, (len(masks), *self.covariance.shape)), masks)[0]
+        centred = self.centred(rows)
+        white = centred @ roots[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", centred, roots[of_row])
+        return np.where(present, white, np.nan)
+
     def second_moments(self, rows: Array) -> Array:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
         present = ~np.isnan(rows)

@@ -10,7 +10,9 @@ from scipy.special import betainc, betaincinv
 from scipy.stats import chi
 
 from skthermo._arrays import Array
+from skthermo.detection._gaussian import Gaussian, check_invertible
 from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.detection._patterns import as_if_complete
 
 SMALLEST = 1e-300
 """Probabilities are not followed below this."""
@@ -71,45 +73,37 @@ class WindowLaw(Protocol):
 
 @dataclass(frozen=True)
 class MeanLaw:
-    """Distance of the mean of a window, whose variance grows with the correlation of records in it.
+    """Length of the mean of whitened records, over its standard deviation, which grows with their correlation.
 
     Attributes
     ----------
-    centre : ndarray of shape (n_modes,)
+    records : Gaussian
+        Of single records.
     correlation : ndarray of shape (n_modes,)
-        Mean correlation of two records in one window.
-    detector : MahalanobisDetector
-        Judges means over their standard deviation.
+        Mean correlation of two whitened records in one window.
     """
 
-    centre: Array
+    records: Gaussian
     correlation: Array
-    detector: MahalanobisDetector
 
     @classmethod
     def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "MeanLaw":
-        """Learned from the windows that end at some rows."""
-        centre = np.nanmean(windows.rows[rows], axis=0)
-        centred = np.nan_to_num(windows.rows - centre)
-        sums, squares = windows.sums(centred)[rows], windows.sums(centred**2)[rows]
-        counts = windows.sums(~np.isnan(windows.rows))[rows]
-        variance = squares.sum(axis=0) / counts.sum(axis=0)
-        pairs = np.maximum((counts * (counts - 1)).sum(axis=0), 1)
-        correlation = np.clip((sums**2 - squares).sum(axis=0) / pairs / variance, 0.0, 1.0)
-        detector = MahalanobisDetector(contamination, threshold="quantile")
-        law = cls(centre, correlation, detector)
-        detector.fit(law._standard_means(windows)[rows])
-        return law
+        """Learned from the records in some rows, and from the windows that end there."""
+        records = Gaussian.of(windows.rows[rows])
+        check_invertible(records.covariance, windows.rows[rows])
+        white = records.whiten(windows.rows)
+        counts = windows.sums(~np.isnan(white))[rows]
+        sums, squares = (windows.sums(np.nan_to_num(values))[rows] for values in (white, white**2))
+        correlation = (sums**2 - squares).sum(axis=0) / np.maximum((counts * (counts - 1)).sum(axis=0), 1)
+        return cls(records, np.clip(correlation, 0.0, 1.0))
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window."""
-        return self.detector.damage_index(self._standard_means(windows))
-
-    def _standard_means(self, windows: Windows) -> Array:
-        counts = windows.sums(~np.isnan(windows.rows))
-        deviations = np.sqrt(counts * (1 + (counts - 1) * self.correlation))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return windows.sums(np.nan_to_num(windows.rows - self.centre)) / deviations
+        white = self.records.whiten(windows.rows)
+        counts = windows.sums(~np.isnan(white))
+        sums = windows.sums(np.nan_to_num(white))
+        squared = sums**2 / np.maximum(counts * (1 + (counts - 1) * self.correlation), 1)
+        return as_if_complete(np.sqrt(squared.sum(axis=1)), (counts > 0).sum(axis=1), sums.shape[1])
 
 
 @dataclass(frozen=True)
