@@ -13,8 +13,8 @@ from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection._windows import CountLaw, MeanLaw, Windows
 
-FOLDS = 10
-"""Periods of the baseline whose windows are judged by what the others teach."""
+MOST_PERIODS = 50
+"""Largest number of periods of the baseline whose windows are judged by what the others teach."""
 
 
 class WindowedAlarm(DamageDetector):
@@ -46,7 +46,8 @@ class WindowedAlarm(DamageDetector):
     def _learn(self, windows: Windows) -> float:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = MeanLaw if self.rule == "mean" else CountLaw
-        for rest, fold in KFold(min(FOLDS, n_rows)).split(windows.rows):
+        n_periods = int(np.clip(n_rows // (2 * windows.longest), 2, MOST_PERIODS))
+        for rest, fold in KFold(n_periods).split(windows.rows):
             index[fold] = law.of(windows, rest, self.contamination, self.m).index(windows)[fold]
         self.law_ = law.of(windows, np.arange(n_rows), self.contamination, self.m)
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))

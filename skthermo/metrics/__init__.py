@@ -4,6 +4,7 @@ from skthermo.metrics._detectability import (
     minimum_detectable_damage,
     probability_of_detection,
     probability_of_false_alarm,
+    time_to_detection,
 )
 from skthermo.metrics._errors import complete_r2, error_table, frequency_scorer, mape
 
@@ -15,4 +16,5 @@ __all__ = [
     "minimum_detectable_damage",
     "probability_of_detection",
     "probability_of_false_alarm",
+    "time_to_detection",
 ]

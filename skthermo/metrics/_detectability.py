@@ -1,7 +1,10 @@
-"""Probability of false alarm, probability of detection, minimum detectable damage."""
+"""Probability of false alarm and of detection, time to detection, minimum detectable damage."""
+
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import real_array
 
@@ -122,11 +125,60 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
-def _share_above(damage_index: ArrayLike, threshold: float) -> float:
+def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = 0) -> Any:
+    """Time from the onset of damage to the first alarm.
+
+    Parameters
+    ----------
+    damage_index : array-like or Series of shape (n_samples,)
+        Damage index of records in order of time; NaN is no alarm.
+    threshold : float
+        A damage index above it is an alarm.
+    onset : int or label of the index, default=0
+        First damaged record: its position counted from 0 or, for a series, a label of its index or a time between
+        two of them.
+
+    Returns
+    -------
+    float or Timedelta
+        Number of records from the onset to the first alarm at or after it, 0 if the record of the onset raises it, NaN
+        if none does. For a series on a ``DatetimeIndex`` the time between them, or NaT.
+
+    Raises
+    ------
+    ValueError
+        If the index is not a vector or not in order of time, the threshold is not finite, or the onset is after the
+        last record.
+
+    Examples
+    --------
+    >>> from skthermo.metrics import time_to_detection
+    >>> time_to_detection([5.0, 1.0, 2.0, 4.0, 5.0], threshold=3.0, onset=1)
+    2.0
+    """
+    index, limit = _checked(damage_index, threshold)
+    times = damage_index.index if isinstance(damage_index, pd.Series) else pd.RangeIndex(len(index))
+    if not times.is_monotonic_increasing:
+        raise ValueError("the damage index is not in order of time; expected records in order")
+    first = int(times.searchsorted(onset))
+    if first >= len(index):
+        raise ValueError(f"onset is {onset!r}, after the last record, {times[-1]!r}; expected one within the records")
+    alarms = np.flatnonzero(index[first:] > limit)
+    if isinstance(times, pd.DatetimeIndex):
+        return times[first + alarms[0]] - pd.Timestamp(onset) if alarms.size else pd.NaT
+    return float(alarms[0]) if alarms.size else float("nan")
+
+
+def _checked(damage_index: ArrayLike, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     index, limit = real_array(damage_index, "damage_index"), real_array(threshold, "threshold")
     if index.ndim != 1:
         raise ValueError(f"damage_index has shape {index.shape}; expected a vector (n_samples,)")
     if limit.shape or not np.isfinite(limit):
         raise ValueError(f"threshold is {limit.tolist()}; expected a finite number")
+    return index, limit
+
+
+def _share_above(damage_index: ArrayLike, threshold: float) -> float:
+    index, limit = _checked(damage_index, threshold)
     present = index[~np.isnan(index)]
     return float((present > limit).mean()) if present.size else float("nan")
