@@ -43,13 +43,16 @@ class WindowedAlarm(DamageDetector):
     def _records(self, X: Any, F: Array) -> Windows:
         return Windows.of(X, F, self.window)
 
-    def _learn(self, windows: Windows) -> float:
+    def _learn(self, windows: Windows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = MeanLaw if self.rule == "mean" else CountLaw
         n_periods = int(np.clip(n_rows // (2 * windows.longest), 2, MOST_PERIODS))
         for rest, fold in KFold(n_periods).split(windows.rows):
             index[fold] = law.of(windows, rest, self.contamination, self.m).index(windows)[fold]
         self.law_ = law.of(windows, np.arange(n_rows), self.contamination, self.m)
+        return index
+
+    def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
         return conformal_threshold(index, self.contamination, 1 / correlation_time(is_high))
 
