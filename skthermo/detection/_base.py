@@ -72,9 +72,8 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
-        index = self._learn(self._records(X, F))
-        self.threshold_ = self._limit(index)
-        self.baseline_index_ = series_like(X, index)
+        self.baseline_index_ = self._learn(self._records(X, F))
+        self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
         return self
 
@@ -94,7 +93,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         check_is_fitted(self)
         F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
         index = self._index(self._records(X, F))
-        return series_like(X, index)
+        return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
         """Negative damage index: higher is healthier.
@@ -153,8 +152,3 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
-
-
-def series_like(X: Any, index: Array) -> NDArray[np.float64] | pd.Series:
-    """A damage index as a series on X's index if X is a frame, else unchanged."""
-    return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index

@@ -32,7 +32,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
     ----------
     detectors_ : list of detector
         Fitted clones.
-    baseline_index_ : ndarray or Series of shape (n_samples,)
+    baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline, from the indices by which the detectors set their own thresholds.
     threshold_ : float
         The ceil((n + 1)(1 - contamination))-th smallest of them.
@@ -118,7 +118,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
                     f"detector {name!r} ends with {last!r:.200}; expected a detector of this package with a positive "
                     "threshold, such as MahalanobisDetector()"
                 )
-        return _mean([np.asarray(last.baseline_index_) / last.threshold_ for last in lasts])
+        return _mean([last.baseline_index_ / last.threshold_ for last in lasts])
 
     def _limit(self, index: Array) -> float:
         return conformal_threshold(index, self.contamination)

@@ -54,7 +54,7 @@ class MahalanobisDetector(DamageDetector):
         Fitted: mean (``location_``) and covariance of the baseline.
     pattern_scale_ : object
         Factors for patterns of missing modes.
-    baseline_index_ : ndarray or Series of shape (n_samples,)
+    baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline, for the conformal threshold of each record from all others.
     threshold_ : float
         A damage index above it is an alarm.

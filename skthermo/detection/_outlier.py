@@ -30,7 +30,7 @@ class OutlierDetector(DamageDetector):
     ----------
     estimator_ : outlier detector
         Fitted clone.
-    baseline_index_ : ndarray or Series of shape (n_samples,)
+    baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline; NaN where a mode is missing.
     threshold_ : float
         The (1 - contamination) quantile of the baseline's damage index.
