@@ -113,6 +113,11 @@ class WindowedAlarm(DamageDetector):
     def _learn(self, windows: Windows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = MeanLaw if self.rule == "mean" else CountLaw
+        if n_rows < 2 * windows.longest:
+            raise ValueError(
+                f"the baseline has {n_rows} rows, and windows hold up to {windows.longest} records; expected at least "
+                "twice as many rows"
+            )
         n_periods = int(np.clip(n_rows // (2 * windows.longest), 2, MOST_PERIODS))
         for rest, fold in KFold(n_periods).split(windows.rows):
             index[fold] = law.of(windows, rest, self.contamination, self.m).index(windows)[fold]
@@ -124,4 +129,7 @@ class WindowedAlarm(DamageDetector):
         return conformal_threshold(index, self.contamination, 1 / correlation_time(is_high))
 
     def _index(self, windows: Windows) -> Array:
-        return self.law_.index(windows)
+        index = np.empty(len(windows.rows))
+        for run, piece in windows.pieces():
+            index[run] = self.law_.index(piece)[run.start - run.stop :]
+        return index
