@@ -17,7 +17,8 @@ from sklearn.linear_model import LinearRegression
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 
 N_TEMPERATURES, N_MODES = 7, 4
-BASELINE = 5000
+BASELINE = 8760
+"""A year of hourly records."""
 
 
 def records(random, n, missing):

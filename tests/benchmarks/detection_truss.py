@@ -54,7 +54,7 @@ def main():
     parser.add_argument("--years", type=int, default=20, help="of the healthy campaign that sets both thresholds")
     options = parser.parse_args()
     runs = [rates(seed, options.years) for seed in range(options.seeds)]
-    table = pd.DataFrame([found for found, _ in runs])
+    table = pd.DataFrame([pd.Series(found) for found, _ in runs])
     means = table.mean().unstack(level=0)[[*SCALES.values()]]
     differences = table["covariance by weather"] - table["one covariance"]
     means["difference"] = differences.mean()
