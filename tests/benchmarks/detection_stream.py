@@ -66,12 +66,9 @@ def main():
     mean = timed("WindowedAlarm, mean of 24", lambda: WindowedAlarm(24).fit(white))
     count = timed("WindowedAlarm, 12 of 24", lambda: WindowedAlarm(24, rule="m-of-n").fit(white))
 
-    X = records(random, options.records, options.missing)
-    print(
-        f"{options.records} new records, {options.missing:.0%} of frequencies missing: {X.nbytes / 1e9:.2f} GB", end=""
-    )
-    print(f", peak so far {peak_gigabytes():.2f} GB")
     before = peak_gigabytes()
+    X = records(random, options.records, options.missing)
+    print(f"{options.records} new records, {options.missing:.0%} of frequencies missing: {X.nbytes / 1e9:.2f} GB")
     residuals = timed("transform", partial(compensator.transform, X))
     n_bytes = X.nbytes
     del X
@@ -81,7 +78,7 @@ def main():
         rates[name] = 100 * np.mean(index > alarm.threshold_)
         del index
     print(f"false alarms, %, 2 asked: {', '.join(f'{name} {rate:.2f}' for name, rate in rates.items())}")
-    beyond = (peak_gigabytes() - before) * 1e9 / n_bytes
+    beyond = (peak_gigabytes() - before) * 1e9 / n_bytes - 1
     print(f"peak beyond the records themselves, in sizes of the records: {beyond:.1f}")
 
     if options.missing:
