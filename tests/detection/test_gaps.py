@@ -303,11 +303,17 @@ def test_patterns_with_twice_the_variance_raise_as_many_alarms_as_others():
     assert min(rate for pattern, rate in before.items() if not all(pattern)) > 0.04
 
 
-def test_patterns_alike_get_no_factors_and_rare_ones_neither():
-    detector = MahalanobisDetector().fit(with_gaps(records(3000), 0.5))
-    masks = np.array([[1, 1, 1], [1, 0, 0], [0, 1, 1]], dtype=bool)
-    np.testing.assert_allclose(detector.pattern_scale_(masks), 1, atol=0.1)
+def test_patterns_alike_get_no_factors():
+    """Differences that chance explains are left alone."""
+    masks = np.array([[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]], dtype=bool)
+    fits = (MahalanobisDetector().fit(with_gaps(records(2000, seed), 0.5, seed)) for seed in range(20))
+    factors = np.array([detector.pattern_scale_(masks) for detector in fits])
+    assert (factors == 1).all(axis=1).mean() > 0.7
+    np.testing.assert_allclose(factors, 1, atol=0.15)
+
+
+def test_rare_patterns_get_no_factors():
     rare = F.copy()
     rare[:40, 0] = np.nan
     rare[:40, 1:] += 0.3
-    np.testing.assert_array_equal(MahalanobisDetector().fit(rare).pattern_scale_(masks), 1)
+    np.testing.assert_array_equal(MahalanobisDetector().fit(rare).pattern_scale_(~np.isnan(rare)), 1)
