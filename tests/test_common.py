@@ -13,7 +13,13 @@ from sklearn.neighbors import LocalOutlierFactor
 from sklearn.svm import OneClassSVM
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import (
+    FusedDetector,
+    MahalanobisDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
 from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 
@@ -46,6 +52,8 @@ def expected_failures(estimator):
         return KNOTS
     if isinstance(estimator, MahalanobisDetector):
         return {} if estimator.threshold == "quantile" else RATE_OF_NEW_RECORDS
+    if isinstance(estimator, FusedDetector):
+        return RATE_OF_NEW_RECORDS
     if isinstance(estimator, WindowedAlarm):
         return ROWS_ARE_ORDERED | RATE_OF_NEW_RECORDS
     return ROWS_ARE_ORDERED if isinstance(estimator, LagFeatures) else {}
@@ -63,6 +71,7 @@ def expected_failures(estimator):
         MahalanobisDetector(),
         MahalanobisDetector(threshold="quantile"),
         MahalanobisDetector(threshold="chi2"),
+        FusedDetector([("paper", MahalanobisDetector(threshold="quantile")), ("default", MahalanobisDetector())]),
         WindowedAlarm(3),
         WindowedAlarm(3, rule="m-of-n"),
         OutlierDetector(IsolationForest(n_estimators=20, random_state=0)),
@@ -90,6 +99,7 @@ TRANSFORMERS_AND_DETECTORS = [
     KNNGapImputer(),
     BiasAligner(),
     MahalanobisDetector(),
+    FusedDetector([("plain", MahalanobisDetector())]),
     WindowedAlarm("6h"),
     WindowedAlarm(6, rule="m-of-n"),
     OutlierDetector(OneClassSVM()),

@@ -239,7 +239,7 @@ def test_only_rows_without_any_mode_have_no_index_and_no_alarm():
     index = detector.damage_index(frame)
     assert index.index.equals(stamps)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows have a missing value"):
+    with pytest.warns(UserWarning, match="2 of 400 rows lack values and have no damage index"):
         alarms = detector.predict(frame)
     np.testing.assert_array_equal(alarms[[3, 7, 8]], [1, 1, -1])
 

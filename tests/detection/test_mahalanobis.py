@@ -77,7 +77,7 @@ def test_rows_without_any_mode_give_no_index_and_no_alarm():
     index = detector.damage_index(holed)
     assert index.index.equals(holed.index)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows have a missing value"):
+    with pytest.warns(UserWarning, match="2 of 400 rows lack values and have no damage index"):
         alarms = detector.predict(holed)
     np.testing.assert_array_equal(alarms[[3, 7, 8, 9]], [1, 1, -1, -1])
 
