@@ -86,7 +86,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         (
             "steps that fail",
-            "found.put(active[there.value < here.value], there.of(there.value < here.value))",
+            "found.put(active[better], there.of(better))",
             "found.put(active, there)",
         ),
         ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
@@ -104,16 +104,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.weight if self.weighted else None", "None"),
     ],
     ("surrogate/_residuals.py", "surrogate/test_uncertainty.py"): [
-        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
             "self._spread(self.weather[test], test)",
         ),
         ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
-        ("correlation time", "time += 2 * correlation", "time += correlation"),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
+    ],
+    ("_weather.py", "surrogate/test_uncertainty.py"): [
+        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
+        ("correlation time", "time += 2 * correlation", "time += correlation"),
     ],
     ("surrogate/_chain_uncertainty.py", "surrogate/test_uncertainty.py"): [
         ("periods of time", 'T.index.argsort(kind="stable")', "np.arange(len(T))"),
