@@ -151,7 +151,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
         ("rank of the threshold", "(n_independent + 1) * (1 - contamination)", "n_independent * (1 - contamination)"),
     ],
-    ("detection/_local_covariance.py", "detection/test_whitening.py"): [
+    ("detection/_local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
