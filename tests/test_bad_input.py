@@ -27,7 +27,7 @@ from skthermo.datasets import (
     make_z24,
     steel_modulus,
 )
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.fem import (
     AffineModel,
     Bar,
@@ -62,6 +62,7 @@ from skthermo.metrics import (
     minimum_detectable_damage,
     probability_of_detection,
     probability_of_false_alarm,
+    time_to_detection,
 )
 from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
@@ -90,6 +91,7 @@ FRAME = Structure(NODES, BARS, SUPPORTS, {"rafters": ["rafter 1", "rafter 2"]})
 STIFF, EYE = [[2.0, -1.0], [-1.0, 1.0]], np.eye(2)
 HOURLY = pd.DataFrame({"T1": np.arange(50.0)}, pd.date_range("2020-01-01", periods=50, freq="h"))
 BOTH = T.join(F)
+DATED = pd.Series(np.arange(365.0), F.index)
 MODES = list(F)
 
 
@@ -114,6 +116,7 @@ def indexed(index):
 LAGS = LagFeatures(2).fit(HOURLY)
 OFFSETS = [stamp.tz_localize("UTC" if i % 2 else "Asia/Tokyo") for i, stamp in enumerate(HOURLY.index)]
 GAPPY = T.where(np.random.default_rng(0).random(T.shape) > 0.012)
+DIAGONAL = F.mask(np.eye(6, dtype=bool)[np.arange(365) % 6])
 HOLES = T.where(np.eye(3, dtype=bool)[np.arange(365) % 3])
 SHAPES = TRUSS.modes(ONES[:1])[1][0, [0, 4, 8]]
 DETECTOR = MahalanobisDetector().fit(F)
@@ -600,7 +603,7 @@ DETECTION = [
     ("a regressor as covariance", lambda: MahalanobisDetector(covariance=Ridge()).fit(F), "error", "'covariance'"),
     ("one row", lambda: MahalanobisDetector().fit(F[:1]), "error", "1 sample"),
     ("fewer rows than modes", lambda: MahalanobisDetector().fit(F[:4]), "error", "expected"),
-    ("a column of NaN", lambda: MahalanobisDetector().fit(changed(F, slice(None), 0, NAN)), "error", "0 of 365"),
+    ("a column of NaN", lambda: MahalanobisDetector().fit(changed(F, slice(None), 0, NAN)), "error", r"modes \[0\]"),
     (
         "a constant mode",
         lambda: MahalanobisDetector().fit(changed(F, slice(None), 0, 7.0)),
@@ -618,11 +621,61 @@ DETECTION = [
     ("no rows", lambda: DETECTOR.predict(F[:0]), "error", "0 sample"),
     (
         "missing modes",
-        lambda: DETECTOR.predict(changed(F, slice(7), 0, NAN)),
+        lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)),
         "warning",
-        "7 of 365 rows have a missing value",
+        "7 of 365 rows lack values and have no damage index",
     ),
-    ("a mode lost", lambda: DETECTOR.predict(changed(F, slice(None), 0, NAN)), "warning", "365 of 365 rows"),
+    ("all modes lost", lambda: DETECTOR.predict(F * NAN), "warning", "365 of 365 rows"),
+    ("threshold of text", lambda: MahalanobisDetector(threshold="paper").fit(F), "error", "'threshold'.*'paper'"),
+    ("threshold a number", lambda: MahalanobisDetector(threshold=3.0).fit(F), "error", "'threshold'.*3.0"),
+    ("too few records", lambda: MahalanobisDetector().fit(F[:20]), "warning", "20 independent baseline .*at least 49"),
+    (
+        "no row complete",
+        lambda: MahalanobisDetector(covariance=EmpiricalCovariance()).fit(DIAGONAL),
+        "error",
+        "0 of 365",
+    ),
+    (
+        "one row with a value",
+        lambda: MahalanobisDetector().fit(changed(F[:3], [0, 1], slice(None), NAN)),
+        "error",
+        "1 of 3",
+    ),
+    ("window None", lambda: WindowedAlarm(None).fit(F), "error", "'window'.*None"),
+    ("window zero", lambda: WindowedAlarm(0).fit(F), "error", "'window'.*Got 0"),
+    ("window half", lambda: WindowedAlarm(2.5).fit(F), "error", "'window'.*2.5"),
+    ("window a Timedelta", lambda: WindowedAlarm(pd.Timedelta("1D")).fit(F), "error", "'window'.*Timedelta"),
+    (
+        "window of time, array",
+        lambda: WindowedAlarm("7D").fit(F.to_numpy()),
+        "error",
+        "'7D', a time, but the records are not a frame",
+    ),
+    ("window of time, unsorted", lambda: WindowedAlarm("7D").fit(F[::-1]), "error", "in order of time"),
+    ("rule of text", lambda: WindowedAlarm(7, rule="median").fit(F), "error", "'rule'.*'median'"),
+    ("m zero", lambda: WindowedAlarm(7, rule="m-of-n", m=0).fit(F), "error", "'m'.*Got 0"),
+    ("windows of too few rows", lambda: WindowedAlarm(7).fit(F[:13]), "error", "13 rows.*up to 7 records; expected"),
+    ("windows of fewer rows than modes", lambda: WindowedAlarm(2).fit(F[:6]), "error", "singular"),
+    ("window of no time", lambda: WindowedAlarm("0h").fit(F), "error", "window is '0h'; expected"),
+    ("window of negative time", lambda: WindowedAlarm("-3h").fit(F), "error", "window is '-3h'; expected"),
+    ("window of words", lambda: WindowedAlarm("a day").fit(F), "error", "window is 'a day'; expected"),
+    ("m above n", lambda: WindowedAlarm(5, rule="m-of-n", m=9).fit(F), "error", "m is 9, but windows hold 5 records"),
+    ("windows of few rows", lambda: WindowedAlarm(2).fit(F[:40]), "warning", "independent baseline .*at least 49"),
+    ("windows before fit", lambda: WindowedAlarm(7).predict(F), "error", "not fitted"),
+    (
+        "windows lost",
+        lambda: WindowedAlarm(2).fit(F).predict(changed(F, slice(7), slice(None), NAN)),
+        "warning",
+        "7 of 365",
+    ),
+    ("windows, other modes", lambda: WindowedAlarm(2).fit(F).predict(F.iloc[:, ::-1]), "error", "feature names"),
+    ("windows, a mode twice", lambda: WindowedAlarm(2).fit(F.join(F["f1"].rename("f7"))), "error", "rank 6"),
+    ("windows, infinite", lambda: WindowedAlarm(2).fit(changed(F, 0, 0, INF)), "error", "infinity"),
+    ("scale of text", lambda: compensator(scale="regional").fit(BOTH), "error", "'scale'.*'regional'"),
+    ("scale True", lambda: compensator(scale=True).fit(BOTH), "error", "'scale'.*True"),
+    ("scale, constant modes", lambda: compensator(scale="local").fit(T.join(F * 0 + 7.0)), "error", "singular"),
+    ("scale, hot", lambda: compensator(scale="local").fit(BOTH).transform((T + 60).join(F)), "warning", "far outside"),
+    ("scale, applicability before fit", lambda: compensator(scale="local").applicability(BOTH), "error", "not fitted"),
     ("before fit", lambda: MahalanobisDetector().predict(F), "error", "not fitted"),
     ("frequencies of -999", lambda: MahalanobisDetector().fit(changed(F, 3, 1, -999.0)), "warning", "-999"),
     ("no score_samples", lambda: OutlierDetector(LocalOutlierFactor()).fit(F), "error", "no score_samples"),
@@ -648,15 +701,15 @@ DETECTION = [
     ("a target of NaN", lambda: compensator().fit(changed(BOTH, slice(None), 3, NAN)), "error", "'f1'"),
     ("kelvin", lambda: compensator().fit((T + 273.15).join(F)), "warning", "kelvin"),
     ("-999", lambda: compensator().fit(changed(BOTH, 0, 0, -999.0)), "warning", "-999 in 1 of 365"),
-    ("kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "warning", "kelvin"),
+    ("kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "warning", "above 150: kelvin"),
     ("other columns later", lambda: COMPENSATOR.transform(BOTH.iloc[:, ::-1]), "error", "feature names"),
     ("names twice", lambda: MahalanobisDetector().fit(F.iloc[:, [0, 0]]), "error", "expected each name once"),
     ("gaps in every row", lambda: compensator().fit(HOLES.join(F)), "error", "0 of 365|complete|row"),
     (
         "masked modes",
-        lambda: MahalanobisDetector().fit(F.to_numpy()).predict(masked(F)),
+        lambda: MahalanobisDetector().fit(F.to_numpy()[:, :1]).predict(masked(F)[:, :1]),
         "warning",
-        "1 of 365 rows have a missing value",
+        "1 of 365 rows lack values and have no damage index",
     ),
     ("a table of booleans", lambda: MahalanobisDetector().fit(F > 10), "error", "expected"),
     ("an infinite record", lambda: DETECTOR.predict(changed(F, 0, 0, INF)), "error", "infinity"),
@@ -678,6 +731,12 @@ METRICS = [
     ("threshold NaN", lambda: probability_of_false_alarm([1.0], NAN), "error", "threshold is nan"),
     ("threshold infinite", lambda: probability_of_detection([1.0], INF), "error", "threshold is inf"),
     ("thresholds", lambda: probability_of_detection([1.0], [1.0, 2.0]), "error", "threshold is"),
+    ("time to detection of a table", lambda: time_to_detection([[1.0]], 3.0), "error", r"shape \(1, 1\)"),
+    ("time to detection of None", lambda: time_to_detection(None, 3.0), "error", "damage_index is None"),
+    ("time to detection, threshold NaN", lambda: time_to_detection([1.0], NAN), "error", "threshold is nan"),
+    ("time to detection, unsorted", lambda: time_to_detection(DATED[::-1], 3.0, DATED.index[0]), "error", "in order"),
+    ("onset too late", lambda: time_to_detection([1.0], 3.0, 1), "error", "onset is 1, after the last record"),
+    ("onset next year", lambda: time_to_detection(DATED, 3.0, "2030"), "error", "onset is '2030', after"),
     ("other lengths", lambda: minimum_detectable_damage([0.1], [0.1, 0.2]), "error", r"\(1,\) and pod \(2,\)"),
     ("pod in percent", lambda: minimum_detectable_damage([0.1, 0.2], [26, 95]), "error", "pod is.*not percent"),
     ("level in percent", lambda: minimum_detectable_damage([0.1], [0.9], 90), "error", "level is 90"),

@@ -1,4 +1,4 @@
-"""Whether the tests notice mistakes in the numerics of modal analysis, tracking, model updating and the surrogates.
+"""Whether the tests notice mistakes in the numerics of modal analysis, updating, surrogates and detection.
 
     OMP_NUM_THREADS=1 python tools/mutations.py [WORD ...]
 
@@ -86,7 +86,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         (
             "steps that fail",
-            "found.put(active[there.value < here.value], there.of(there.value < here.value))",
+            "found.put(active[better], there.of(better))",
             "found.put(active, there)",
         ),
         ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
@@ -104,16 +104,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.weight if self.weighted else None", "None"),
     ],
     ("surrogate/_residuals.py", "surrogate/test_uncertainty.py"): [
-        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
             "self._spread(self.weather[test], test)",
         ),
         ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
-        ("correlation time", "time += 2 * correlation", "time += correlation"),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
+    ],
+    ("_weather.py", "surrogate/test_uncertainty.py"): [
+        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
+        ("correlation time", "time += 2 * correlation", "time += correlation"),
     ],
     ("surrogate/_chain_uncertainty.py", "surrogate/test_uncertainty.py"): [
         ("periods of time", 'T.index.argsort(kind="stable")', "np.arange(len(T))"),
@@ -121,6 +123,54 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
+    ],
+    ("detection/_gaussian.py", "detection/test_gaps.py"): [
+        ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),
+        ("mean of modes with gaps", "mean, covariance = mean + step,", "mean, covariance = mean,"),
+        ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
+        ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
+    ],
+    ("detection/_patterns.py", "detection/test_gaps.py"): [
+        ("distances in few modes", "here, there = 2 / (9 * n_present)", "here, there = 2 / (8 * n_present)"),
+        ("factors of patterns", "np.exp(-_effects(", "np.exp(0 * _effects("),
+        ("factors by chance", "- chi2.ppf(CHANCE, len(values) - 1)", ""),
+    ],
+    ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
+        ("leave-one-out distances", "(n_rows - 1 - distances**2)", "(n_rows - distances**2)"),
+        (
+            "records behind a mode",
+            "present.sum(axis=0), len(F)).min(axis=1)",
+            "present.sum(axis=0), len(F)).max(axis=1)",
+        ),
+        (
+            "periods of a covariance estimator",
+            "clone(self.covariance).fit(F[complete[rest]])",
+            "clone(self.covariance).fit(F[complete])",
+        ),
+    ],
+    ("detection/_thresholds.py", "detection/test_thresholds.py"): [
+        ("rank of the threshold", "(n_independent + 1) * (1 - contamination)", "n_independent * (1 - contamination)"),
+    ],
+    ("detection/_local_covariance.py", "detection/test_local_covariance.py"): [
+        ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
+        ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
+        ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
+    ],
+    ("detection/_whitening.py", "detection/test_whitening.py"): [
+        ("spread beyond the baseline", "BEYOND = 0.5", "BEYOND = 0.0"),
+        ("unknown weather", "len(self.covariances) - 1)", "0)"),
+    ],
+    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
+        ("correlation in a window", "sums**2 - squares", "sums**2"),
+        ("variance of a mean", "(1 + (counts - 1) * self.correlation)", "(1 + counts * self.correlation)"),
+        ("records of a partial window", "self.m * count / self.n", "self.m"),
+        ("edge of a window of time", 'side="right"', 'side="left"'),
+    ],
+    ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
+        ("periods of windows", "law.of(windows, rest, self", "law.of(windows, np.arange(n_rows), self"),
+    ],
+    ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
+        ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
 }
 

@@ -29,7 +29,7 @@ def test_index_of_gaussian_records_follows_the_chi_distribution():
 
 
 def test_threshold_is_the_quantile_of_the_baseline():
-    detector = MahalanobisDetector(contamination=0.05).fit(F)
+    detector = MahalanobisDetector(contamination=0.05, threshold="quantile").fit(F)
     index = detector.damage_index(F)
     assert detector.threshold_ == np.quantile(index, 0.95)
     assert (index > detector.threshold_).mean() == 0.05
@@ -67,33 +67,43 @@ def test_any_covariance_estimator_serves(covariance):
     assert not hasattr(covariance, "covariance_")
 
 
-def test_missing_modes_give_no_index_and_no_alarm():
+def test_rows_without_any_mode_give_no_index_and_no_alarm():
     frame = pd.DataFrame(F, columns=["f1", "f2", "f3"], index=pd.date_range("2025", periods=400, freq="h"))
     holed = frame.copy()
-    holed.iloc[[3, 7], 1] = np.nan
-    holed.iloc[7:9] += 10
+    holed.iloc[[3, 7]] = np.nan
+    holed.iloc[8:10] += 10
+    holed.iloc[9, 1] = np.nan
     detector = MahalanobisDetector().fit(frame)
     index = detector.damage_index(holed)
     assert index.index.equals(holed.index)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows have a missing value"):
+    with pytest.warns(UserWarning, match="2 of 400 rows lack values and have no damage index"):
         alarms = detector.predict(holed)
-    np.testing.assert_array_equal(alarms[[3, 7, 8]], [1, 1, -1])
+    np.testing.assert_array_equal(alarms[[3, 7, 8, 9]], [1, 1, -1, -1])
 
 
-def test_incomplete_rows_do_not_enter_the_baseline():
+def test_rows_without_any_mode_do_not_enter_the_baseline():
+    holed = np.vstack([F, np.full((5, 3), np.nan)])
+    with_them, without = (MahalanobisDetector().fit(rows) for rows in (holed, F))
+    assert with_them.threshold_ == pytest.approx(without.threshold_, rel=1e-9)
+    np.testing.assert_allclose(with_them.damage_index(F), without.damage_index(F), rtol=1e-6)
+
+
+def test_rows_with_some_modes_enter_the_baseline():
     holed = np.vstack([F, [[np.nan, 100.0, 100.0]]])
-    assert MahalanobisDetector().fit(holed).threshold_ == MahalanobisDetector().fit(F).threshold_
+    mean = MahalanobisDetector().fit(holed).covariance_.location_
+    np.testing.assert_allclose(mean[1:], holed[:, 1:].mean(axis=0))
+    assert mean[0] != pytest.approx(F[:, 0].mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("X", "message"),
     [
-        (F[:3], "covariance of 3 complete baseline rows and 3 modes is singular .rank 2."),
+        (F[:3], r"covariance of 3 baseline rows and 3 modes is singular \(rank 2\)"),
         (F * [1, 1, 0], r"singular \(rank 2\)"),
-        (np.column_stack([F, F[:, 0]]), r"400 complete baseline rows and 4 modes is singular \(rank 3\)"),
+        (np.column_stack([F, F[:, 0]]), r"400 baseline rows and 4 modes is singular \(rank 3\)"),
         (F[:1], "1 sample"),
-        (np.vstack([F[:1], np.full((5, 3), np.nan)]), "1 of 6 rows have every mode"),
+        (np.vstack([F[:1], np.full((5, 3), np.nan)]), "1 of 6 rows have a value"),
         (np.where(F[5] == F, np.inf, F), "infinity"),
     ],
 )
@@ -108,7 +118,7 @@ def test_parameters_of_the_covariance_are_checked():
 
 
 def test_few_records_do_with_a_shrunk_covariance():
-    detector = MahalanobisDetector(covariance=LedoitWolf()).fit(F[:3])
+    detector = MahalanobisDetector(covariance=LedoitWolf(), threshold="quantile").fit(F[:3])
     inverse = np.linalg.inv(ledoit_wolf(F[:3])[0])
     expected = [mahalanobis(row, F[:3].mean(axis=0), inverse) for row in F[:3]]
     assert detector.threshold_ == pytest.approx(np.quantile(expected, 0.98), rel=1e-10)

@@ -1,0 +1,76 @@
+"""Which records tell the covariance in some weather, and how much."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from skthermo.detection._gaussian import Gaussian
+from skthermo.detection._local_covariance import History, LocalCovariance, Smoothing, whitened
+from tests.detection.test_whitening import FROZEN, SOURCE, THAWED, X, compensator
+
+
+@pytest.fixture
+def history():
+    residuals, places = compensator(None).fit_transform(X).to_numpy(), X[["T1"]].to_numpy()
+    return History(np.arange(len(X)), places, residuals, Gaussian.of(residuals))
+
+
+def test_neighbours_are_the_nearest_in_weather_that_are_not_near_in_time(history):
+    row, size = 700, 60
+    far = np.flatnonzero(np.abs(history.order - row) >= 24)
+    expected = far[np.argsort(np.abs(history.places[far, 0] - history.places[row, 0]), kind="stable")[:size]]
+    found = history.neighbours(size, history.places[[row]], order=history.order[[row]])
+    assert set(found.rows[found.counted]) == set(expected)
+    anywhere = history.neighbours(size, history.places[[row]])
+    assert row in anywhere.rows[anywhere.counted]
+    assert anywhere.counted.sum() == size
+
+
+def test_standard_deviations_are_those_of_the_neighbours_drawn_to_those_of_all(history):
+    row, size, pseudo = 700, 60, 7
+    covariance = LocalCovariance(history, Smoothing(size, pseudo))
+    near = history.neighbours(size, history.places[[row]])
+    squares = (history.residuals[near.rows[0]] - history.overall.mean) ** 2
+    expected = (squares.sum(axis=0) + pseudo * np.diag(history.overall.covariance)) / (size + pseudo)
+    np.testing.assert_allclose(np.diag(covariance(near)[0]), expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("size", [50, 100])
+def test_correlations_follow_the_weather_too(history, size):
+    at = history.neighbours(size, np.array([[-8.0], [8.0]]))
+    for found, spread in zip(LocalCovariance(history, Smoothing(size, 5))(at), (FROZEN, THAWED), strict=True):
+        true = spread @ spread.T
+        correlations = [c[0, 1] / np.sqrt(c[0, 0] * c[1, 1]) for c in (found, true)]
+        assert correlations[0] == pytest.approx(correlations[1], abs=0.25)
+
+
+def test_a_burst_of_wild_records_does_not_whiten_itself(history):
+    burst = np.arange(700, 724)
+    wild = replace(history, residuals=history.residuals.copy())
+    wild.residuals[burst] += [20.0, -20.0]
+    near = history.neighbours(100, history.places[burst], order=burst)
+    covariances = [LocalCovariance(one, Smoothing(100, 5))(near) for one in (wild, history)]
+    deviations = [np.sqrt(np.einsum("ijj->ij", covariance)) for covariance in covariances]
+    np.testing.assert_allclose(*deviations, rtol=1e-10)
+    white = whitened(wild.residuals[burst], wild.overall, covariances[0])[0]
+    assert (np.linalg.norm(white, axis=1) > 50).all()
+
+
+def test_the_smoothing_is_the_likeliest_for_records_that_were_left_out(history, monkeypatch):
+    monkeypatch.setattr(f"{SOURCE}.NEIGHBOURS", (50, 100, 500))
+
+    def likelihood(smoothing):
+        covariances = history.overall.covariance[np.newaxis].repeat(len(X), axis=0)
+        if smoothing:
+            covariances = LocalCovariance(history, smoothing)(history.own_neighbours(smoothing.n_neighbors))
+        centred = history.residuals - history.overall.mean
+        pairs = zip(centred[:200], covariances[:200], strict=True)
+        densities = sum(multivariate_normal.logpdf(row, [0, 0], covariance) for row, covariance in pairs)
+        found = whitened(history.residuals[:200], history.overall, covariances[:200])[1]
+        assert found == pytest.approx(densities + 200 * np.log(2 * np.pi), rel=1e-10)
+        return whitened(history.residuals, history.overall, covariances)[1]
+
+    candidates = [None, *(Smoothing(size, pseudo) for size in (50, 100, 500) for pseudo in (5, 15))]
+    assert max(candidates, key=likelihood) == history.best_smoothing()

@@ -1,0 +1,263 @@
+"""Alarms raised by several records in a row."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+from scipy.stats import binom, chi
+from sklearn.base import clone
+
+from skthermo.detection import MahalanobisDetector, WindowedAlarm
+from skthermo.detection._windows import CountLaw, Windows
+from skthermo.metrics import time_to_detection
+
+RULES = ["mean", "m-of-n"]
+each_rule = pytest.mark.parametrize("rule", RULES)
+MIXED = np.array([[1.0, 0.3, 0.0], [0.0, 1.0, -0.4], [0.2, 0.0, 0.5]])
+
+
+def stream(n_rows=1500, seed=0, correlation=0.0, shift=0.0):
+    """Hourly records of three modes; ``correlation`` of neighbours in time, ``shift`` in standard deviations of f1."""
+    noise = np.random.default_rng(seed).normal(size=(n_rows, 3))
+    noise[1:] *= np.sqrt(1 - correlation**2)
+    noise = lfilter([1.0], [1.0, -correlation], noise, axis=0)
+    stamps = pd.date_range("2025", periods=n_rows, freq="h")
+    return pd.DataFrame([4.0, 9.0, 12.0] + (noise + [shift, 0, 0]) @ MIXED, stamps, ["f1", "f2", "f3"])
+
+
+X, LATER = stream(), stream(seed=1)
+HOLED = LATER.mask(np.random.default_rng(0).random(LATER.shape) < 0.4)
+
+
+# The mean of a window
+
+
+def test_a_window_of_one_record_is_close_to_the_mahalanobis_index():
+    index = WindowedAlarm(1).fit(X).damage_index(LATER)
+    np.testing.assert_allclose(index, MahalanobisDetector().fit(X).damage_index(LATER), rtol=1e-8)
+    assert WindowedAlarm(1).fit(X).threshold_ == pytest.approx(MahalanobisDetector().fit(X).threshold_, rel=0.05)
+
+
+def test_equal_records_raise_the_index_by_the_root_of_their_number():
+    """As far as the records of the baseline do not depend on each other."""
+    alarm = WindowedAlarm(9).fit(X)
+    alarm.law_.correlation[:] = 0
+    single = WindowedAlarm(1).fit(X)
+    record = X.iloc[[5]]
+    same = pd.concat([record] * 20).set_axis(X.index[:20])
+    expected = single.damage_index(record).iloc[0] * np.sqrt(np.minimum(np.arange(1, 21), 9))
+    np.testing.assert_allclose(alarm.damage_index(same), expected, rtol=1e-9)
+
+
+def test_the_index_is_the_length_of_the_mean_in_its_standard_deviations():
+    alarm = WindowedAlarm(24).fit(X)
+    white = alarm.law_.records.whiten(LATER.to_numpy())
+    for row in (100, 1400):
+        mean = white[row - 23 : row + 1].mean(axis=0)
+        variance = (1 + 23 * alarm.law_.correlation) / 24
+        assert alarm.damage_index(LATER).iloc[row] == pytest.approx(np.sqrt((mean**2 / variance).sum()), rel=1e-9)
+
+
+def test_the_correlation_in_a_window_is_that_of_its_pairs():
+    records = stream(20_000, 2, correlation=0.7)
+    lags = np.arange(1, 12)
+    expected = 2 * ((12 - lags) * 0.7**lags).sum() / (12 * 11)
+    np.testing.assert_allclose(WindowedAlarm(12).fit(records).law_.correlation, expected, atol=0.03)
+    np.testing.assert_allclose(WindowedAlarm(12).fit(stream(20_000)).law_.correlation, 0, atol=0.01)
+
+
+# m of n records
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(1, 12), st.data())
+def test_alarms_are_where_m_of_n_records_are_above_the_threshold(n, data):
+    m, contamination = data.draw(st.integers(1, n)), data.draw(st.sampled_from([0.02, 0.1, 0.3]))
+    alarm = WindowedAlarm(n, rule="m-of-n", m=m, contamination=contamination).fit(X)
+    single = alarm.law_.detector.damage_index(LATER.to_numpy())
+    high = np.convolve(single > alarm.threshold_, np.ones(n), "full")[: len(LATER)]
+    full = slice(n - 1, None)
+    np.testing.assert_array_equal((alarm.predict(LATER) == -1)[full], (high >= m)[full])
+
+
+def test_half_of_the_records_are_asked_for_by_default():
+    assert [WindowedAlarm(n, rule="m-of-n").fit(X).law_.m for n in (1, 2, 5, 24)] == [1, 1, 3, 12]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(2, 24), st.data())
+def test_windows_with_gaps_are_as_unlikely_by_the_binomial_law(n, data):
+    """The m-th largest of n independent indices is above a value where at least m are: a binomial probability."""
+    m, count = data.draw(st.integers(1, n)), data.draw(st.integers(1, n - 1))
+    law = CountLaw(MahalanobisDetector().fit(X.to_numpy()), n, m)
+    single = np.full((1, n), np.nan)
+    single[0, n - count :] = np.random.default_rng(data.draw(st.integers(0, 99))).uniform(0.5, 4, count)
+    scaled = max(int(np.rint(m * count / n)), 1)
+    value = np.sort(single[0, n - count :])[-scaled]
+    found = law._as_if_full(single, 3)[0]
+    expected = binom.sf(scaled - 1, count, chi.sf(value, 3))
+    assert binom.sf(m - 1, n, chi.sf(found, 3)) == pytest.approx(expected, rel=1e-6)
+
+
+# Windows
+
+
+@each_rule
+def test_times_and_numbers_are_the_same_windows_on_a_regular_index(rule):
+    by_number, by_time = (WindowedAlarm(window, rule=rule).fit(X) for window in (24, "24h"))
+    assert by_time.threshold_ == by_number.threshold_
+    pd.testing.assert_series_equal(by_time.damage_index(LATER), by_number.damage_index(LATER))
+
+
+@each_rule
+def test_a_window_of_time_holds_the_records_that_fall_into_it(rule):
+    kept = LATER.drop(index=LATER.index[100:110])
+    alarm = WindowedAlarm("6h", rule=rule).fit(X)
+    as_gaps = LATER.copy()
+    as_gaps.iloc[100:110] = np.nan
+    index = alarm.damage_index(kept)
+    np.testing.assert_allclose(index, alarm.damage_index(as_gaps)[kept.index], rtol=1e-9)
+    np.testing.assert_allclose(index.iloc[100], alarm.damage_index(LATER.iloc[110:]).iloc[0], rtol=1e-9)
+
+
+@each_rule
+def test_only_windows_without_any_mode_have_no_index(rule):
+    holed = HOLED.copy()
+    holed.iloc[200:230] = np.nan
+    holed.iloc[215, 1] = 9.0
+    index = WindowedAlarm(6, rule=rule).fit(X).damage_index(holed)
+    empty = holed.isna().all(axis=1).rolling(6, min_periods=1).min() == 1
+    np.testing.assert_array_equal(index.isna(), empty)
+    assert empty.sum() == 9 + 10
+    with pytest.warns(UserWarning, match="19 of 1500 rows lack values and have no damage index"):
+        alarms = WindowedAlarm(6, rule=rule).fit(X).predict(holed)
+    assert (alarms[empty] == 1).all()
+
+
+def test_sums_over_windows_are_those_of_pandas():
+    values = np.random.default_rng(0).normal(size=(300, 2))
+    stamps = pd.DatetimeIndex(
+        np.sort(np.random.default_rng(1).choice(pd.date_range("2025", periods=900, freq="h"), 300))
+    )
+    frame = pd.DataFrame(values, stamps)
+    for window in (7, "10h"):
+        windows = Windows.of(frame, values, window)
+        rolling = frame.rolling(window, min_periods=1)
+        np.testing.assert_array_equal(windows.sizes, rolling.count()[0])
+        np.testing.assert_allclose(windows.sums(values), rolling.sum(), atol=1e-12)
+
+
+@each_rule
+def test_the_order_of_modes_and_their_units_do_not_matter(rule):
+    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    for change in (lambda records: records[["f3", "f1", "f2"]], lambda records: records * [1.0, 1e3, 1e-6]):
+        other = WindowedAlarm(12, rule=rule).fit(change(X))
+        if rule == "m-of-n":
+            np.testing.assert_allclose(other.damage_index(change(HOLED)), alarm.damage_index(HOLED), rtol=1e-7)
+            assert other.threshold_ == pytest.approx(alarm.threshold_, rel=1e-7)
+        else:  # modes are whitened by a symmetric root, whose axes depend a little on units
+            np.testing.assert_allclose(other.damage_index(change(LATER)), alarm.damage_index(LATER), rtol=0.1)
+
+
+@each_rule
+def test_the_size_of_chunks_does_not_matter(rule, monkeypatch):
+    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    whole = alarm.damage_index(HOLED)
+    monkeypatch.setattr("skthermo.detection._windows.NUMBERS", 100)
+    np.testing.assert_allclose(alarm.damage_index(HOLED), whole, rtol=1e-10)
+
+
+@each_rule
+def test_later_records_do_not_change_earlier_windows(rule):
+    alarm = WindowedAlarm("12h", rule=rule).fit(X)
+    whole = alarm.damage_index(HOLED)
+    np.testing.assert_allclose(alarm.damage_index(HOLED[:700]), whole[:700], rtol=1e-9)
+    np.testing.assert_allclose(alarm.damage_index(HOLED[300:])[11:], whole[311:], rtol=1e-7)
+
+
+# Rates
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.7])
+@each_rule
+def test_false_alarms_are_as_asked_whatever_the_correlation_in_time(rule, correlation):
+    rates = []
+    for seed in range(6):
+        alarm = WindowedAlarm(12, rule=rule, contamination=0.05).fit(stream(2500, seed, correlation))
+        rates.append((alarm.predict(stream(5000, 100 + seed, correlation)) == -1).mean())
+    assert 0.05 * 0.75 < np.mean(rates) < 0.05 * 1.25
+
+
+@each_rule
+def test_damage_is_found_that_single_records_miss(rule):
+    damaged = stream(500, 3, shift=1.6)
+    single, windowed = MahalanobisDetector().fit(X), WindowedAlarm(24, rule=rule).fit(X)
+    shares = [(detector.predict(damaged) == -1).mean() for detector in (single, windowed)]
+    assert shares[0] < 0.25
+    assert shares[1] > 0.75
+    onset = pd.concat(
+        [LATER, damaged.set_axis(damaged.index + (LATER.index[-1] - LATER.index[0]) + pd.Timedelta("1h"))]
+    )
+    wait = time_to_detection(windowed.damage_index(onset), windowed.threshold_, onset.index[len(LATER)])
+    assert wait <= pd.Timedelta("48h")
+
+
+@each_rule
+def test_a_baseline_with_gaps_teaches_nearly_the_same(rule):
+    holed = X.mask(np.random.default_rng(0).random(X.shape) < 0.2)
+    alarms = [WindowedAlarm(12, rule=rule).fit(baseline) for baseline in (X, holed)]
+    assert alarms[1].threshold_ == pytest.approx(alarms[0].threshold_, rel=0.2)
+    for alarm in alarms:
+        assert (alarm.predict(HOLED) == -1).mean() < 0.06
+
+
+# As an estimator, and what is refused
+
+
+@each_rule
+def test_pickles_clones_and_arrays(rule):
+    alarm = WindowedAlarm("12h", rule=rule).fit(X)
+    expected = alarm.damage_index(HOLED)
+    pd.testing.assert_series_equal(pickle.loads(pickle.dumps(alarm)).damage_index(HOLED), expected)
+    assert not hasattr(clone(alarm), "law_")
+    plain = WindowedAlarm(12, rule=rule).fit(X.to_numpy())
+    np.testing.assert_array_equal(plain.damage_index(HOLED.to_numpy()), expected)
+
+
+@pytest.mark.parametrize(
+    ("window", "records", "message"),
+    [
+        (
+            "24h",
+            X.to_numpy(),
+            "window is '24h', a time, but the records are not a frame on a DatetimeIndex in order of time; expected",
+        ),
+        ("24h", X.reset_index(drop=True), "not a frame on a DatetimeIndex"),
+        ("24h", X[::-1], "in order of time; expected one"),
+        (0, X, "'window' parameter of WindowedAlarm must be an int in the range"),
+        (2.5, X, "'window' parameter of WindowedAlarm"),
+        (3, X[:5], "has 5 rows, and windows hold up to 3 records; expected at least twice as many rows"),
+        ("9h", X[:17], "has 17 rows, and windows hold up to 9 records"),
+        (2, X[:5], "covariance of [0-9] baseline rows and 3 modes is singular"),
+        (3, X.assign(f4=X["f1"]), r"singular \(rank 3\)"),
+    ],
+)
+@each_rule
+def test_windows_and_records_that_do_not_serve_are_named(rule, window, records, message):
+    with pytest.raises(ValueError, match=message):
+        WindowedAlarm(window, rule=rule).fit(records)
+
+
+@pytest.mark.parametrize("window", ["0h", "-3h", "NaT", "", "a day"])
+def test_lengths_of_time_that_do_not_serve_are_named(window):
+    with pytest.raises(ValueError, match=r"window is .*; expected"):
+        WindowedAlarm(window).fit(X)
+
+
+def test_more_records_than_a_window_has_cannot_be_asked_for():
+    with pytest.raises(ValueError, match="m is 9, but windows hold 5 records; expected at most as many"):
+        WindowedAlarm(5, rule="m-of-n", m=9).fit(X)
