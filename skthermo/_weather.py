@@ -47,6 +47,9 @@ class TrainingRange:
         known = ~np.isnan(values).any(axis=1)
         if not known.any():
             return f"none of {len(values)} rows can be predicted: each lacks a temperature or a lagged one"
+        limits = np.array([np.fmin.reduce(values), np.fmax.reduce(values)])
+        if (np.nan_to_num(self.excess(limits)) <= FAR).all():
+            return ""
         excess = np.where(known[:, np.newaxis], self.excess(inputs), 0.0)
         rows = (excess > FAR).any(axis=1)
         if not rows.any():

@@ -248,7 +248,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
         weather = as_floats(temperatures)
         known = ~np.isnan(weather).any(axis=1)
-        message = self.training_range_.warning(weather[known]) if known.any() else ""
+        message = self.training_range_.warning(weather) if known.any() else ""
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "foreign weather")
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
@@ -311,7 +311,12 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         residuals[untested] = np.nan
         if self.scale is None:
             return residuals
-        self.spread_, white = Spread.of(weather, residuals, local=self.scale == "local")
+        empty = np.isnan(residuals).all(axis=0)
+        if empty.any():
+            name = self.get_feature_names_out()[empty][0]
+            raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
+        size = np.fmax.reduce(np.abs(as_floats(frequencies)))
+        self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
         return white
 
     def _split(self, X: Any, values: NDArray) -> tuple[Any, Any]:

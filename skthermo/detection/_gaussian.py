@@ -13,6 +13,9 @@ TOLERANCE = 1e-9
 """Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
 
 
+GAPS_TOLERANCE = 1e-7
+"""A combination of standardised modes with gaps that varies less than this is taken to be constant."""
+
 JITTER = 1e-12
 """Added to the variances of standardised modes, so that copies of a mode have inverses until `check_invertible`."""
 
@@ -87,12 +90,18 @@ def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
     return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
 
 
-def check_invertible(covariance: Array, rows: Array) -> Array:
-    """Standard deviations of the modes, if no mode is constant or a combination of others."""
+def check_invertible(covariance: Array, rows: Array, size: Array | None = None) -> Array:
+    """Standard deviations of the modes, if no mode is constant or a combination of others.
+
+    ``size`` holds magnitudes of the modes beside which a deviation may be only rounding.
+    """
+    size = np.fmax.reduce(np.abs(rows)) if size is None else size
     deviations = np.sqrt(np.diag(covariance))
-    # A deviation of a constant mode is only rounding.
-    scale = np.where(deviations <= 1e-14 * np.nanmax(np.abs(rows), axis=0), np.inf, deviations)
-    rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), hermitian=True)
+    constant = (deviations <= 1e-14 * size) | (np.fmax.reduce(rows) == np.fmin.reduce(rows))
+    scale = np.where(constant, np.inf, deviations)
+    # With gaps, the iteration leaves a small variance where there is none.
+    tolerance = GAPS_TOLERANCE if np.isnan(rows).any() else None
+    rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), tolerance, hermitian=True)
     if rank < len(covariance):
         n_rows = int((~np.isnan(rows)).any(axis=1).sum())
         raise ValueError(

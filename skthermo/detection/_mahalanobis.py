@@ -10,6 +10,7 @@ from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
 from skthermo._validation import HasMethods, StrOptions
+from skthermo._warnings import warn_user
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._gaussian import Gaussian, check_invertible, patterns, precisions
 from skthermo.detection._patterns import PatternScale, as_if_complete
@@ -182,6 +183,14 @@ def _most_likely(F: Array) -> EmpiricalCovariance:
     empty = np.isnan(F).all(axis=0)
     if empty.any():
         raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(F)} rows")
+    together = ~np.isnan(F).T @ ~np.isnan(F)
+    if not together.all():
+        first, second = np.argwhere(~together)[0]
+        warn_user(
+            f"modes {first} and {second} (counted from 0) are never there together ({(~together).sum() // 2} pairs): "
+            "their correlation is a guess",
+            "modes never together",
+        )
     learned = Gaussian.of(F)
     scale = check_invertible(learned.covariance, F)
     fitted = EmpiricalCovariance()

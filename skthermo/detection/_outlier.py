@@ -95,7 +95,8 @@ class OutlierDetector(DamageDetector):
         complete = F[~np.isnan(F).any(axis=1)]
         if len(complete) < 2:
             raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
-        self.estimator_ = clone(self.estimator).fit(complete)
+        scores = hasattr(self.estimator, "score_samples") or hasattr(self.estimator, "decision_function")
+        self.estimator_ = clone(self.estimator).fit(complete) if scores else None
         if not hasattr(self.estimator_, "score_samples") and not _is_pyod(self.estimator_):
             raise ValueError(
                 f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "

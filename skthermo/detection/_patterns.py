@@ -57,7 +57,7 @@ class PatternScale:
         """Learned from the indices of a baseline."""
         known = np.isfinite(index)
         index, present = index[known], present[known]
-        by_number = _factors(index, present.sum(axis=1), present.shape[1] + 1, contamination)
+        by_number = _factors(index, present.sum(axis=1), present.shape[1] + 1, contamination, trend=True)
         masks, of_row = patterns(present)
         by_pattern = _factors(index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, TENTH))
         scale = cls(by_number, masks, by_pattern)
@@ -74,8 +74,11 @@ class PatternScale:
         return self.by_number[masks.sum(axis=1)] * np.where(same.any(axis=1), same @ self.by_pattern, 1.0)
 
 
-def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float) -> Array:
-    """Factors that make the groups exceed one level equally often, 1 where a group is small."""
+def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float, *, trend: bool = False) -> Array:
+    """Factors that make the groups exceed one level equally often, 1 where a group is small.
+
+    With ``trend``, they are drawn to a straight line over the numbers of the groups.
+    """
     counts = np.bincount(group, minlength=n_groups)
     large = np.flatnonzero(counts >= max(FEWEST, 1 / share))
     if len(large) < 2:
@@ -85,8 +88,19 @@ def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float)
     low, high = 1 - min(2 * share, 0.9), 1 - share / 2
     steepness = np.diff(np.quantile(logs, [low, high]))[0] / (high - low)
     factors = np.ones(n_groups)
-    factors[large] = np.exp(-_effects(values, share * (1 - share) * steepness**2 / counts[large]))
+    variances = share * (1 - share) * steepness**2 / counts[large]
+    line = _line(large, values, variances) if trend else 0.0
+    factors[large] = np.exp(-line - _effects(values - line, variances))
     return factors
+
+
+def _line(numbers: Array, values: Array, variances: Array) -> Array:
+    """Differences from the mean on a straight line, shrunk; zero if chance may have caused them."""
+    weights = 1 / variances
+    x = numbers - np.average(numbers, weights=weights)
+    slope, information = (weights * x * values).sum() / (weights * x * x).sum(), (weights * x * x).sum()
+    evidence = slope**2 * information
+    return slope * (1 - 1 / evidence) * x if evidence > chi2.ppf(CHANCE, 1) else np.zeros(len(x))
 
 
 def _effects(values: Array, variances: Array) -> Array:

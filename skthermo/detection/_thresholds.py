@@ -32,9 +32,15 @@ def conformal_threshold(index: Array, contamination: float, share: float = 1.0) 
     rank = int(np.ceil((n_independent + 1) * (1 - contamination) / share - 1e-9))
     if rank > len(ordered):
         warn_user(
-            f"{n_independent:.0f} independent baseline records are too few for a rate of false alarms of "
+            f"{np.floor(n_independent):.0f} independent baseline records are too few for a rate of false alarms of "
             f"{contamination:.2g}: the threshold is the largest index, which later records exceed at a rate of about "
             f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
             "few records for a threshold",
         )
-    return float(ordered[min(rank, len(ordered)) - 1])
+    threshold = float(ordered[min(rank, len(ordered)) - 1])
+    if threshold == np.inf:
+        raise ValueError(
+            f"{len(ordered)} baseline rows are too few for their number of modes: some single row decides alone "
+            "about a direction; expected more rows"
+        )
+    return threshold

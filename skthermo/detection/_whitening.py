@@ -28,8 +28,8 @@ class Spread:
         Mean, and covariance in unknown weather.
     smoothing : Smoothing or None
         None if the covariance is the same in all weather.
-    reach : TrainingRange
-        Temperatures of the records behind it.
+    reach : TrainingRange or None
+        Temperatures of the records behind it, beyond which residuals may be larger.
     coordinates : Pipeline
         Gives places to rows of weather.
     places : ndarray of shape (n_places, n_coordinates)
@@ -39,20 +39,21 @@ class Spread:
 
     overall: Gaussian
     smoothing: Smoothing | None
-    reach: TrainingRange
+    reach: TrainingRange | None
     coordinates: Pipeline | None
     places: Array
     covariances: Array
 
     @classmethod
-    def of(cls, weather: Array, residuals: Array, *, local: bool) -> tuple["Spread", Array]:
+    def of(cls, weather: Array, residuals: Array, size: Array, *, local: bool) -> tuple["Spread", Array]:
         """The spread that a baseline in order of time shows, and the whitened baseline itself.
 
-        A baseline record is whitened by the others, without its neighbours in time.
+        A baseline record is whitened by the others, without its neighbours in time. ``size`` holds magnitudes of the
+        frequencies.
         """
         overall, learned = Gaussian.of(residuals), ~np.isnan(residuals).all(axis=1)
-        check_invertible(overall.covariance, residuals)
-        reach = TrainingRange.of(weather, learned)
+        check_invertible(overall.covariance, residuals, size)
+        reach = TrainingRange.of(weather, learned) if local else None
         usable = np.flatnonzero(learned & ~np.isnan(weather).any(axis=1))
         plain = cls(overall, None, reach, None, np.empty((0, 1)), overall.covariance[np.newaxis])
         white = plain.whiten(weather, residuals)
@@ -89,9 +90,11 @@ class Spread:
         masks, pattern = patterns(present)
         cases, case = np.unique(self._place(weather) * len(masks) + pattern, return_inverse=True)
         roots = whitenings(self.covariances[cases // len(masks)], masks[cases % len(masks)])[0]
-        beyond = np.nan_to_num(self.reach.excess(weather)).mean(axis=1)
         white = np.einsum("ij,ijk->ik", self.overall.centred(residuals), roots[case])
-        return np.where(present, white / np.sqrt(1 + (BEYOND * beyond[:, np.newaxis]) ** 2), np.nan)
+        if self.reach is not None:
+            beyond = np.nan_to_num(self.reach.excess(weather)).mean(axis=1)
+            white /= np.sqrt(1 + (BEYOND * beyond[:, np.newaxis]) ** 2)
+        return np.where(present, white, np.nan)
 
     def _place(self, weather: Array) -> NDArray[np.intp]:
         """The nearest place of every row; the overall covariance where a temperature is missing."""

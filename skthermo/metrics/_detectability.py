@@ -1,5 +1,6 @@
 """Probability of false alarm and of detection, time to detection, minimum detectable damage."""
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -125,7 +126,7 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
-def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = 0) -> Any:
+def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = None) -> Any:
     """Time from the onset of damage to the first alarm.
 
     Parameters
@@ -134,9 +135,9 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = 0)
         Damage index of records in order of time; NaN is no alarm.
     threshold : float
         A damage index above it is an alarm.
-    onset : int or label of the index, default=0
-        First damaged record: its position counted from 0 or, for a series, a label of its index or a time between
-        two of them.
+    onset : int or time, optional
+        First damaged record: its position counted from 0 or, for a series on a ``DatetimeIndex``, a time, which may lie
+        between two records. By default the first record.
 
     Returns
     -------
@@ -147,8 +148,8 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = 0)
     Raises
     ------
     ValueError
-        If the index is not a vector or not in order of time, the threshold is not finite, or the onset is after the
-        last record.
+        If the index is not a vector or not in order of time, the threshold is not finite, or the onset is not within
+        the records.
 
     Examples
     --------
@@ -157,16 +158,30 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = 0)
     2.0
     """
     index, limit = _checked(damage_index, threshold)
-    times = damage_index.index if isinstance(damage_index, pd.Series) else pd.RangeIndex(len(index))
+    times = getattr(damage_index, "index", None)
+    if not isinstance(times, pd.DatetimeIndex):
+        times = pd.RangeIndex(len(index))
     if not times.is_monotonic_increasing:
         raise ValueError("the damage index is not in order of time; expected records in order")
-    first = int(times.searchsorted(onset))
-    if first >= len(index):
-        raise ValueError(f"onset is {onset!r}, after the last record, {times[-1]!r}; expected one within the records")
+    start = _start(times, onset)
+    first = int(times.searchsorted(start))
     alarms = np.flatnonzero(index[first:] > limit)
     if isinstance(times, pd.DatetimeIndex):
-        return times[first + alarms[0]] - pd.Timestamp(onset) if alarms.size else pd.NaT
+        return times[first + alarms[0]] - start if alarms.size else pd.NaT
     return float(alarms[0]) if alarms.size else float("nan")
+
+
+def _start(times: pd.Index, onset: Any) -> Any:
+    """The onset as a time or a position, which is not after the last record."""
+    is_time = isinstance(times, pd.DatetimeIndex)
+    try:
+        start = times[0] if onset is None else pd.Timestamp(onset) if is_time else operator.index(onset)
+        if start <= times[-1] and (is_time or start >= 0):
+            return start
+    except (IndexError, TypeError, ValueError):
+        pass
+    expected = "a time, not after the last record" if is_time else "a position, from 0 to that of the last record"
+    raise ValueError(f"onset is {onset!r} for {len(times)} records; expected {expected}")
 
 
 def _checked(damage_index: ArrayLike, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -149,7 +149,6 @@ def test_a_mode_that_is_never_there_is_named():
         MahalanobisDetector().fit(rows)
 
 
-@pytest.mark.xfail(strict=True, reason="rounding of expectation maximisation hides that the covariance is singular")
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.5])
 @pytest.mark.parametrize("weights", [[1, 0, 0], [1, 2, 3]], ids=["copy", "sum"])
 def test_a_mode_that_others_determine_is_found_in_spite_of_gaps(weights, share):
@@ -158,7 +157,6 @@ def test_a_mode_that_others_determine_is_found_in_spite_of_gaps(weights, share):
         MahalanobisDetector().fit(rows)
 
 
-@pytest.mark.xfail(strict=True, reason="the variance of a mode with a single value is what the iteration began with")
 def test_a_mode_with_a_single_value_has_no_variance():
     rows = F.copy()
     rows[1:, 2] = np.nan

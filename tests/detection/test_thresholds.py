@@ -174,9 +174,6 @@ def test_the_empirical_covariance_is_the_default(threshold):
     np.testing.assert_allclose(given.damage_index(rows), default.damage_index(rows), rtol=1e-10)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="each row alone decides one direction of the covariance: its distance is infinite"
-)
 @TOO_FEW
 def test_a_threshold_is_a_number_with_as_few_records_as_the_covariance_allows():
     assert MahalanobisDetector().fit(records(5)).threshold_ < np.inf

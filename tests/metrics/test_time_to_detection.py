@@ -51,12 +51,6 @@ def test_no_alarm_on_stamps_is_no_time():
     assert time_to_detection(zoned, 3.0, zoned.index[1]) == pd.Timedelta("3h")
 
 
-def test_labels_that_are_no_times_count_records():
-    assert time_to_detection(pd.Series(INDEX, list("abcdef")), 3.0, "b") == 3
-    assert time_to_detection(pd.Series(INDEX, [0, 10, 20, 30, 40, 50]), 3.0, 20) == 2
-
-
-@pytest.mark.xfail(strict=True, raises=TypeError, reason="the position 0 is looked up among stamps")
 def test_the_first_record_is_the_onset_by_default_also_on_stamps():
     assert time_to_detection(SERIES[1:], 3.0) == pd.Timedelta("3h")
 
@@ -64,8 +58,13 @@ def test_the_first_record_is_the_onset_by_default_also_on_stamps():
 @pytest.mark.parametrize(
     ("index", "onset", "message"),
     [
-        (INDEX, 6, "onset is 6, after the last record, 5; expected one within the records"),
-        (SERIES, "2026", "onset is '2026', after the last record"),
+        (INDEX, 6, "onset is 6 for 6 records; expected a position, from 0 to that of the last record"),
+        (INDEX, -1, "onset is -1 for 6 records; expected a position"),
+        (INDEX, 0.5, "onset is 0.5 for 6 records; expected a position"),
+        ([], None, "onset is None for 0 records"),
+        (SERIES, "2026", "onset is '2026' for 6 records; expected a time, not after the last record"),
+        (SERIES, "soon", "onset is 'soon' for 6 records; expected a time"),
+        (SERIES.tz_localize("UTC"), "2025", "onset is '2025' for 6 records; expected a time"),
         (SERIES[::-1], SERIES.index[0], "the damage index is not in order of time"),
         ([INDEX], 0, r"damage_index has shape \(1, 6\); expected a vector"),
     ],
