@@ -21,7 +21,8 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
 
     Transformers at the head of a pipeline that accept NaN get every row, so that lags find the rows before; the
-    rest of the pipeline gets the rows that it accepts.
+    rest of the pipeline gets the rows that it accepts. Where targets are missing, each of them gets a regressor of its
+    own, fitted on the rows that have it.
     """
 
     def __init__(self, estimator: BaseEstimator):
@@ -32,17 +33,25 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         self.head_ = None if head is None else clone(head)
         inputs = X if head is None else self.head_.fit_transform(X)
         self.takes_nan_ = takes_nan(rest)
-        usable = self._predictable(inputs)
-        if not takes_missing_targets(rest):
-            usable &= _complete(y)
-        if not usable.any():
-            wanted = "every target" if self.takes_nan_ else "every value"
-            raise ValueError(
-                f"none of {len(y)} rows to learn from is complete; expected rows with {wanted} for "
-                f"{type(rest).__name__}"
-            )
         self.n_targets_ = y.shape[1]
-        self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))
+        usable, present = self._predictable(inputs), ~np.isnan(as_floats(y))
+        if takes_missing_targets(rest):
+            present[:] = True
+        in_use = usable[:, np.newaxis] & present
+        if not in_use.any(axis=0).all():
+            wanted = "that target" if self.takes_nan_ else "that target and every other column"
+            raise ValueError(
+                f"target {in_use.any(axis=0).argmin()} (counted from 0) has none of {len(y)} rows to learn from; "
+                f"expected rows with {wanted} for {type(rest).__name__}"
+            )
+        if (in_use == usable[:, np.newaxis]).all():
+            self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))
+        else:
+            self.regressor_ = MultiOutputRegressor(rest)
+            targets = as_floats(y).T
+            self.regressor_.estimators_ = [
+                clone(rest).fit(inputs[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
+            ]
         self.estimator_ = self.regressor_ if head is None else joined(self.estimator, self.head_, self.regressor_)
         return self
 
