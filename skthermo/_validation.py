@@ -15,6 +15,7 @@ from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval, InvalidParameterError, StrOptions
+from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _check_sample_weight, _num_samples, check_is_fitted
 
 from skthermo._arrays import without_mask, without_missing
@@ -26,6 +27,7 @@ __all__ = [
     "Interval",
     "InvalidParameterError",
     "StrOptions",
+    "_BaseComposition",
     "_BaseImputer",
     "_check_feature_names_in",
     "_check_sample_weight",

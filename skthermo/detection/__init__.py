@@ -1,8 +1,9 @@
 """Damage detection from frequencies."""
 
 from skthermo.detection._compensator import TemperatureCompensator
+from skthermo.detection._fused import FusedDetector
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
 from skthermo.detection._windowed_alarm import WindowedAlarm
 
-__all__ = ["MahalanobisDetector", "OutlierDetector", "TemperatureCompensator", "WindowedAlarm"]
+__all__ = ["FusedDetector", "MahalanobisDetector", "OutlierDetector", "TemperatureCompensator", "WindowedAlarm"]

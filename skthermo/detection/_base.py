@@ -18,8 +18,8 @@ from skthermo._warnings import warn_user
 class DamageDetector(OutlierMixin, BaseEstimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
-    A detector has the parameter ``contamination`` and two methods: `_learn` and `_index`. Both get rows in which
-    modes may be missing.
+    A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes
+    may be missing, and `_limit`.
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
@@ -29,8 +29,12 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         return F
 
     @abstractmethod
-    def _learn(self, F: Any) -> float:
-        """Learn the baseline, and give the threshold."""
+    def _learn(self, F: Any) -> Array:
+        """Learn the baseline, and give its damage index as the threshold should see it."""
+
+    @abstractmethod
+    def _limit(self, index: Array) -> float:
+        """The threshold, from the baseline's damage index."""
 
     @abstractmethod
     def _index(self, F: Any) -> Array:
@@ -55,19 +59,21 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Raises
         ------
         ValueError
-            If fewer than two rows are complete, or the detector cannot learn from them.
+            If fewer than two rows have a value, or the detector cannot learn from them.
 
         Warns
         -----
         UserWarning
-            If there are numbers that stand for a missing value, such as -999.
+            If there are numbers that stand for a missing value, such as -999, or too few records for the rate of
+            false alarms that is asked for.
         """
         F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
-        self.threshold_ = self._learn(self._records(X, F))
+        self.baseline_index_ = self._learn(self._records(X, F))
+        self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
         return self
 
@@ -82,7 +88,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Returns
         -------
         ndarray or Series of shape (n_samples,)
-            Dimensionless; NaN where a mode is missing. A frame gives a series on its index.
+            Dimensionless; NaN where it cannot be computed. A frame gives a series on its index.
         """
         check_is_fitted(self)
         F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
@@ -100,7 +106,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Returns
         -------
         ndarray of shape (n_samples,)
-            NaN where a mode is missing.
+            NaN where there is no damage index.
         """
         return -np.asarray(self.damage_index(X))
 
@@ -115,7 +121,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Returns
         -------
         ndarray of shape (n_samples,)
-            NaN where a mode is missing.
+            NaN where there is no damage index.
         """
         return self.score_samples(X) - self.offset_
 
@@ -130,14 +136,15 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Returns
         -------
         ndarray of shape (n_samples,)
-            -1 (alarm) where the damage index exceeds the threshold, else +1. Rows with a missing
-            mode get +1, and one warning counts them.
+            -1 (alarm) where the damage index exceeds the threshold, else +1. Rows without a damage index get +1, and
+            one warning counts them.
         """
         decision = self.decision_function(X)
         unknown = int(np.isnan(decision).sum())
         if unknown:
             warn_user(
-                f"{unknown} of {len(decision)} rows have a missing value: no alarm is raised there", "missing values"
+                f"{unknown} of {len(decision)} rows lack values and have no damage index: no alarm is raised there",
+                "missing values",
             )
         return np.where(decision < 0, -1, 1)
 

@@ -41,12 +41,25 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         the output.
     cv : int, cross-validation splitter or iterable, default=None
         Folds of `fit_transform`. An int gives that many folds of consecutive rows, None gives 5. A
-        splitter must put every row into exactly one test fold.
+        splitter must put every row into exactly one test fold, or all but the first rows, as ``TimeSeriesSplit``
+        does: the residuals of those are NaN.
+    scale : {None, "global", "local"}, default=None
+        What the residuals are divided by:
+
+        - ``None``: nothing; they are in Hz.
+        - ``"global"``: their covariance. They are then in standard deviations, and uncorrelated.
+        - ``"local"``: the covariance that they have in similar weather. Frost that makes residuals scatter then no
+          longer hides damage on warm days.
 
     Attributes
     ----------
     estimator_ : regressor
         Clone of ``estimator``, fitted on all rows that it can take.
+    spread_ : object
+        Covariance of the residuals by weather, if they are scaled; ``spread_.smoothing`` says over how many records
+        of similar weather it is taken (None: all).
+    training_range_ : object
+        Lowest and highest values of the other columns.
     targets_ : ndarray of int
         Positions of the targets.
     n_features_in_ : int
@@ -76,12 +89,24 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
     too; an array is passed as an array.
 
+    Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
+    each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
+    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. The
+    numbers of neighbours and of pseudo-rows, or one covariance for all weather, are those under which baseline
+    records are likeliest given the others, records fewer than 24 rows apart left out; such records are left out too
+    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather.
+    Where a record's temperatures lie outside the baseline's by e ranges of their columns (on average over the
+    columns), residuals are also divided by sqrt(1 + (e / 2)^2): what the regression says there is less certain. A row
+    with a missing temperature takes the covariance of all records. `transform` warns of rows whose weather is far
+    outside the baseline's; `applicability` says how far.
+
     Missing values:
 
     - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so
       that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
       the pipeline, and to the rows of X where the estimator is no such pipeline.
-    - A missing target makes only its own residual NaN. Its row is not used to fit the estimator. Only an
+    - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
+      estimator of its own, fitted on the rows that have it. Only an
       estimator with an FE model (`DataInformedFEM`, also at the end of a pipeline or in a search) gets all
       rows, because its lags need them; it leaves out incomplete rows itself.
     - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to
@@ -108,7 +133,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     >>> in_sample = MahalanobisDetector().fit(compensator.fit(baseline).transform(baseline))
     >>> print(f"{(in_sample.predict(compensator.transform(unseen)) == -1).mean():.0%} false alarms")
-    16% false alarms
+    14% false alarms
     """
 
     _parameter_constraints: dict = {
@@ -151,7 +176,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         ------
         ValueError
             If a target is not among the columns or is named twice; if the targets are all of the columns
-            or none; if a target is NaN in every row, or no row is complete.
+            or none; if a target is NaN in every row, or in every row that the estimator can learn from; if the
+            residuals that are to be scaled have a singular covariance.
 
         Warns
         -----
@@ -179,7 +205,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            In Hz, each row predicted by a clone that was not fitted on its fold.
+            In Hz, or dimensionless if scaled; each row predicted by a clone that was not fitted on its fold.
 
         Raises
         ------
@@ -205,7 +231,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            In Hz, measured minus predicted. For the rows of `fit` they are too small: use `fit_transform` there.
+            Measured minus predicted, in Hz, or dimensionless if scaled. For the rows of `fit` they are too small: use
+            `fit_transform` there.
 
         Raises
         ------
@@ -215,7 +242,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            As in `fit`.
+            As in `fit`, and if temperatures are far outside those of `fit`.
         """
         check_is_fitted(self)
         temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))

@@ -1,5 +1,7 @@
 """Damage index and alarm by any of scikit-learn's outlier detectors."""
 
+from typing import Any
+
 import numpy as np
 from sklearn.base import BaseEstimator, clone
 
@@ -12,15 +14,15 @@ from skthermo.detection._thresholds import quantile_threshold
 class OutlierDetector(DamageDetector):
     """Alarm where an outlier detector scores frequencies lower than nearly all of a healthy baseline.
 
-    The damage index is minus the estimator's ``score_samples``, and the threshold a quantile of the
-    baseline's damage index.
+    The damage index is minus the estimator's ``score_samples`` (or the ``decision_function`` of PyOD's detectors,
+    where higher is more abnormal), and the threshold a quantile of the baseline's damage index.
 
     Parameters
     ----------
     estimator : outlier detector
         With ``fit`` and ``score_samples``, such as ``IsolationForest()``, ``OneClassSVM()``,
-        ``LocalOutlierFactor(novelty=True)`` or ``EllipticEnvelope()``, or a pipeline that ends
-        with one. Its own threshold and ``contamination`` are not used.
+        ``LocalOutlierFactor(novelty=True)`` or ``EllipticEnvelope()``, a pipeline that ends
+        with one, or a detector of PyOD. Its own threshold and ``contamination`` are not used.
     contamination : float, default=0.02
         Share of the baseline above the threshold: 0.02 puts it at the 98th percentile.
 
@@ -28,6 +30,8 @@ class OutlierDetector(DamageDetector):
     ----------
     estimator_ : outlier detector
         Fitted clone.
+    baseline_index_ : ndarray of shape (n_samples,)
+        Damage index of the baseline; NaN where a mode is missing.
     threshold_ : float
         The (1 - contamination) quantile of the baseline's damage index.
     offset_ : float
@@ -87,20 +91,33 @@ class OutlierDetector(DamageDetector):
         self.estimator = estimator
         self.contamination = contamination
 
-    def _learn(self, F: Array) -> float:
-        if not hasattr(self.estimator, "score_samples"):
-            raise ValueError(
-                f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "
-                "scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)"
-            )
+    def _learn(self, F: Array) -> Array:
         complete = F[~np.isnan(F).any(axis=1)]
         if len(complete) < 2:
             raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
         self.estimator_ = clone(self.estimator).fit(complete)
-        return quantile_threshold(self._index(complete), self.contamination)
+        if not hasattr(self.estimator_, "score_samples") and not _is_pyod(self.estimator_):
+            raise ValueError(
+                f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "
+                "scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)"
+            )
+        return self._index(F)
+
+    def _limit(self, index: Array) -> float:
+        return quantile_threshold(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
         index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)
         if complete.any():
-            index[complete] = -self.estimator_.score_samples(F[complete])
+            index[complete] = self._abnormality(F[complete])
         return index
+
+    def _abnormality(self, complete: Array) -> Array:
+        if _is_pyod(self.estimator_):
+            return self.estimator_.decision_function(complete)
+        return -self.estimator_.score_samples(complete)
+
+
+def _is_pyod(estimator: Any) -> bool:
+    """Whether a fitted detector scores as PyOD's do: higher is more abnormal."""
+    return hasattr(estimator, "decision_scores_")

@@ -18,7 +18,74 @@ MOST_PERIODS = 50
 
 
 class WindowedAlarm(DamageDetector):
-    """Alarm where the last records together are far from a healthy baseline."""
+    """Alarm where the last records together are far from a healthy baseline.
+
+    Records have to be in order of time, and are best whitened: residuals of
+    ``TemperatureCompensator(..., scale="local")``.
+
+    Parameters
+    ----------
+    window : int or str
+        Number of records, up to the one that is judged, or a time such as ``"24h"`` on the ``DatetimeIndex`` of a
+        frame.
+    rule : {"mean", "m-of-n"}, default="mean"
+        What the damage index of a window is:
+
+        - ``"mean"``: length of the mean of the whitened records, in standard deviations of such a mean. Finds small
+          lasting changes.
+        - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that
+          there is an alarm where m of them exceed the threshold. Not misled by a few absurd records.
+
+    m : int, optional
+        Number of records of a full window that have to exceed the threshold; by default half of them. For
+        ``rule="m-of-n"``.
+    contamination : float, default=0.02
+        Share of healthy windows above the threshold. Windows of later records overlap: alarms come in runs.
+
+    Attributes
+    ----------
+    law_ : object
+        What the baseline teaches about windows.
+    baseline_index_ : ndarray of shape (n_samples,)
+        Damage index of the baseline's windows, each judged by what other periods teach.
+    threshold_ : float
+        A damage index above it is an alarm.
+    offset_ : float
+        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_ : int
+        Number of modes.
+    feature_names_in_ : ndarray of str
+        Names of the modes, where `fit` saw a frame with such names.
+
+    See Also
+    --------
+    MahalanobisDetector : Alarms of single records.
+    skthermo.metrics.time_to_detection : How long after its onset damage is found.
+
+    Notes
+    -----
+    Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a
+    single one. The standard deviation of a mean therefore includes the mean correlation of two records in one window,
+    mode by mode, and the threshold comes from the baseline's own windows. Every window is judged by what other
+    periods of the baseline teach, and the number of independent windows, by the correlation time of the baseline's
+    highest ones, decides which of their indices is the threshold. If there are too few for the rate, the threshold
+    is the largest index, and a warning says so. With thresholds for days to come in mind, let the compensator predict
+    its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
+
+    Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be
+    as unlikely in a full window of independent records, by the binomial law. The first windows of a series are
+    shorter than the others: a call does not remember the records of the last one.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector, WindowedAlarm
+    >>> healthy = make_truss_campaign(3, random_state=0).frequencies
+    >>> damaged = make_truss_campaign(damage={"top": 0.1}, random_state=1).frequencies
+    >>> single, week = MahalanobisDetector().fit(healthy), WindowedAlarm(7).fit(healthy)
+    >>> print(f"{(single.predict(damaged) == -1).mean():.0%}, {(week.predict(damaged) == -1).mean():.0%} alarms")
+    11%, 70% alarms
+    """
 
     _parameter_constraints: dict = {
         **DamageDetector._parameter_constraints,
@@ -43,15 +110,26 @@ class WindowedAlarm(DamageDetector):
     def _records(self, X: Any, F: Array) -> Windows:
         return Windows.of(X, F, self.window)
 
-    def _learn(self, windows: Windows) -> float:
+    def _learn(self, windows: Windows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = MeanLaw if self.rule == "mean" else CountLaw
+        if n_rows < 2 * windows.longest:
+            raise ValueError(
+                f"the baseline has {n_rows} rows, and windows hold up to {windows.longest} records; expected at least "
+                "twice as many rows"
+            )
         n_periods = int(np.clip(n_rows // (2 * windows.longest), 2, MOST_PERIODS))
         for rest, fold in KFold(n_periods).split(windows.rows):
             index[fold] = law.of(windows, rest, self.contamination, self.m).index(windows)[fold]
         self.law_ = law.of(windows, np.arange(n_rows), self.contamination, self.m)
+        return index
+
+    def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
         return conformal_threshold(index, self.contamination, 1 / correlation_time(is_high))
 
     def _index(self, windows: Windows) -> Array:
-        return self.law_.index(windows)
+        index = np.empty(len(windows.rows))
+        for run, piece in windows.pieces():
+            index[run] = self.law_.index(piece)[run.start - run.stop :]
+        return index

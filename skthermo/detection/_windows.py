@@ -1,5 +1,6 @@
 """Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,7 +19,7 @@ SMALLEST = 1e-300
 """Probabilities are not followed below this."""
 
 NUMBERS = 2_000_000
-"""Numbers that are sorted at a time."""
+"""Numbers that are held in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +40,32 @@ class Windows:
         """Windows of a number of records, or of a time on the index of a frame."""
         if not isinstance(window, str):
             return cls(rows, np.maximum(np.arange(len(rows)) - window + 1, 0))
+        try:
+            duration = pd.Timedelta(window)
+        except ValueError:
+            duration = pd.NaT
+        if not duration > pd.Timedelta(0):
+            raise ValueError(f"window is {window!r}; expected a number of records, or a time such as '24h'")
         times = getattr(X, "index", None)
-        if not isinstance(times, pd.DatetimeIndex):
+        if not isinstance(times, pd.DatetimeIndex) or not times.is_monotonic_increasing:
             raise ValueError(
-                f"window is {window!r}, a time; expected a frame on a DatetimeIndex, or a number of records"
+                f"window is {window!r}, a time, but the records are not a frame on a DatetimeIndex in order of time; "
+                "expected one, or a number of records as the window"
             )
-        if not times.is_monotonic_increasing:
-            raise ValueError(f"window is {window!r}, a time; expected records in order of time")
-        return cls(rows, times.searchsorted(times - pd.Timedelta(window), side="right"))
+        return cls(rows, times.searchsorted(times - duration, side="right"))
 
     def sums(self, values: Array) -> Array:
         """Sums of the values of the records in every window."""
         totals = np.concatenate([np.zeros((1, *values.shape[1:])), values.cumsum(axis=0)])
         return totals[1:] - totals[self.first]
+
+    def pieces(self) -> Iterator[tuple[slice, "Windows"]]:
+        """Runs of windows, which hold a bounded number of records, each with the records before that it needs."""
+        step = max(NUMBERS // self.longest, 1)
+        for start in range(0, len(self.rows), step):
+            stop, before = min(start + step, len(self.rows)), self.first[start]
+            first = np.maximum(self.first[before:stop] - before, 0)
+            yield slice(start, stop), Windows(self.rows[before:stop], first)
 
     @property
     def sizes(self) -> NDArray[np.intp]:
@@ -131,21 +145,17 @@ class CountLaw:
         """Learned from the records in some rows."""
         detector = MahalanobisDetector(contamination, threshold="quantile").fit(windows.rows[rows])
         n = int(np.median(windows.sizes))
-        return cls(detector, n, (n + 1) // 2 if m is None else min(m, n))
+        if m is not None and m > n:
+            raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")
+        return cls(detector, n, (n + 1) // 2 if m is None else m)
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window."""
-        single, n_modes = self.detector.damage_index(windows.rows), windows.rows.shape[1]
-        index = np.empty(len(single))
-        longest = windows.longest
-        padded = np.concatenate([np.full(longest - 1, np.nan), single])
-        step = max(NUMBERS // longest, 1)
-        for first in range(0, len(single), step):
-            block = np.arange(first, min(first + step, len(single)))
-            last = np.lib.stride_tricks.sliding_window_view(padded, longest)[block]
-            inside = np.arange(longest) >= longest - windows.sizes[block, np.newaxis]
-            index[block] = self._as_if_full(np.where(inside, last, np.nan), n_modes)
-        return index
+        single = self.detector.damage_index(windows.rows)
+        padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
+        last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)
+        inside = np.arange(windows.longest) >= windows.longest - windows.sizes[:, np.newaxis]
+        return self._as_if_full(np.where(inside, last, np.nan), windows.rows.shape[1])
 
     def _as_if_full(self, single: Array, n_modes: int) -> Array:
         count = (~np.isnan(single)).sum(axis=1)

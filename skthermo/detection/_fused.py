@@ -1,0 +1,139 @@
+"""Several detectors as one."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.base import clone
+from sklearn.pipeline import Pipeline
+
+from skthermo._arrays import Array
+from skthermo._validation import _BaseComposition
+from skthermo.detection._base import DamageDetector
+from skthermo.detection._thresholds import conformal_threshold
+
+
+class FusedDetector(DamageDetector, _BaseComposition):
+    """Alarm where several detectors together find records far from a healthy baseline.
+
+    The damage index is the mean of theirs, each divided by its own threshold. What one compensator makes of the
+    weather, another may not: their mean is nearly as good as the best of them, or better, without a choice.
+
+    Parameters
+    ----------
+    detectors : list of (str, detector)
+        Names and detectors, or pipelines that end with one, such as
+        ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())``. All get the same columns.
+    contamination : float, default=0.02
+        Share of healthy records above the threshold.
+
+    Attributes
+    ----------
+    detectors_ : list of detector
+        Fitted clones.
+    baseline_index_ : ndarray of shape (n_samples,)
+        Damage index of the baseline, from the indices by which the detectors set their own thresholds.
+    threshold_ : float
+        The ceil((n + 1)(1 - contamination))-th smallest of them.
+    offset_ : float
+        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_ : int
+        Number of columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    See Also
+    --------
+    MahalanobisDetector : The detector at the end of most pipelines.
+
+    Notes
+    -----
+    A record that some of the detectors cannot judge gets the mean of the others.
+
+    Examples
+    --------
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from sklearn.neighbors import KNeighborsRegressor
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import FusedDetector, MahalanobisDetector, TemperatureCompensator
+    >>> healthy, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"top": 0.1}))
+    >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (healthy, damaged))
+    >>> def detector(regressor):
+    ...     compensator = TemperatureCompensator(regressor, targets=list(healthy.frequencies))
+    ...     return make_pipeline(compensator, MahalanobisDetector())
+    >>> detectors = [("lines", detector(LinearRegression())), ("neighbours", detector(KNeighborsRegressor()))]
+    >>> fused = FusedDetector(detectors).fit(baseline)
+    >>> print(f"{(fused.predict(later) == -1).mean():.0%} alarms")
+    22% alarms
+    """
+
+    _parameter_constraints: dict = {**DamageDetector._parameter_constraints, "detectors": [list]}
+
+    def __init__(self, detectors: Sequence[tuple[str, Any]], contamination: float = 0.02):
+        self.detectors = detectors
+        self.contamination = contamination
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters of this detector and of those that it is made of.
+
+        Parameters
+        ----------
+        deep : bool, default=True
+            Whether to give the parameters of the detectors too.
+
+        Returns
+        -------
+        dict
+        """
+        return self._get_params("detectors", deep=deep)
+
+    def set_params(self, **params: Any) -> "FusedDetector":
+        """Set parameters, also of the detectors, as in ``set_params(lines__mahalanobisdetector__contamination=0.01)``.
+
+        Parameters
+        ----------
+        **params : dict
+            Names and values.
+
+        Returns
+        -------
+        FusedDetector
+        """
+        return self._set_params("detectors", **params)
+
+    def _records(self, X: ArrayLike, F: Array) -> ArrayLike:
+        return X
+
+    def _learn(self, X: ArrayLike) -> Array:
+        if not self.detectors:
+            raise ValueError("detectors is an empty list; expected one or more (name, detector)")
+        self._validate_names([name for name, _ in self.detectors])
+        self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]
+        lasts = [_last(detector) for detector in self.detectors_]
+        for (name, _), last in zip(self.detectors, lasts, strict=True):
+            if not isinstance(last, DamageDetector) or last.threshold_ <= 0:
+                raise ValueError(
+                    f"detector {name!r} ends with {last!r:.200}; expected a detector of this package with a positive "
+                    "threshold, such as MahalanobisDetector()"
+                )
+        return _mean([last.baseline_index_ / last.threshold_ for last in lasts])
+
+    def _limit(self, index: Array) -> float:
+        return conformal_threshold(index, self.contamination)
+
+    def _index(self, X: ArrayLike) -> Array:
+        return _mean([-fitted.score_samples(X) / _last(fitted).threshold_ for fitted in self.detectors_])
+
+
+def _last(detector: Any) -> Any:
+    return detector[-1] if isinstance(detector, Pipeline) else detector
+
+
+def _mean(indices: list[Array]) -> Array:
+    """Mean index of every record, NaN left out; NaN where all are."""
+    known = [~np.isnan(index) for index in indices]
+    count = np.sum(known, axis=0)
+    total = np.sum([np.nan_to_num(index) for index in indices], axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
