@@ -24,8 +24,15 @@ import pandas as pd
 from plot_z24_bridge import BLUE, GREY, MODES, ORANGE, boosting, bridge_model, chain, read_arguments, save
 from sklearn.ensemble import IsolationForest
 from sklearn.model_selection import TimeSeriesSplit
+from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import (
+    FusedDetector,
+    MahalanobisDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
 from skthermo.metrics import time_to_detection
 from skthermo.surrogate import TemperatureMapper
 
@@ -101,6 +108,15 @@ def threshold_table(inputs):
     whitened = {name: found for (name, label), found in inputs.items() if label == WHITENED}
     tables = {kind: alarm_table(whitened, detector) for kind, detector in detectors.items()}
     return pd.concat(tables, axis=1)
+
+
+def fused():
+    """Two compensators, whose damage indices are averaged."""
+    compensators = {
+        name: TemperatureCompensator(estimator, targets=FREQUENCIES, scale="local")
+        for name, estimator in (("lines", TemperatureMapper()), ("trees", boosting()))
+    }
+    return FusedDetector([(name, make_pipeline(part, MahalanobisDetector())) for name, part in compensators.items()])
 
 
 def weather_table(records, inputs):
@@ -226,7 +242,8 @@ def main():
     print(f"{len(records.damaged)} after damage began. Every detector is asked for 2 % false alarms.\n")
 
     inputs = inputs_of_detectors(records)
-    show("Alarms in percent of the records, by compensator and by what the detector sees:", alarm_table(inputs))
+    tables = alarm_table(inputs), alarm_table({("lines and trees", "mean of their indices"): records}, fused())
+    show("Alarms in percent of the records, by compensator and by what the detector sees:", pd.concat(tables))
     show("The same for whitened residuals, by threshold, and by another detector:", threshold_table(inputs))
     show(
         "Alarms in percent of records, by weather; no baseline record is warmer than the last limit (broken lines):",
