@@ -1,11 +1,11 @@
 """
-Z24: a real bridge, its weather and its damage
-==============================================
+Z24: a real bridge and its weather
+==================================
 
 The Z24 bridge was monitored for a year and then damaged step by step. Below 0 °C its frequencies rise by
 some 2 % a degree, because asphalt and soil freeze; damage lowers them by less than a frosty week raises
-them. Here an FE model learns that effect from the first four fifths of the healthy records, is tested on
-the last fifth, and then simulates the damage that was done to the bridge.
+them. Here an FE model learns that effect from the first four fifths of the healthy records and is tested on
+the last fifth. ``plot_z24_detection.py`` then looks for the damage.
 
 The test is warmer than all training records. The default mapper goes on there in straight lines; boosted trees, which
 are compared, stay at their last value; polynomials would extrapolate badly.
@@ -24,13 +24,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from scipy.optimize import brentq
 from sklearn.ensemble import GradientBoostingRegressor
-from sklearn.model_selection import KFold
 from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo.datasets import load_z24, make_z24
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import sample
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner
@@ -43,8 +40,6 @@ Expected a CSV or MATLAB file as skthermo.datasets.load_z24 describes it, or a f
 {", ".join(FILES)}. The monitoring data of the Z24 bridge are provided by KU Leuven for
 non-commercial use on request: https://bwk.kuleuven.be/bwm/z24. Pass the path, or set SKTHERMO_DATA."""
 
-FOLDS = KFold(5)
-GROUP = "piers_soil"
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#777777"
 KINDS = ["vertical", "lateral", "vertical", "torsion"]
 MODES = [f"$f_{i}$ ({kind})" for i, kind in enumerate(KINDS, 1)]
@@ -135,58 +130,6 @@ def hold_out_table(bridge):
     return pd.DataFrame(rows, [*F, "mean", "ratio"]).T.round(3)
 
 
-class Damage:
-    """What the bridge was given in its last month, measured and simulated.
-
-    The severity in piers and soil is fitted to the mean drop of f2 and to nothing else.
-    """
-
-    def __init__(self, bridge):
-        self.bridge = bridge
-        self.fem = chain(bridge_model()).fit(bridge.T, bridge.F)
-        self.expected = self.fem.predict(bridge.T_damaged)
-        self.measured_drop = self.mean_drop(bridge.F_damaged)
-        self.severity = brentq(lambda s: (self.mean_drop(self.simulate(s)) - self.measured_drop)["f2"], 0.0, 0.9)
-        self.simulated_drop = self.mean_drop(self.simulate(self.severity))
-
-    def simulate(self, severity, **noise):
-        return self.fem.simulate(self.bridge.T_damaged, damage={GROUP: severity}, **noise)
-
-    def mean_drop(self, frequencies):
-        """Mean change of every mode, in percent of the healthy prediction at the same temperatures."""
-        return 100 * (frequencies / self.expected - 1).mean()
-
-    def indices(self, compensate):
-        """Damage index by source and state, and the threshold that measured healthy records set."""
-        T, F, T_damaged, F_damaged = self.bridge.T, self.bridge.F, self.bridge.T_damaged, self.bridge.F_damaged
-        compensator = TemperatureCompensator(boosting(), targets=list(F), cv=FOLDS)
-        baseline = compensator.fit_transform(T.join(F)) if compensate else F
-        detector = MahalanobisDetector().fit(baseline)
-
-        def index(temperatures, frequencies):
-            records = compensator.transform(temperatures.join(frequencies)) if compensate else frequencies
-            return detector.damage_index(records)
-
-        return {
-            ("measured", "healthy"): detector.damage_index(baseline),
-            ("measured", "damaged"): index(T_damaged, F_damaged),
-            ("data-informed", "healthy"): index(T, self.fem.simulate(T, noise="fitted", random_state=0)),
-            ("data-informed", "damaged"): index(
-                T_damaged, self.simulate(self.severity, noise="fitted", random_state=1)
-            ),
-        }, detector.threshold_
-
-
-def damage_table(indices):
-    """Share of alarms by kind of index, source and state, in percent."""
-    return pd.DataFrame(
-        {
-            kind: {source: 100 * (index > threshold).mean() for source, index in found.items()}
-            for kind, (found, threshold) in indices.items()
-        }
-    ).round(1)
-
-
 def plot_over_time(bridge, fem):
     """Measured and predicted frequencies over the monitored year; the last fifth is hold-out data."""
     fig, axes = plt.subplots(5, 1, figsize=(11, 9), sharex=True, layout="constrained")
@@ -233,40 +176,26 @@ def plot_parameters(bridge, fem):
     return fig
 
 
-def plot_indices(bridge, indices):
-    """Damage index over time, before and after damage began."""
-    fig, axes = plt.subplots(2, 2, figsize=(12, 6.5), sharex=True, sharey="row", layout="constrained")
-    for row, (kind, (found, threshold)) in zip(axes, indices.items(), strict=True):
-        for ax, source in zip(row, ("measured", "data-informed"), strict=True):
-            for state, colour in (("healthy", BLUE), ("damaged", ORANGE)):
-                ax.plot(found[source, state], ".", ms=2.5, color=colour, label=state)
-            ax.axhline(threshold, color="black", ls="--", lw=1, label="threshold (98 %)")
-            ax.set_title(f"{source}, {kind}")
-            ax.tick_params(axis="x", rotation=30)
-        row[0].set_ylabel("damage index\n(Mahalanobis, unsquared)")
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, markerscale=4)
-    return fig
-
-
-def plot_drops(damage):
-    """Effect of damage on each mode; only f2 was fitted."""
-    fig, ax = plt.subplots(figsize=(6.5, 3.8), layout="constrained")
-    places = np.arange(4)
-    ax.bar(places - 0.2, damage.measured_drop, width=0.4, color=BLUE, label="measured")
-    ax.bar(places + 0.2, damage.simulated_drop, width=0.4, color=ORANGE, label="simulated, fitted to $f_2$")
-    ax.axhline(0, color="black", lw=0.7)
-    ax.set_xticks(places, MODES)
-    ax.set_ylabel("mean change of frequency (%)")
-    ax.legend()
-    return fig
-
-
-def main():
-    parser = argparse.ArgumentParser(description="The Z24 bridge: weather learned, damage simulated.")
+def read_arguments(description):
+    """The bridge's records, and the folder for figures, from the command line."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("data", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"), help="file or folder")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
     options = parser.parse_args()
-    bridge = Bridge(find(options.data and Path(options.data)))
+    return Bridge(find(options.data and Path(options.data))), options.figures
+
+
+def save(figures, folder):
+    """Save figures by their names, and say where."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in figures.items():
+        figure.savefig(folder / f"{name}.png", dpi=130)
+        plt.close(figure)
+    print("Figures:", *(folder / f"{name}.png" for name in figures), sep="\n  ")
+
+
+def main():
+    bridge, folder = read_arguments("The Z24 bridge: how weather moves its frequencies.")
     T, F, T_test, F_test = bridge.split()
     fem = chain(bridge_model()).fit(T, F)
 
@@ -285,25 +214,12 @@ def main():
     print("Share of these records in the default chain's intervals of 90 %:")
     print("  " + ", ".join(f"{mode} {share:.0%}" for mode, share in held.items()), end="\n\n")
 
-    damage = Damage(bridge)
-    print(f"Damage in {GROUP}, fitted to the mean drop of f2: {damage.severity:.1%}; mean change in percent\n")
-    print(pd.DataFrame({"measured": damage.measured_drop, "simulated": damage.simulated_drop}).T.round(2), end="\n\n")
-    indices = {kind: damage.indices(compensate=kind == "compensated") for kind in ("raw", "compensated")}
-    print("Alarms in percent of the records; the threshold leaves 2 % of the measured healthy ones above it\n")
-    print(damage_table(indices), end="\n\n")
-
     figures = {
         "z24_over_time": plot_over_time(bridge, fem),
         "z24_over_temperature": plot_over_temperature(bridge, fem),
         "z24_parameters": plot_parameters(bridge, fem),
-        "z24_damage_index": plot_indices(bridge, indices),
-        "z24_damage": plot_drops(damage),
     }
-    options.figures.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures.items():
-        figure.savefig(options.figures / f"{name}.png", dpi=130)
-        plt.close(figure)
-    print("Figures:", *(options.figures / f"{name}.png" for name in figures), sep="\n  ")
+    save(figures, folder)
 
 
 if __name__ == "__main__":

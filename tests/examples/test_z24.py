@@ -1,0 +1,110 @@
+"""The Z24 examples on a bridge that freezes by a known law, on the real one where its data are, and without data."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
+from tests.examples.z24 import BRIDGE, DAMAGE, DETECTION
+
+pytestmark = [
+    pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside"),
+    pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
+]
+
+
+@pytest.fixture(scope="module")
+def frozen(tmp_path_factory):
+    """The bridge that freezes, as the examples read it."""
+    folder = tmp_path_factory.mktemp("z24")
+    frozen_bridge().to_csv(folder / "z24_monitoring.csv", index=False)
+    return BRIDGE.Bridge(BRIDGE.find(folder))
+
+
+def test_the_severity_is_found_from_f2_alone_and_the_other_modes_follow(frozen):
+    damage = DAMAGE.Damage(frozen)
+    assert damage.severity == pytest.approx(SEVERITY, abs=0.02)
+    np.testing.assert_allclose(damage.simulated_drop, damage.measured_drop, atol=0.4)
+
+
+def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
+    ratio = BRIDGE.hold_out_table(frozen)["ratio"]
+    for regressor in ("broken lines", "boosted trees"):
+        tracked, by_rank = (ratio[f"{regressor}, chain, {kind}, bounds 0.5"] for kind in ("tracked", "sorted"))
+        assert tracked < 1.05
+        assert by_rank > tracked
+
+
+def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
+    records = DETECTION.Records.of(frozen)
+    table = DETECTION.alarm_table(
+        {
+            label: DETECTION.compensate(records, DETECTION.TemperatureMapper(), scale)[0]
+            for label, scale in DETECTION.SCALES.items()
+        }
+    )
+    assert (table["false alarms"] <= 5).all()
+    assert table["damage found"][DETECTION.WHITENED] > 95
+
+
+def test_a_local_deviation_is_that_of_similar_weather(frozen):
+    records = DETECTION.Records.of(frozen)
+    deviation = {}
+    for scale in ("global", "local"):
+        compensator = DETECTION.compensate(records, DETECTION.TemperatureMapper(), scale)[1]
+        deviation[scale] = DETECTION.local_deviation(records.baseline, compensator)
+    plain = DETECTION.compensate(records, DETECTION.TemperatureMapper())[0].baseline["f2"]
+    np.testing.assert_allclose(deviation["global"], plain.std(), rtol=0.02)
+    assert deviation["local"].std() > 0
+
+
+def test_the_parameter_that_was_damaged_falls(frozen):
+    measured, names = DAMAGE.in_parameters(DETECTION.Records.of(frozen))
+    fall = DAMAGE.changes(measured, names).damaged.mean()
+    assert fall["piers_soil"] == pytest.approx(-100 * SEVERITY, abs=5)
+    assert fall.drop("piers_soil").abs().max() < 5
+
+
+@pytest.mark.parametrize("example", [BRIDGE, DETECTION, DAMAGE])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [([], "No Z24 data at SKTHERMO_DATA, which is not set"), (["no/such/folder"], "No Z24 data at no/such/folder")],
+)
+def test_without_data_it_says_what_to_get_and_where(example, arguments, message, monkeypatch):
+    monkeypatch.delenv("SKTHERMO_DATA", raising=False)
+    monkeypatch.setattr(sys, "argv", [example.__file__, *arguments])
+    with pytest.raises(SystemExit) as left:
+        example.main()
+    assert left.value.code.startswith(message)  # to stderr, with status 1
+    assert "https://bwk.kuleuven.be/bwm/z24" in left.value.code
+
+
+@pytest.fixture(scope="module")
+def real():
+    if "SKTHERMO_DATA" not in os.environ:
+        pytest.skip("SKTHERMO_DATA does not name the folder with z24/z24_monitoring.csv")
+    return BRIDGE.Bridge(BRIDGE.find(Path(os.environ["SKTHERMO_DATA"])))
+
+
+def test_the_real_bridge_is_predicted_as_well_as_by_a_direct_regression(real):
+    table = BRIDGE.hold_out_table(real)
+    tracked = table.index.str.contains("chain, tracked")
+    assert tracked.sum() == 4
+    assert (table["ratio"][tracked] < 1.03).all()
+    assert table["mean"]["broken lines, chain, tracked, bounds 0.3"] < 0.62
+
+
+def test_the_real_bridges_damage_is_found(real):
+    records = DETECTION.Records.of(real)
+    found = {
+        name: DETECTION.compensate(records, estimator, "local")[0]
+        for name, estimator in (("broken lines", DETECTION.TemperatureMapper()), ("trees", BRIDGE.boosting()))
+    }
+    table = DETECTION.alarm_table(found)
+    assert (table["false alarms"] <= 3).all()
+    assert (table["damage found"] >= 80).all()
+    days = DETECTION.found_by_day({("broken lines", DETECTION.WHITENED): found["broken lines"]}).loc["found"]
+    assert (days.iloc[2:] == 100).all()
