@@ -180,16 +180,6 @@ def season_table(records):
     return pd.DataFrame(rows).T.rename_axis("baseline")
 
 
-def local_deviation(records, compensator, mode="f2"):
-    """Standard deviation of a mode's residual in the weather of each record, in Hz.
-
-    A mode alone is divided by its standard deviation, so that one hertz more shows it.
-    """
-    alone = records.assign(**dict.fromkeys(set(FREQUENCIES) - {mode}, np.nan))
-    more = alone.assign(**{mode: alone[mode] + 1.0})
-    return 1 / (compensator.transform(more)[mode] - compensator.transform(alone)[mode])
-
-
 def plot_kinds(ax, x, y, **style):
     """Records of the baseline, of the hold-out and after damage, in their colours."""
     for kind, (label, colour) in KINDS.items():
@@ -207,7 +197,8 @@ def plot_spread(records, inputs):
         ("local", "-", "2 deviations, by weather"),
     ):
         compensator = compensate(records, TemperatureMapper(), scale)[1]
-        deviation = local_deviation(records.baseline, compensator).groupby(degree).median()
+        weather = records.baseline.drop(columns=FREQUENCIES)
+        deviation = pd.Series(compensator.spread_.deviations(weather)[:, 1], weather.index).groupby(degree).median()
         ax.plot(2 * deviation, style, color="black", label=label)
         ax.plot(-2 * deviation, style, color="black")
     ax.set(xlabel="pavement (°C)", ylabel=f"residual of {MODES[1]} (Hz)")

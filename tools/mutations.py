@@ -160,10 +160,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread beyond the baseline", "BEYOND = 0.5", "BEYOND = 0.0"),
         ("unknown weather", "len(self.covariances) - 1)", "0)"),
     ],
-    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
+    ("detection/_window_laws.py", "detection/test_windowed_alarm.py"): [
         ("correlation in a window", "sums**2 - squares", "sums**2"),
-        ("variance of a mean", "(1 + (counts - 1) * self.correlation)", "(1 + counts * self.correlation)"),
+        ("variance of a mean", "self.correlation * weights**2", "self.correlation * squared_weights"),
         ("records of a partial window", "self.m * count / self.n", "self.m"),
+    ],
+    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
+        ("mean age of fading records", "(window - 1) / (window + 1)", "window / (window + 1)"),
         ("edge of a window of time", 'side="right"', 'side="left"'),
     ],
     ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
+from sklearn.model_selection import BaseCrossValidator, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_temperatures, frame_like
@@ -22,6 +22,7 @@ from skthermo._validation import (
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange
 from skthermo.detection._complete_rows import CompleteRowsRegressor
+from skthermo.detection._folds import folds_of
 from skthermo.detection._targets import check_positions_are_names, positions_of
 from skthermo.detection._whitening import Spread
 
@@ -56,8 +57,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     estimator_ : regressor
         Clone of ``estimator``, fitted on all rows that it can take.
     spread_ : object
-        Covariance of the residuals by weather, if they are scaled; ``spread_.smoothing`` says over how many records
-        of similar weather it is taken (None: all).
+        Covariance of the residuals by weather, if they are scaled. ``spread_.smoothing`` says over how many records of
+        similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
@@ -96,7 +97,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     records are likeliest given the others, records fewer than 24 rows apart left out; such records are left out too
     where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather.
     Where a record's temperatures lie outside the baseline's by e ranges of their columns (on average over the
-    columns), residuals are also divided by sqrt(1 + (e / 2)^2): what the regression says there is less certain. A row
+    columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain. A row
     with a missing temperature takes the covariance of all records. `transform` warns of rows whose weather is far
     outside the baseline's; `applicability` says how far.
 
@@ -303,7 +304,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
         """Learn from all rows, and give residuals of each by what the other folds teach."""
-        folds, untested = self._folds(temperatures)
+        folds, untested = folds_of(self.cv, temperatures)
         self._learn(temperatures, frequencies)
         partition = [*folds, (untested, untested)] if untested.size else folds
         predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=partition)
@@ -329,20 +330,6 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
             warn_user(str(error), "temperatures")
         return temperatures, frequencies
-
-    def _folds(self, X: Any) -> tuple[list[tuple[NDArray[np.intp], NDArray[np.intp]]], NDArray[np.intp]]:
-        """The folds, and the rows before the first of them, which a splitter that goes forward in time leaves out."""
-        folds = list(check_cv(self.cv).split(X))
-        tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
-        untested = np.arange(tested.argmax())
-        wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
-        if wrong.size:
-            raise ValueError(
-                f"cv is {self.cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
-                "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
-                "first, as TimeSeriesSplit does"
-            )
-        return folds, untested
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

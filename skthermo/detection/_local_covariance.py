@@ -66,7 +66,10 @@ class History:
 
     def own_neighbours(self, size: int) -> Neighbours:
         """The records nearest to each of them, without those near in time."""
-        return self._far_in_time(size, self._nearest_to_own[:, : size + 2 * NEAR_IN_TIME - 1], self.order)
+        if size not in self._own:
+            near = self._nearest_to_own[:, : size + 2 * NEAR_IN_TIME - 1]
+            self._own[size] = self._far_in_time(size, near, self.order)
+        return self._own[size]
 
     def best_smoothing(self) -> Smoothing | None:
         """The smoothing, or none, under which records are likeliest given the others."""
@@ -82,6 +85,10 @@ class History:
     @property
     def _sizes(self) -> list[int]:
         return [size for size in NEIGHBOURS if size <= len(self.order) // 2]
+
+    @cached_property
+    def _own(self) -> dict[int, Neighbours]:
+        return {}
 
     @cached_property
     def _nearest_to_own(self) -> NDArray[np.intp]:

@@ -76,6 +76,11 @@ class Spread:
         covariances = np.concatenate([at_places, plain.covariances])
         return cls(overall, smoothing, reach, coordinates, history.places, covariances), white
 
+    def deviations(self, weather: Array) -> Array:
+        """Standard deviations of residuals in the weather of each row, (n_samples, n_modes)."""
+        variances = np.einsum("ijj->ij", self.covariances)[self._place(np.asarray(weather, dtype=float))]
+        return np.sqrt(variances) * self._widening(weather)[:, np.newaxis]
+
     def whiten(self, weather: Array, residuals: Array) -> Array:
         """Residuals of new records in standard deviations and uncorrelated."""
         white = np.empty_like(residuals)
@@ -91,10 +96,13 @@ class Spread:
         cases, case = np.unique(self._place(weather) * len(masks) + pattern, return_inverse=True)
         roots = whitenings(self.covariances[cases // len(masks)], masks[cases % len(masks)])[0]
         white = np.einsum("ij,ijk->ik", self.overall.centred(residuals), roots[case])
-        if self.reach is not None:
-            beyond = np.nan_to_num(self.reach.excess(weather)).mean(axis=1)
-            white /= np.sqrt(1 + (BEYOND * beyond[:, np.newaxis]) ** 2)
-        return np.where(present, white, np.nan)
+        return np.where(present, white / self._widening(weather)[:, np.newaxis], np.nan)
+
+    def _widening(self, weather: Array) -> Array:
+        """Factor of the deviations where weather is beyond that of the baseline."""
+        if self.reach is None:
+            return np.ones(len(weather))
+        return np.sqrt(1 + (BEYOND * np.nan_to_num(self.reach.excess(weather)).mean(axis=1)) ** 2)
 
     def _place(self, weather: Array) -> NDArray[np.intp]:
         """The nearest place of every row; the overall covariance where a temperature is missing."""

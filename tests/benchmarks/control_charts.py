@@ -1,19 +1,10 @@
-"""Control charts of quality engineering beside which windows are measured, and correlated residuals to try them on."""
+"""A control chart beside which windows are measured, and correlated residuals to try them on."""
 
 import numpy as np
 from scipy.signal import lfilter
 from sklearn.covariance import EmpiricalCovariance
 
 BURN_IN = 200
-
-
-def ewma(records, window):
-    """Length of the exponentially weighted mean (MEWMA), whose weights have the mean age of a window's records.
-
-    The first axis of the records is time, the last one holds whitened modes.
-    """
-    weight = 2 / (window + 1)
-    return np.linalg.norm(lfilter([weight], [1, weight - 1], records, axis=0), axis=-1)
 
 
 def cusum(records, allowance):

@@ -10,13 +10,13 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from control_charts import correlated, cusum, ewma
+from control_charts import correlated, cusum
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.metrics import time_to_detection
 
 THRESHOLDS = ("quantile", "conformal", "chi2")
-RULES = {"mean": "mean", "m-of-n": "half of the records"}
+RULES = {"mean": "mean", "ewma": "exponentially weighted", "m-of-n": "half of the records"}
 ASKED = 0.02
 CORRELATION = 0.7
 N_MODES = 4
@@ -134,14 +134,12 @@ def windowed(alarm):
 
 
 def print_charts(options):
-    """Windows beside EWMA and CUSUM, all with the same rate of false alarms."""
+    """Windows beside CUSUM, all with the same rate of false alarms."""
     random, onset, n_after = np.random.default_rng(3), 500, 400
     baseline, independent = (correlated(random, (n, N_MODES), CORRELATION) for n in (10_000, options.calibration))
     methods = {"single records": windowed(WindowedAlarm(1).fit(baseline))}
     for n, rule in product((6, 24), RULES):
         methods[f"window of {n}, {RULES[rule]}"] = windowed(WindowedAlarm(n, rule=rule).fit(baseline))
-    for n in (6, 24):
-        methods[f"EWMA like a window of {n}"] = lambda records, n=n: ewma(records, n)
     for allowance in (0.25, 0.5, 1.0):
         methods[f"CUSUM, allowance {allowance}"] = lambda records, allowance=allowance: cusum(records, allowance)
     streams = correlated(random, (onset + n_after, options.streams, N_MODES), CORRELATION)

@@ -175,8 +175,9 @@ def test_the_empirical_covariance_is_the_default(threshold):
 
 
 @TOO_FEW
-def test_a_threshold_is_a_number_with_as_few_records_as_the_covariance_allows():
-    assert MahalanobisDetector().fit(records(5)).threshold_ < np.inf
+def test_a_baseline_in_which_each_row_decides_alone_about_a_direction_is_refused():
+    with pytest.raises(ValueError, match="5 baseline rows are too few for their number of modes"):
+        MahalanobisDetector().fit(records(5))
 
 
 @pytest.mark.parametrize("threshold", ["paper", None, 3.0])

@@ -144,8 +144,8 @@ def test_few_records_have_one_covariance():
 # Weather that the baseline does not know
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_weather_beyond_the_baseline_widens_the_spread(scale):
+@pytest.mark.parametrize(("scale", "width_of_one_range"), [("global", 0.0), ("local", 0.5)])
+def test_weather_beyond_the_baseline_widens_the_local_spread(scale, width_of_one_range):
     fitted = compensator(scale).fit(X)
     hot = LATER.iloc[[500]].copy()
     hot[["T1", "T2"]] = X[["T1", "T2"]].max().to_numpy()
@@ -161,7 +161,7 @@ def test_weather_beyond_the_baseline_widens_the_spread(scale):
                 white = fitted.transform(far).to_numpy()
         else:
             white = fitted.transform(far).to_numpy()
-        np.testing.assert_allclose(white, inside / np.sqrt(1 + (0.5 * steps) ** 2), rtol=1e-9)
+        np.testing.assert_allclose(white, inside / np.sqrt(1 + (width_of_one_range * steps) ** 2), rtol=1e-9)
 
 
 @pytest.mark.parametrize("scale", [None, "global", "local"])

@@ -1,0 +1,119 @@
+"""Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, betaincinv
+from scipy.stats import chi
+
+from skthermo._arrays import Array
+from skthermo.detection._gaussian import Gaussian, check_invertible
+from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.detection._patterns import as_if_complete
+from skthermo.detection._windows import FadingWindows, Windows
+
+NEGLIGIBLE = 1e-15
+"""Modes whose records have faded to a smaller sum of squared weights are missing."""
+
+SMALLEST = 1e-300
+"""Probabilities are not followed below this."""
+
+
+class WindowLaw(Protocol):
+    """What a baseline teaches about windows."""
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window; NaN where no record has a mode."""
+
+
+@dataclass(frozen=True)
+class MeanLaw:
+    """Length of the mean of whitened records, over its standard deviation, which grows with their correlation.
+
+    Attributes
+    ----------
+    records : Gaussian
+        Of single records.
+    correlation : ndarray of shape (n_modes,)
+        Mean correlation of two whitened records in one window.
+    """
+
+    records: Gaussian
+    correlation: Array
+
+    @classmethod
+    def of(
+        cls, windows: Windows | FadingWindows, rows: NDArray[np.intp], contamination: float, m: int | None
+    ) -> "MeanLaw":
+        """Learned from the records in some rows, and from the windows that end there."""
+        records = Gaussian.of(windows.rows[rows])
+        check_invertible(records.covariance, windows.rows[rows])
+        white = records.whiten(windows.rows)
+        sums, weights, squared_weights = cls._sums(windows, white)
+        squares = windows.square_sums(np.nan_to_num(white) ** 2)
+        excess, pairs = (sums**2 - squares)[rows].sum(axis=0), (weights**2 - squared_weights)[rows].sum(axis=0)
+        return cls(records, np.clip(excess / np.maximum(pairs, 1), 0.0, 1.0))
+
+    def index(self, windows: Windows | FadingWindows) -> Array:
+        """Damage index of every window."""
+        sums, weights, squared_weights = self._sums(windows, self.records.whiten(windows.rows))
+        variances = (1 - self.correlation) * squared_weights + self.correlation * weights**2
+        known = squared_weights > NEGLIGIBLE
+        squared = np.where(known, sums**2, 0.0) / np.where(known, variances, 1.0)
+        return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), sums.shape[1])
+
+    @staticmethod
+    def _sums(windows: Windows | FadingWindows, white: Array) -> tuple[Array, Array, Array]:
+        """Sums of the records, of their weights, and of the squares of these, mode by mode."""
+        present = (~np.isnan(white)).astype(float)
+        return windows.sums(np.nan_to_num(white)), windows.sums(present), windows.square_sums(present)
+
+
+@dataclass(frozen=True)
+class CountLaw:
+    """The m-th largest damage index of the records in a window: it exceeds a threshold where m records do.
+
+    In a window with gaps, the index is the one that is as unlikely in a window of ``n`` independent records, by the
+    binomial law.
+
+    Attributes
+    ----------
+    detector : MahalanobisDetector
+        Judges single records.
+    n : int
+        Number of records in a full window.
+    m : int
+    """
+
+    detector: MahalanobisDetector
+    n: int
+    m: int
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "CountLaw":
+        """Learned from the records in some rows."""
+        detector = MahalanobisDetector(contamination, threshold="quantile").fit(windows.rows[rows])
+        n = int(np.median(windows.sizes))
+        if m is not None and m > n:
+            raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")
+        return cls(detector, n, (n + 1) // 2 if m is None else m)
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window."""
+        single = self.detector.damage_index(windows.rows)
+        padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
+        last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)
+        inside = np.arange(windows.longest) >= windows.longest - windows.sizes[:, np.newaxis]
+        return self._as_if_full(np.where(inside, last, np.nan), windows.rows.shape[1])
+
+    def _as_if_full(self, single: Array, n_modes: int) -> Array:
+        count = (~np.isnan(single)).sum(axis=1)
+        m = np.maximum(np.rint(self.m * count / self.n), 1).astype(int)
+        value = -np.take_along_axis(np.sort(-single, axis=1), np.minimum(m, single.shape[1])[:, np.newaxis] - 1, axis=1)
+        value, partial = value[:, 0], (count != self.n) & (count > 0)
+        m, count = m[partial], count[partial]
+        chance = np.maximum(betainc(m, count - m + 1, chi.sf(value[partial], n_modes)), SMALLEST)
+        value[partial] = chi.isf(np.maximum(betaincinv(self.m, self.n - self.m + 1, chance), SMALLEST), n_modes)
+        return value
