@@ -299,3 +299,12 @@ def test_a_mode_without_out_of_fold_residuals_is_named(scale):
 def test_other_scales_are_named():
     with pytest.raises(ValueError, match="'scale' parameter of TemperatureCompensator must be"):
         compensator("regional").fit(X)
+
+
+def test_deviations_are_those_by_which_single_modes_are_divided():
+    for scale in ("global", "local"):
+        fitted = compensator(scale).fit(X)
+        alone = LATER.assign(f2=np.nan)
+        more = alone.assign(f1=alone["f1"] + 1.0)
+        divided = 1 / (fitted.transform(more) - fitted.transform(alone))["f1"]
+        np.testing.assert_allclose(fitted.spread_.deviations(LATER[["T1", "T2"]])[:, 0], divided, rtol=1e-9)

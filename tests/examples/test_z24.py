@@ -50,17 +50,6 @@ def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
     assert table["damage found"][DETECTION.WHITENED] > 95
 
 
-def test_a_local_deviation_is_that_of_similar_weather(frozen):
-    records = DETECTION.Records.of(frozen)
-    deviation = {}
-    for scale in ("global", "local"):
-        compensator = DETECTION.compensate(records, DETECTION.TemperatureMapper(), scale)[1]
-        deviation[scale] = DETECTION.local_deviation(records.baseline, compensator)
-    plain = DETECTION.compensate(records, DETECTION.TemperatureMapper())[0].baseline["f2"]
-    np.testing.assert_allclose(deviation["global"], plain.std(), rtol=0.02)
-    assert deviation["local"].std() > 0
-
-
 def test_the_parameter_that_was_damaged_falls(frozen):
     measured, names = DAMAGE.in_parameters(DETECTION.Records.of(frozen))
     fall = DAMAGE.changes(measured, names).damaged.mean()
