@@ -64,7 +64,7 @@ def variation(study):
                 warnings.filterwarnings("ignore", message=r".*(far outside|did not converge)")
                 warnings.filterwarnings("ignore", message="4 parameters and 3 modes")
                 self.fem.fit(self.baseline.temperatures, self.baseline.frequencies)
-            self.detector = MahalanobisDetector(contamination=0.02).fit(self.baseline.frequencies)
+            self.detector = MahalanobisDetector(contamination=0.02, threshold="quantile").fit(self.baseline.frequencies)
             self.verification = self.campaign(n_years=len(study.HALVED))
             self.unseen = self.campaign(n_years=1)
 

@@ -120,7 +120,7 @@ def false_alarms(records, fem, regressor, n_draws):
     if regressor is not None:
         compensator = TemperatureCompensator(regressor, targets=list(F), cv=KFold(5))
         baseline = compensator.fit_transform(T.join(F))
-    detector = MahalanobisDetector().fit(baseline)
+    detector = MahalanobisDetector(threshold="quantile").fit(baseline)
 
     def rate(frequencies):
         read = frequencies if compensator is None else compensator.transform(T_test.join(frequencies))
