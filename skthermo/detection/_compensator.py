@@ -326,7 +326,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         others = np.delete(np.arange(len(columns)), self.targets_)
         temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
         try:
-            check_temperatures(pd.DataFrame(values[:, others], columns=columns[others]))
+            check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
             warn_user(str(error), "temperatures")
         return temperatures, frequencies
