@@ -1,5 +1,6 @@
 """Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,7 +13,7 @@ from skthermo._arrays import Array
 from skthermo.detection._gaussian import Gaussian, check_invertible
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._patterns import as_if_complete
-from skthermo.detection._windows import FadingWindows, Windows
+from skthermo.detection._windows import NUMBERS, FadingWindows, Windows
 
 NEGLIGIBLE = 1e-15
 """Modes whose records have faded to a smaller sum of squared weights are missing."""
@@ -69,6 +70,48 @@ class MeanLaw:
         """Sums of the records, of their weights, and of the squares of these, mode by mode."""
         present = (~np.isnan(white)).astype(float)
         return windows.sums(np.nan_to_num(white)), windows.sums(present), windows.square_sums(present)
+
+
+@dataclass(frozen=True)
+class SumLaw:
+    """Length of a cumulative sum of whitened records that shrinks by an allowance with each of them (Crosier, 1988).
+
+    The allowance is half of the change that the mean of a window would just find.
+
+    Attributes
+    ----------
+    records : Gaussian
+        Of single records.
+    allowance : float
+    """
+
+    records: Gaussian
+    allowance: float
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "SumLaw":
+        """Learned from the records in some rows, and from the windows that end there."""
+        means = MeanLaw.of(windows, rows, contamination, m)
+        variance = (1 - means.correlation) / windows.longest + means.correlation
+        just_found = chi.isf(contamination, len(variance)) * np.sqrt(variance.mean())
+        return cls(means.records, float(just_found / 2))
+
+    def index(self, windows: Windows) -> Array:
+        """Length of the sum at every record, before it shrinks; NaN before the first mode."""
+        index, total = np.empty(len(windows.rows)), [0.0] * windows.rows.shape[1]
+        begun = False
+        for first in range(0, len(index), NUMBERS // 20):
+            block = self.records.whiten(windows.rows[first : first + NUMBERS // 20])
+            has_modes = (~np.isnan(block)).any(axis=1).tolist()
+            for i, row in enumerate(np.nan_to_num(block).tolist(), first):
+                total = [x + y for x, y in zip(total, row, strict=True)]
+                length = math.hypot(*total)
+                begun = begun or has_modes[i - first]
+                index[i] = length if begun else np.nan
+                if has_modes[i - first]:
+                    kept = max(1 - self.allowance / length, 0.0) if length > 0 else 0.0
+                    total = [kept * x for x in total]
+        return index
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,10 @@ from skthermo._validation import Interval, StrOptions
 from skthermo._weather import correlation_time
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
-from skthermo.detection._window_laws import CountLaw, MeanLaw
+from skthermo.detection._window_laws import CountLaw, MeanLaw, SumLaw
 from skthermo.detection._windows import FadingWindows, Windows
+
+LAWS = {"mean": MeanLaw, "ewma": MeanLaw, "cusum": SumLaw, "m-of-n": CountLaw}
 
 MOST_PERIODS = 50
 """Largest number of periods of the baseline whose windows are judged by what the others teach."""
@@ -29,13 +31,16 @@ class WindowedAlarm(DamageDetector):
     window : int or str
         Number of records, up to the one that is judged, or a time such as ``"24h"`` on the ``DatetimeIndex`` of a
         frame. With gaps in time, a number of records reaches back beyond them; a time does not.
-    rule : {"mean", "ewma", "m-of-n"}, default="mean"
+    rule : {"mean", "ewma", "cusum", "m-of-n"}, default="mean"
         What the damage index of a window is:
 
         - ``"mean"``: length of the mean of the whitened records, in standard deviations of such a mean. Finds small
           lasting changes.
         - ``"ewma"``: the same of an exponentially weighted mean of all records so far, whose weights have the mean age
           of those of the window. Finds medium and large changes some 20 % sooner; remembers an absurd record longer.
+        - ``"cusum"``: length of the cumulative sum of the whitened records, which shrinks with each by half of the
+          change that the mean of a window would just find. Finds medium lasting changes in several times as many
+          records, if residuals are steady in time; its alarms outlast their cause.
         - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that
           there is an alarm where m of them exceed the threshold. Not misled by a few absurd records.
 
@@ -93,7 +98,7 @@ class WindowedAlarm(DamageDetector):
     _parameter_constraints: dict = {
         **DamageDetector._parameter_constraints,
         "window": [Interval(Integral, 1, None, closed="left"), str],
-        "rule": [StrOptions({"mean", "ewma", "m-of-n"})],
+        "rule": [StrOptions(set(LAWS))],
         "m": [Interval(Integral, 1, None, closed="left"), None],
     }
 
@@ -101,7 +106,7 @@ class WindowedAlarm(DamageDetector):
         self,
         window: int | str,
         *,
-        rule: Literal["mean", "ewma", "m-of-n"] = "mean",
+        rule: Literal["mean", "ewma", "cusum", "m-of-n"] = "mean",
         m: int | None = None,
         contamination: float = 0.02,
     ):
@@ -113,15 +118,15 @@ class WindowedAlarm(DamageDetector):
     def _records(self, X: Any, F: Array) -> Windows | FadingWindows:
         if self.m is not None and self.rule != "m-of-n":
             raise ValueError(f"m is {self.m}, but rule is {self.rule!r}; expected m only with the rule 'm-of-n'")
-        if self.rule != "ewma":
-            return Windows.of(X, F, self.window)
-        if isinstance(self.window, str):
-            raise ValueError(f"window is {self.window!r} and rule 'ewma'; expected a number of records with this rule")
-        return FadingWindows.of(F, self.window)
+        if self.rule in ("ewma", "cusum") and isinstance(self.window, str):
+            raise ValueError(
+                f"window is {self.window!r} and rule {self.rule!r}; expected a number of records with this rule"
+            )
+        return FadingWindows.of(F, self.window) if self.rule == "ewma" else Windows.of(X, F, self.window)
 
     def _learn(self, windows: Windows | FadingWindows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
-        law = CountLaw if self.rule == "m-of-n" else MeanLaw
+        law = LAWS[self.rule]
         width = self.window if self.rule == "ewma" else windows.longest
         if n_rows < 2 * width:
             raise ValueError(
@@ -136,9 +141,14 @@ class WindowedAlarm(DamageDetector):
 
     def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
-        return conformal_threshold(index, self.contamination, 1 / correlation_time(is_high))
+        time = correlation_time(is_high)
+        # High sums come in few runs, which hardly tell how long they last.
+        time = max(time, self.window) if self.rule == "cusum" else time
+        return conformal_threshold(index, self.contamination, 1 / time)
 
     def _index(self, windows: Windows | FadingWindows) -> Array:
+        if self.rule == "cusum":
+            return self.law_.index(windows)
         index = np.empty(len(windows.rows))
         for run, piece in windows.pieces():
             index[run] = self.law_.index(piece)[run.start - run.stop :]

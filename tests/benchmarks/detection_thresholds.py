@@ -16,7 +16,7 @@ from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.metrics import time_to_detection
 
 THRESHOLDS = ("quantile", "conformal", "chi2")
-RULES = {"mean": "mean", "ewma": "exponentially weighted", "m-of-n": "half of the records"}
+RULES = {"mean": "mean", "ewma": "exponentially weighted", "cusum": "cumulative sum", "m-of-n": "half of the records"}
 ASKED = 0.02
 CORRELATION = 0.7
 N_MODES = 4
