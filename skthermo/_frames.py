@@ -13,6 +13,7 @@ from skthermo._warnings import warn_user
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
+ABSURD = 20  # robust standard deviations from the median
 MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
 
 
@@ -93,6 +94,43 @@ def warn_of_markers(X: ArrayLike) -> None:
             f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
             "markers",
         )
+
+
+def warn_of_absurd(X: ArrayLike) -> None:
+    """Warn of values that are absurdly far from the median of their column."""
+    values = as_floats(X)
+    values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
+    if np.isnan(values).all(axis=0).any():
+        return
+    distances = np.abs(values - np.nanmedian(values, axis=0))
+    far = distances > ABSURD * 1.4826 * np.nanmedian(distances, axis=0)
+    if (far & (np.nanmedian(distances, axis=0) > 0)).any():
+        row, column = np.argwhere(far)[0]
+        warn_user(
+            f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "
+            f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
+            f"damage; expected NaN where a value is wrong (absurd is more than {ABSURD} robust deviations away)",
+            "absurd values",
+        )
+
+
+def warn_of_disorder(X: Any) -> None:
+    """Warn of a frame whose stamps are not in order."""
+    row = first_disorder(X)
+    if row:
+        warn_user(
+            f"row {row} ({X.index[row]}) is earlier than the row before it: folds are periods of time only for rows in "
+            "order; expected X.sort_index()",
+            "rows in disorder",
+        )
+
+
+def first_disorder(X: Any) -> int:
+    """Position of the first row of a frame that is earlier than the row before it; 0 if there is none."""
+    times = getattr(X, "index", None)
+    if not isinstance(times, pd.DatetimeIndex) or times.is_monotonic_increasing:
+        return 0
+    return int(np.argmax(times[1:] < times[:-1])) + 1
 
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OutlierMixin
 
 from skthermo._arrays import Array
-from skthermo._frames import frame_like, warn_of_markers
+from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._validation import Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import warn_user
 
@@ -64,11 +64,12 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         Warns
         -----
         UserWarning
-            If there are numbers that stand for a missing value, such as -999, or too few records for the rate of
-            false alarms that is asked for.
+            If there are numbers that stand for a missing value, such as -999, values absurdly far from the others, or
+            too few records for the rate of false alarms that is asked for.
         """
         F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
+        warn_of_absurd(frame_like(X, F))
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")

@@ -10,7 +10,14 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.model_selection import BaseCrossValidator, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
-from skthermo._frames import check_columns, check_temperatures, frame_like
+from skthermo._frames import (
+    check_columns,
+    check_temperatures,
+    frame_like,
+    warn_of_absurd,
+    warn_of_disorder,
+    warn_of_markers,
+)
 from skthermo._validation import (
     HasMethods,
     StrOptions,
@@ -183,7 +190,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            If another column looks like kelvin, or holds numbers that stand for a missing value, such as -999.
+            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
+            frequencies absurdly far from the others; if stamps are not in order.
         """
         temperatures, frequencies = self._read_baseline(X)
         if self.scale is None:
@@ -295,7 +303,10 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
-        return self._split(X, values)
+        temperatures, frequencies = self._split(X, values)
+        warn_of_disorder(X)
+        warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
+        return temperatures, frequencies
 
     def _learn(self, temperatures: Any, frequencies: Any) -> None:
         self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
@@ -325,6 +336,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
         others = np.delete(np.arange(len(columns)), self.targets_)
         temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
+        warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[self.targets_], axis=1))
         try:
             check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
         except ValueError as error:  # only a warning, as another column may be something else than a temperature

@@ -12,6 +12,7 @@ from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
 from skthermo._arrays import as_columns, as_floats
+from skthermo._frames import column_names
 from skthermo._models import is_model
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer
@@ -40,9 +41,10 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         in_use = usable[:, np.newaxis] & present
         if not in_use.any(axis=0).all():
             wanted = "that target" if self.takes_nan_ else "that target and every other column"
+            target = column_names(y, "target ")[in_use.any(axis=0).argmin()]
             raise ValueError(
-                f"target {in_use.any(axis=0).argmin()} (counted from 0) has none of {len(y)} rows to learn from; "
-                f"expected rows with {wanted} for {type(rest).__name__}"
+                f"{target!r} has none of {len(y)} rows to learn from, of all or in a fold; expected rows with {wanted} "
+                f"for {type(rest).__name__}"
             )
         if (in_use == usable[:, np.newaxis]).all():
             self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))

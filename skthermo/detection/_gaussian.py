@@ -1,14 +1,16 @@
 """Normal distributions of rows in which modes may be missing."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
-MOST_STEPS = 1000
+MOST_STEPS = 300
 TOLERANCE = 1e-9
 """Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
 
@@ -104,10 +106,11 @@ def check_invertible(covariance: Array, rows: Array, size: Array | None = None) 
     rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), tolerance, hermitian=True)
     if rank < len(covariance):
         n_rows = int((~np.isnan(rows)).any(axis=1).sum())
+        which = f", modes {np.flatnonzero(constant).tolist()} (counted from 0) are constant" if constant.any() else ""
         raise ValueError(
-            f"the covariance of {n_rows} baseline rows and {len(covariance)} modes is singular (rank {rank}); expected "
-            f"more than {len(covariance)} rows, no mode that is constant or a copy of others, or a shrunk covariance "
-            "such as LedoitWolf()"
+            f"the covariance of {n_rows} baseline rows and {len(covariance)} modes is singular (rank {rank}){which}; "
+            f"expected more than {len(covariance)} rows, and no mode that is constant or a copy of others (or, in "
+            "MahalanobisDetector, a shrunk covariance such as LedoitWolf())"
         )
     return scale
 
@@ -135,19 +138,41 @@ def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]
     for pattern in range(len(masks)):
         group = rows[of_row == pattern]
         sums[pattern], products[pattern] = group.sum(axis=0), group.T @ group
-    mean, covariance = np.zeros(n_modes), np.eye(n_modes)
+    step = partial(_em_step, masks, counts, sums, products)
+    state = np.concatenate([np.zeros((1, n_modes)), np.eye(n_modes)])
     for _ in range(MOST_STEPS):
-        shift = masks * mean
-        cross = sums[:, :, np.newaxis] * shift[:, np.newaxis, :]
-        centred_sums = sums - counts[:, np.newaxis] * shift
-        centred = products - cross - cross.transpose(0, 2, 1)
-        centred += counts[:, np.newaxis, np.newaxis] * shift[:, :, np.newaxis] * shift[:, np.newaxis, :]
-        fill, rest = _conditionals(covariance + JITTER * np.eye(n_modes), masks)
-        step = np.einsum("ijk,ik->j", fill, centred_sums) / len(rows)
-        moments = fill @ centred @ fill.transpose(0, 2, 1) + counts[:, np.newaxis, np.newaxis] * rest
-        updated = moments.sum(axis=0) / len(rows) - np.outer(step, step)
-        moved = max(np.abs(step).max(), np.abs(updated - covariance).max())
-        mean, covariance = mean + step, (updated + updated.T) / 2
-        if moved < TOLERANCE:
+        once = step(state)
+        twice = step(once)
+        first, second = once - state, twice - once
+        state = twice
+        if np.abs(second).max() < TOLERANCE:
             break
-    return mean, covariance
+        # SQUAREM (Varadhan and Roland, 2008): two steps tell how much farther the iteration would go.
+        length = max(np.linalg.norm(first) / np.linalg.norm(second - first), 1.0)
+        far = once - first + 2 * length * first + length**2 * (second - first)
+        if np.linalg.eigvalsh(far[1:])[0] > 0:
+            beyond = step(far)
+            state = beyond if np.abs(beyond - far).max() <= np.abs(first).max() else twice
+    is_singular = np.linalg.eigvalsh(state[1:])[0] < GAPS_TOLERANCE  # which `check_invertible` refuses
+    if np.abs(second).max() >= TOLERANCE and not is_singular:
+        warn_user(
+            f"the covariance of {len(rows)} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
+            "part of it nearly undetermined",
+            "covariance with gaps",
+        )
+    return state[0], state[1:]
+
+
+def _em_step(masks: Mask, counts: Array, sums: Array, products: Array, state: Array) -> Array:
+    """Expectation and maximisation: the next mean (first row) and covariance, from sums over rows of each mask."""
+    mean, covariance = state[0], state[1:]
+    shift = masks * mean
+    cross = sums[:, :, np.newaxis] * shift[:, np.newaxis, :]
+    centred_sums = sums - counts[:, np.newaxis] * shift
+    centred = products - cross - cross.transpose(0, 2, 1)
+    centred += counts[:, np.newaxis, np.newaxis] * shift[:, :, np.newaxis] * shift[:, np.newaxis, :]
+    fill, rest = _conditionals(covariance + JITTER * np.eye(len(mean)), masks)
+    step = np.einsum("ijk,ik->j", fill, centred_sums) / counts.sum()
+    moments = fill @ centred @ fill.transpose(0, 2, 1) + counts[:, np.newaxis, np.newaxis] * rest
+    updated = moments.sum(axis=0) / counts.sum() - np.outer(step, step)
+    return np.concatenate([[mean + step], (updated + updated.T) / 2])

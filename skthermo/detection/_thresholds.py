@@ -11,7 +11,7 @@ def quantile_threshold(index: Array, contamination: float) -> float:
     return float(np.nanquantile(index, 1 - contamination))
 
 
-def conformal_threshold(index: Array, contamination: float, share: float = 1.0) -> float:
+def conformal_threshold(index: Array, contamination: float, share: float = 1.0, what: str = "records") -> float:
     """The ceil((n + 1)(1 - contamination))-th smallest index, which a new one exceeds with that probability at most.
 
     Parameters
@@ -21,6 +21,8 @@ def conformal_threshold(index: Array, contamination: float, share: float = 1.0) 
     contamination : float
     share : float
         Number of independent records for each record, where they depend on their neighbours in time.
+    what : str
+        What is judged, for the warning.
 
     Returns
     -------
@@ -30,17 +32,17 @@ def conformal_threshold(index: Array, contamination: float, share: float = 1.0) 
     ordered = np.sort(index[~np.isnan(index)])
     n_independent = share * len(ordered)
     rank = int(np.ceil((n_independent + 1) * (1 - contamination) / share - 1e-9))
-    if rank > len(ordered):
-        warn_user(
-            f"{np.floor(n_independent):.0f} independent baseline records are too few for a rate of false alarms of "
-            f"{contamination:.2g}: the threshold is the largest index, which later records exceed at a rate of about "
-            f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
-            "few records for a threshold",
-        )
     threshold = float(ordered[min(rank, len(ordered)) - 1])
     if threshold == np.inf:
         raise ValueError(
             f"{len(ordered)} baseline rows are too few for their number of modes: some single row decides alone "
             "about a direction; expected more rows"
+        )
+    if rank > len(ordered):
+        warn_user(
+            f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a rate of false alarms of "
+            f"{contamination:.2g}: the threshold is the largest index, which later ones exceed at a rate of about "
+            f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
+            "few records for a threshold",
         )
     return threshold

@@ -102,7 +102,9 @@ class Spread:
         """Factor of the deviations where weather is beyond that of the baseline."""
         if self.reach is None:
             return np.ones(len(weather))
-        return np.sqrt(1 + (BEYOND * np.nan_to_num(self.reach.excess(weather)).mean(axis=1)) ** 2)
+        varied = self.reach.highest > self.reach.lowest
+        excess = np.nan_to_num(self.reach.excess(weather))[:, varied]
+        return np.sqrt(1 + (BEYOND * excess.sum(axis=1) / max(varied.sum(), 1)) ** 2)
 
     def _place(self, weather: Array) -> NDArray[np.intp]:
         """The nearest place of every row; the overall covariance where a temperature is missing."""

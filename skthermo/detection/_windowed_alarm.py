@@ -54,6 +54,8 @@ class WindowedAlarm(DamageDetector):
     ----------
     law_ : object
         What the baseline teaches about windows.
+    width_ : int
+        Largest number of records in a window.
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline's windows, each judged by what other periods teach.
     threshold_ : float
@@ -127,7 +129,7 @@ class WindowedAlarm(DamageDetector):
     def _learn(self, windows: Windows | FadingWindows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = LAWS[self.rule]
-        width = self.window if self.rule == "ewma" else windows.longest
+        width = self.width_ = self.window if self.rule == "ewma" else windows.longest
         if n_rows < 2 * width:
             raise ValueError(
                 f"the baseline has {n_rows} rows, and windows hold up to {width} records; expected at least twice as "
@@ -141,10 +143,9 @@ class WindowedAlarm(DamageDetector):
 
     def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
-        time = correlation_time(is_high)
-        # High sums come in few runs, which hardly tell how long they last.
-        time = max(time, self.window) if self.rule == "cusum" else time
-        return conformal_threshold(index, self.contamination, 1 / time)
+        # Few high windows hardly tell how long they last: neighbours within half a window, or a sum's, are not trusted.
+        time = max(correlation_time(is_high), self.width_ if self.rule == "cusum" else self.width_ / 2)
+        return conformal_threshold(index, self.contamination, 1 / time, "windows")
 
     def _index(self, windows: Windows | FadingWindows) -> Array:
         if self.rule == "cusum":

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from skthermo._arrays import Array
+from skthermo._frames import first_disorder
 
 NUMBERS = 2_000_000
 """Numbers that are held in memory at a time."""
@@ -31,19 +32,25 @@ class Windows:
     @classmethod
     def of(cls, X: Any, rows: Array, window: int | str) -> "Windows":
         """Windows of a number of records, or of a time on the index of a frame."""
+        row = first_disorder(X)
+        if row:
+            raise ValueError(
+                f"row {row} ({X.index[row]}) is earlier than the row before it; expected records in order of time, as "
+                "X.sort_index() gives"
+            )
         if not isinstance(window, str):
             return cls(rows, np.maximum(np.arange(len(rows)) - window + 1, 0))
         try:
             duration = pd.Timedelta(window)
         except ValueError:
             duration = pd.NaT
-        if not duration > pd.Timedelta(0):
+        if not duration >= pd.Timedelta("1s"):
             raise ValueError(f"window is {window!r}; expected a number of records, or a time such as '24h'")
         times = getattr(X, "index", None)
-        if not isinstance(times, pd.DatetimeIndex) or not times.is_monotonic_increasing:
+        if not isinstance(times, pd.DatetimeIndex) or times.hasnans:
             raise ValueError(
-                f"window is {window!r}, a time, but the records are not a frame on a DatetimeIndex in order of time; "
-                "expected one, or a number of records as the window"
+                f"window is {window!r}, a time, but the records are not a frame with a stamp for each; expected a "
+                "DatetimeIndex, or a number of records as the window"
             )
         return cls(rows, times.searchsorted(times - duration, side="right"))
 

@@ -1,6 +1,7 @@
 """Probability of false alarm and of detection, time to detection, minimum detectable damage."""
 
 import operator
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -137,7 +138,7 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
         A damage index above it is an alarm.
     onset : int or time, optional
         First damaged record: its position counted from 0 or, for a series on a ``DatetimeIndex``, a time, which may lie
-        between two records. By default the first record.
+        between two records or before all. By default the first record.
 
     Returns
     -------
@@ -148,8 +149,8 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     Raises
     ------
     ValueError
-        If the index is not a vector or not in order of time, the threshold is not finite, or the onset is not within
-        the records.
+        If the index is not a vector or not in order of time, the threshold is not finite, or the onset is after
+        the last record.
 
     Examples
     --------
@@ -159,29 +160,33 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     """
     index, limit = _checked(damage_index, threshold)
     times = getattr(damage_index, "index", None)
-    if not isinstance(times, pd.DatetimeIndex):
-        times = pd.RangeIndex(len(index))
+    is_time = isinstance(times, pd.DatetimeIndex)
+    times = times.as_unit("ns") if is_time else pd.RangeIndex(len(index))
     if not times.is_monotonic_increasing:
         raise ValueError("the damage index is not in order of time; expected records in order")
     start = _start(times, onset)
     first = int(times.searchsorted(start))
     alarms = np.flatnonzero(index[first:] > limit)
-    if isinstance(times, pd.DatetimeIndex):
+    if is_time:
         return times[first + alarms[0]] - start if alarms.size else pd.NaT
     return float(alarms[0]) if alarms.size else float("nan")
 
 
 def _start(times: pd.Index, onset: Any) -> Any:
     """The onset as a time or a position, which is not after the last record."""
-    is_time = isinstance(times, pd.DatetimeIndex)
+    is_time, is_number = isinstance(times, pd.DatetimeIndex), isinstance(onset, Real)
     try:
-        start = times[0] if onset is None else pd.Timestamp(onset) if is_time else operator.index(onset)
-        if start <= times[-1] and (is_time or start >= 0):
+        if is_number or onset is None or not is_time:
+            position = 0 if onset is None else operator.index(onset)
+            if 0 <= position < len(times):
+                return times[position]
+        elif (start := pd.Timestamp(onset).as_unit("ns")) <= times[-1]:
             return start
     except (IndexError, TypeError, ValueError):
         pass
-    expected = "a time, not after the last record" if is_time else "a position, from 0 to that of the last record"
-    raise ValueError(f"onset is {onset!r} for {len(times)} records; expected {expected}")
+    zone = f" in the time zone {times.tz}" if is_time and times.tz is not None else ""
+    expected = f"a position from 0, or a time{zone}" if is_time else "a position from 0"
+    raise ValueError(f"onset is {onset!r} for {len(times)} records; expected {expected}, not after the last record")
 
 
 def _checked(damage_index: ArrayLike, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
