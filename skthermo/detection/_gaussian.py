@@ -10,10 +10,12 @@ from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
-MOST_STEPS = 300
+MOST_STEPS = 100
 TOLERANCE = 1e-9
 """Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
 
+SETTLED = 0.01
+"""It may also end after the most steps, without a warning if the last is this small beside the sampling error."""
 
 GAPS_TOLERANCE = 1e-7
 """A combination of standardised modes with gaps that varies less than this is taken to be constant."""
@@ -154,7 +156,7 @@ def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]
             beyond = step(far)
             state = beyond if np.abs(beyond - far).max() <= np.abs(first).max() else twice
     is_singular = np.linalg.eigvalsh(state[1:])[0] < GAPS_TOLERANCE  # which `check_invertible` refuses
-    if np.abs(second).max() >= TOLERANCE and not is_singular:
+    if np.abs(second).max() > SETTLED / np.sqrt(len(rows)) and not is_singular:
         warn_user(
             f"the covariance of {len(rows)} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
             "part of it nearly undetermined",
