@@ -159,7 +159,7 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     2.0
     """
     index, limit = _checked(damage_index, threshold)
-    times = getattr(damage_index, "index", None)
+    times: Any = getattr(damage_index, "index", None)
     is_time = isinstance(times, pd.DatetimeIndex)
     times = times.as_unit("ns") if is_time else pd.RangeIndex(len(index))
     if not times.is_monotonic_increasing:
