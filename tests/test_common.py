@@ -24,7 +24,7 @@ from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, La
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 
 # scikit-learn checks detectors on 20 to 50 rows.
-pytestmark = pytest.mark.filterwarnings("ignore:.* independent baseline records are too few")
+pytestmark = pytest.mark.filterwarnings("ignore:.* independent baseline (records|windows) are too few")
 
 ROWS_ARE_ORDERED = {
     "check_methods_sample_order_invariance": "lags and windows reach earlier rows: order is the information",
@@ -74,6 +74,8 @@ def expected_failures(estimator):
         FusedDetector([("paper", MahalanobisDetector(threshold="quantile")), ("default", MahalanobisDetector())]),
         WindowedAlarm(3),
         WindowedAlarm(3, rule="m-of-n"),
+        WindowedAlarm(3, rule="ewma"),
+        WindowedAlarm(3, rule="cusum"),
         OutlierDetector(IsolationForest(n_estimators=20, random_state=0)),
         OutlierDetector(OneClassSVM()),
         OutlierDetector(LocalOutlierFactor(5, novelty=True)),
