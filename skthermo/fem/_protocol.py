@@ -35,6 +35,8 @@ class FEModel(Protocol):
     - ``track``, whether a column follows its mode (True) or its rank (False);
     - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box;
     - ``linearised(theta)``, frequencies and Jacobian from one solution;
+    - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;
+    - ``with_added(stiffness, mass)``, a model with further stiffness and mass;
     - ``rescaled(theta)``, a model whose nominal state is this one's at theta.
 
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.

@@ -1,6 +1,5 @@
 """Private steps of `DataInformedFEM`: fill gaps, invert, report; predict parameters, solve, undo the alignment."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -61,13 +60,6 @@ class ChainSteps:
         impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
         theta[impossible] = np.nan
         return theta, impossible
-
-    def _frequencies(self, X: ArrayLike, damage: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Frequencies at given temperatures, in the measured domain."""
-        check_is_fitted(self)
-        simulator = self.simulator_.damaged(damage)
-        frequencies = simulator.frequencies(self._predict_theta(X), self.n_jobs)
-        return as_floats(self.aligner_.inverse_transform(frequencies))
 
     def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
         """The model and, with ``reduce``, its reduced model for a box around the training parameters."""

@@ -1,6 +1,5 @@
 """The whole chain: temperatures and frequencies in, a thermal FE model out."""
 
-from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Literal, TypeAlias
 
@@ -9,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arrays import as_floats, as_random_state
+from skthermo._arrays import as_floats
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._validation import (
     HasMethods,
@@ -21,9 +20,10 @@ from skthermo._validation import (
     clone_sharing_models,
 )
 from skthermo._warnings import warn_each, warn_user
-from skthermo.fem import FEModel, add_noise, check_noise
+from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
+from skthermo.surrogate._chain_simulation import ChainSimulation
 from skthermo.surrogate._chain_steps import ChainSteps
 from skthermo.surrogate._chain_uncertainty import ChainUncertainty
 from skthermo.surrogate._report import mode_warnings
@@ -32,7 +32,7 @@ from skthermo.surrogate._simulator import tolerance
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimator):
+class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -263,51 +263,6 @@ class DataInformedFEM(ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimato
         frequencies = self._frequencies(X)
         predicted = frame_like(X, frequencies, self.mode_names_)
         return (predicted, frame_like(X, frequencies * self._spread(X), self.mode_names_)) if return_std else predicted
-
-    def simulate(
-        self,
-        X: ArrayLike,
-        *,
-        damage: Mapping[str, float] | None = None,
-        noise: ArrayLike | Literal["fitted"] = 0.0,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> Table:
-        """Frequencies of the structure, healthy or damaged, as monitoring would record them, eq. (8).
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        damage : mapping of str to float, optional
-            Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %.
-        noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
-            Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals, out of fold, of a whole training record of similar weather, so that modes scatter together,
-            scatter more in frost, and are missing as in the training records. Runs of consecutive records are drawn if
-            residuals are serially correlated; rows of X should then be in order of time.
-        random_state : int, RandomState or None, default=None
-            Seed of the noise.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz, in the measured domain.
-
-        Raises
-        ------
-        ValueError
-            If a damage group is unknown, a severity is 1 or more, or the model cannot be damaged.
-        """
-        check_is_fitted(self)
-        random = as_random_state(random_state)
-        if isinstance(noise, str):
-            if noise != "fitted":
-                raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-            frequencies = self._frequencies(X, damage) * (1 + self._fitted_noise(X, random))
-        else:
-            check_noise(noise, len(self.mode_names_))
-            frequencies = add_noise(self._frequencies(X, damage), noise, random_state=random)
-        return frame_like(X, frequencies, self.mode_names_)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.

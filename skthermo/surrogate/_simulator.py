@@ -17,6 +17,9 @@ MANY_ROWS = 2000
 
 DEFAULT_TOLERANCE = 1e-5
 
+MARGIN = 0.02
+"""Margin of severities around those asked for, within which a reduced model is accurate."""
+
 
 def tolerance(model: FEModel, reduce: bool | float) -> float | None:
     """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
@@ -59,14 +62,25 @@ class Simulator:
         """The simulator with a reduced model for a box."""
         return cls(model, model.reduced(box, tol=tol, random_state=random_state), box)
 
+    def changed(self, method: str, *args: Any, **options: Any) -> "Simulator":
+        """The simulator of the structure that a method of the model gives, such as "damaged"."""
+        if not hasattr(self.model, method):
+            raise ValueError(f"{self.model!r} has no method {method!r}; expected a model with one, such as AffineModel")
+        reduced = None if self.reduced is None else getattr(self.reduced, method)(*args, **options)
+        return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box)
+
     def damaged(self, damage: Mapping[str, float] | None) -> "Simulator":
         """The simulator of the damaged structure; itself without damage."""
-        if not damage:
-            return self
-        if not hasattr(self.model, "damaged"):
-            raise ValueError(f"{self.model!r} has no method 'damaged'; expected a model that damage can be put into")
-        reduced = None if self.reduced is None else self.reduced.damaged(damage)
-        return Simulator(self.model.damaged(damage), reduced, self.box)
+        return self.changed("damaged", damage) if damage else self
+
+    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float) -> "Simulator":
+        """The simulator whose rows of theta end with 1 - severity of each group."""
+        severities = (min(lowest, 0.0) - MARGIN, min(max(highest, 0.0) + MARGIN, 0.99))
+        changed = self.changed("with_damage_parameters", groups, severities=severities)
+        if self.box is None:
+            return changed
+        factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
+        return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]))
 
     def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""

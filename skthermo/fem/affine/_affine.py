@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Bounds, RandomState
+from skthermo._arrays import Array, Bounds, RandomState
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
@@ -196,7 +196,10 @@ class AffineModel(AffineBase):
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
 
     def _changed(
-        self, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+        self,
+        change: Callable[[AffineCore], AffineCore],
+        names: tuple[str, ...] | None = None,
+        bounds: Array | None = None,
     ) -> "AffineModel":
         twin = self._twin(change(self._core))
         twin._parameter_names = names or self._parameter_names

@@ -13,13 +13,14 @@ from skthermo._threads import map_on_blas_threads
 from skthermo._warnings import warn_user
 from skthermo.fem._theta import check_theta, warn_of_failures
 from skthermo.fem.affine._core import AffineCore
+from skthermo.fem.affine._interventions import Interventions
 from skthermo.fem.affine._read_terms import check_different, check_modes
 from skthermo.fem.modal import LocalModes
 
 Model = TypeVar("Model", bound="AffineBase")
 
 
-class AffineBase(ABC):
+class AffineBase(Interventions, ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
     A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and
@@ -294,9 +295,12 @@ class AffineBase(ABC):
 
     @abstractmethod
     def _changed(
-        self: Model, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+        self: Model,
+        change: Callable[[AffineCore], AffineCore],
+        names: tuple[str, ...] | None = None,
+        bounds: Array | None = None,
     ) -> Model:
-        """A model like this one with a changed full core and these parameter names."""
+        """A model like this one with a changed full core, these parameter names, and bounds of the new ones."""
 
     @property
     @abstractmethod

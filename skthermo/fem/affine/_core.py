@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, Matrix
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal import (
@@ -50,6 +50,11 @@ class NominalModes:
     def __post_init__(self) -> None:
         for array in (self.weighted_shapes, self.mass_coefficients, self.repeated):
             array.flags.writeable = False
+
+    def beside(self, mass: AffineTerms) -> "NominalModes":
+        """The same modes, where mass has been added to the structure as further terms."""
+        added = np.zeros(len(mass.factors) - len(self.mass_coefficients))
+        return replace(self, mass_coefficients=np.append(self.mass_coefficients, added))
 
     def mac(self, shapes: Array, mass: AffineTerms) -> Array:
         """Mass-weighted MAC with shapes (n_samples, n, n_candidates), (n_samples, n_modes, n_candidates)."""
@@ -127,14 +132,32 @@ class AffineCore:
     def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
         """The core whose columns are other modes of the healthy nominal state."""
         healthy = self.healthy or self
-        nominal = nominal_modes(healthy.solver, healthy.mass, ranks)
+        nominal = nominal_modes(healthy.solver, healthy.mass, ranks).beside(self.mass)
         return replace(self, nominal=nominal, ranks=ranks)
 
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
         """The core of fewer parameters, the others being 1."""
-        stiffness, mass = self.stiffness.with_parameters(columns), self.mass.with_parameters(columns)
         healthy = self.healthy.with_parameters(columns) if self.healthy else None
-        return replace(self, stiffness=stiffness, mass=mass, solver=eigen_solver(stiffness, mass), healthy=healthy)
+        return self._with_exponents(self.stiffness.exponents[:, columns], self.mass.exponents[:, columns], healthy)
+
+    def with_group_factors(self, scaled: NDArray[np.int64]) -> "AffineCore":
+        """The core with further parameters that multiply groups of stiffness terms, (n_terms, n_groups)."""
+        healthy = self.healthy.with_group_factors(scaled) if self.healthy else None
+        further = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
+        constant = np.zeros((len(self.mass.factors), scaled.shape[1]), dtype=scaled.dtype)
+        stiffness = np.hstack([self.stiffness.exponents, further])
+        return self._with_exponents(stiffness, np.hstack([self.mass.exponents, constant]), healthy)
+
+    def _with_exponents(self, stiffness: NDArray, mass: NDArray, healthy: "AffineCore | None") -> "AffineCore":
+        terms = self.stiffness.with_exponents(stiffness), self.mass.with_exponents(mass)
+        return replace(self, stiffness=terms[0], mass=terms[1], solver=eigen_solver(*terms), healthy=healthy)
+
+    def with_added(self, stiffness: Matrix | None, mass: Matrix | None) -> "AffineCore":
+        """The core with further constant stiffness and mass; its columns stay the same nominal modes."""
+        stiff = self.stiffness if stiffness is None else self.stiffness.with_constant(stiffness)
+        heavy = self.mass if mass is None else self.mass.with_constant(mass)
+        solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
+        return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
 
     def projected(self, basis: Array, widest_spectrum: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes."""

@@ -34,7 +34,7 @@ def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], l
     keys = [_read_key(key, what) for key, _ in pairs]
     matrices = []
     for key, (_, matrix) in zip(keys, pairs, strict=True):
-        matrices.append(_read_matrix(matrix, f"{what} term {key}", n_dof))
+        matrices.append(read_matrix(matrix, f"{what} term {key}", n_dof))
         n_dof = matrices[0].shape[0]
     return keys, matrices
 
@@ -50,7 +50,7 @@ def _read_key(key, what: str) -> Key:
     return names
 
 
-def _read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
+def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
     array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else real_array(matrix, what)
     if np.iscomplexobj(array):
         raise ValueError(f"{what} is complex; expected real numbers")

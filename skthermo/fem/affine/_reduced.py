@@ -171,10 +171,16 @@ class ReducedModel(AffineBase):
         return twin
 
     def _changed(
-        self, change: Callable[[AffineCore], AffineCore], names: tuple[str, ...] | None = None
+        self,
+        change: Callable[[AffineCore], AffineCore],
+        names: tuple[str, ...] | None = None,
+        bounds: Array | None = None,
     ) -> "ReducedModel":
-        kept = [self._parameter_names.index(name) for name in names or self._parameter_names]
-        return self._regrown(self._full._changed(change, names), self._bounds[kept])
+        full = self._full._changed(change, names)
+        known = dict(zip(self._parameter_names, self._bounds, strict=True))
+        new = () if bounds is None else bounds
+        known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
+        return self._regrown(full, np.array([known[name] for name in full.parameter_names]))
 
     def _regrown(self, full: AffineBase, bounds: Array) -> "ReducedModel":
         """A reduced model of another full model; its basis starts from the present one."""

@@ -96,8 +96,18 @@ class AffineTerms(ABC):
         """The same matrices with their factors multiplied."""
 
     @abstractmethod
-    def with_parameters(self, columns: NDArray[np.intp]) -> "AffineTerms":
-        """Terms of fewer parameters; the others are fixed at 1."""
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "AffineTerms":
+        """The same matrices, multiplied by other parameters."""
+
+    @property
+    @abstractmethod
+    def each_matrix(self) -> list[Matrix]:
+        """The matrices of the terms."""
+
+    def with_constant(self, matrix: Matrix) -> "AffineTerms":
+        """These terms and one more, constant one."""
+        exponents = np.vstack([self.exponents, np.zeros_like(self.exponents[:1])])
+        return type(self).from_matrices([*self.each_matrix, matrix], exponents).scaled(np.append(self.factors, 1.0))
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":
@@ -135,8 +145,12 @@ class DenseTerms(AffineTerms):
     def scaled(self, factors: Array) -> "DenseTerms":
         return DenseTerms(self.matrices, self.exponents, self.factors * factors)
 
-    def with_parameters(self, columns: NDArray[np.intp]) -> "DenseTerms":
-        return DenseTerms(self.matrices, self.exponents[:, columns], self.factors)
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "DenseTerms":
+        return DenseTerms(self.matrices, exponents, self.factors)
+
+    @property
+    def each_matrix(self) -> list[Matrix]:
+        return list(self.matrices)
 
     def projected(self, basis: Array) -> "DenseTerms":
         return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
@@ -198,14 +212,18 @@ class SparseTerms(AffineTerms):
     def scaled(self, factors: Array) -> "SparseTerms":
         return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
 
-    def with_parameters(self, columns: NDArray[np.intp]) -> "SparseTerms":
-        return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents[:, columns], self.factors)
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "SparseTerms":
+        return SparseTerms(self.entries, (self.rows, self.pointers), exponents, self.factors)
 
-    def projected(self, basis: Array) -> DenseTerms:
+    @property
+    def each_matrix(self) -> list[Matrix]:
         terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
         places = ((term.data, (self.rows[term.row], self._columns[term.row])) for term in terms)
-        matrices = (scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places)
-        return DenseTerms(np.stack([basis.T @ (matrix @ basis) for matrix in matrices]), self.exponents, self.factors)
+        return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
+
+    def projected(self, basis: Array) -> DenseTerms:
+        matrices = np.stack([basis.T @ (matrix @ basis) for matrix in self.each_matrix])
+        return DenseTerms(matrices, self.exponents, self.factors)
 
 
 def _freeze(*arrays: NDArray) -> None:

@@ -1,0 +1,63 @@
+"""Simulated records of a changed structure."""
+
+import numpy as np
+import pytest
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.surrogate import DataInformedFEM
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["full", "reduced"])
+def fem(request):
+    year = make_truss_campaign(random_state=0)
+    return DataInformedFEM(make_truss(), reduce=request.param, random_state=0).fit(year.temperatures, year.frequencies)
+
+
+@pytest.fixture(scope="module")
+def weather():
+    return make_truss_campaign(random_state=1).temperatures[:60]
+
+
+def test_each_row_may_have_its_own_severity(fem, weather):
+    growing = np.linspace(0, 0.5, 60)
+    found = fem.simulate(weather, damage={"bottom": growing, "top": 0.1})
+    for row in (0, 30, 59):
+        expected = fem.simulate(weather, damage={"bottom": growing[row], "top": 0.1})
+        np.testing.assert_allclose(found.iloc[row], expected.iloc[row], rtol=2e-5)
+
+
+def test_factors_multiply_the_parameters(fem, weather):
+    found = fem.simulate(weather, parameters={"diagonal": 0.95})
+    theta = fem.predict_parameters(weather) * [1, 1, 0.95, 1]
+    np.testing.assert_allclose(found, fem.model.frequencies(theta), rtol=2e-5)
+
+
+def test_a_retrofit_changes_stiffness_and_mass(fem, weather):
+    mass = np.full(fem.model.n_dof, 30.0)
+    stiffness = np.eye(fem.model.n_dof) * 1e5
+    found = fem.simulate(weather, stiffness=stiffness, mass=mass, damage={"top": -0.1})
+    expected = fem.model.with_added(stiffness, mass).damaged({"top": -0.1}).frequencies(fem.predict_parameters(weather))
+    np.testing.assert_allclose(found, expected, rtol=2e-5)
+
+
+@pytest.mark.parametrize("noise", [0.02, "fitted"])
+def test_noise_is_what_draw_noise_gives(fem, weather, noise):
+    clean = fem.simulate(weather, damage={"top": 0.2})
+    found = fem.simulate(weather, damage={"top": 0.2}, noise=noise, random_state=3)
+    np.testing.assert_allclose(found, clean * (1 + fem.draw_noise(weather, noise, random_state=3)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"parameters": {"deck": 1.1}}, "parameter 'deck' is unknown; expected some of"),
+        ({"parameters": {"top": 0.0}}, "factor of parameter 'top' is 0.0; expected a positive number"),
+        ({"damage": {"top": [0.1, 0.2]}}, r"has shape \(2,\).*expected one severity or 60"),
+        ({"damage": {"top": np.full(60, 1.0)}}, "highest value 1.0; expected one severity or 60"),
+        ({"damage": {"deck": np.full(60, 0.1)}}, r"unknown damage groups \['deck'\]"),
+        ({"damage": 0.2}, "damage is 0.2; expected a mapping"),
+    ],
+)
+def test_impossible_changes_are_refused(fem, weather, changes, message):
+    with pytest.raises(ValueError, match=message):
+        fem.simulate(weather, **changes)
