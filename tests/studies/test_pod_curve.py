@@ -1,0 +1,144 @@
+"""Curves of the probability of detection, against statsmodels and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.special import expit, logit
+from scipy.stats import norm
+
+from skthermo.studies import pod_curve
+
+SEVERITIES = np.array([0.1, 0.15, 0.2, 0.25, 0.3])
+DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])
+RECORDS = np.full(5, 40.0)
+
+
+@pytest.mark.parametrize("log", [False, True])
+@pytest.mark.parametrize("records", [RECORDS, RECORDS * [0.31, 0.7, 0.55, 1.0, 0.93]])
+def test_agrees_with_a_generalised_linear_model(log, records):
+    api = pytest.importorskip("statsmodels.api")
+    x = np.log(SEVERITIES) if log else SEVERITIES
+    detected = DETECTED / RECORDS * records
+    fitted = api.GLM(
+        np.column_stack([detected, records - detected]), api.add_constant(x), family=api.families.Binomial()
+    )
+    fitted = fitted.fit(tol=1e-12)
+    curve = pod_curve(SEVERITIES, detected, records, log=log)
+    np.testing.assert_allclose([curve.intercept, curve.slope], fitted.params, rtol=1e-6)
+    np.testing.assert_allclose(curve.covariance, fitted.cov_params(), rtol=1e-5)
+    grid = np.linspace(0.1, 0.5, 400_001)
+    design = api.add_constant(np.log(grid) if log else grid)
+    lower = design @ fitted.params - norm.ppf(0.95) * np.sqrt(
+        np.einsum("ij,jk,ik->i", design, fitted.cov_params(), design)
+    )
+    assert curve.a90 == pytest.approx(grid[np.argmax(design @ fitted.params >= logit(0.9))], abs=1e-5)
+    assert curve.a90_95 == pytest.approx(grid[np.argmax(lower >= logit(0.9))], abs=1e-5)
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_bound_reaches_the_level_where_severity_at_says(log):
+    curve = pod_curve(SEVERITIES, DETECTED, RECORDS, log=log, confidence=0.9)
+    pod, lowest, highest = curve.predict([curve.a90, curve.a90_95, curve.severity_at(0.9, confidence=0.05)])
+    assert pod[0] == pytest.approx(0.9)
+    assert lowest[1] == pytest.approx(0.9)  # two-sided 90 % bounds are one-sided 95 % bounds
+    assert highest[2] == pytest.approx(0.9)
+    assert curve.a50 < curve.a90 < curve.a90_95
+
+
+def test_two_severities_are_fitted_exactly():
+    curve = pod_curve([0.1, 0.3], [10, 90], [100, 100])
+    assert curve.a50 == pytest.approx(0.2)
+    np.testing.assert_allclose(curve.predict([0.1, 0.3])[0], [0.1, 0.9])
+    variances = 1 / (100 * 0.09) + np.zeros(2)  # of both logits
+    assert curve.covariance[1, 1] == pytest.approx(variances.sum() / 0.2**2)
+
+
+def test_strengthening_is_the_mirror_image_of_damage():
+    curve, mirrored = (pod_curve(sign * SEVERITIES, DETECTED, RECORDS) for sign in (1, -1))
+    assert mirrored.a90_95 == -curve.a90_95
+    np.testing.assert_array_equal(mirrored.predict(-SEVERITIES), curve.predict(SEVERITIES))
+
+
+def test_order_scale_and_severities_without_records_do_not_matter():
+    curve = pod_curve(SEVERITIES, DETECTED, RECORDS)
+    shuffled = pod_curve([0.9, *SEVERITIES[::-1]], [0, *DETECTED[::-1]], [0, *RECORDS[::-1]])
+    assert (shuffled.a90, shuffled.a90_95) == pytest.approx((curve.a90, curve.a90_95))
+    more = pod_curve(SEVERITIES, 4 * DETECTED, 4 * RECORDS)
+    assert more.a90 == pytest.approx(curve.a90)
+    np.testing.assert_allclose(4 * more.covariance, curve.covariance)
+
+
+@pytest.mark.parametrize(
+    ("detected", "between"),
+    [
+        ([0, 0, 40, 40, 40], (0.15, 0.2)),
+        ([0, 0, 20, 40, 40], (0.2, 0.25)),
+        ([0, 0, 38, 40, 40], (0.15, 0.2)),
+        ([40, 40, 40, 40, 40], (0.0, 0.1)),
+    ],
+)
+def test_separated_severities_give_a_bracket(detected, between):
+    with pytest.warns(UserWarning, match="a90 lies between"):
+        curve = pod_curve(SEVERITIES, detected, RECORDS)
+    assert np.isnan([curve.slope, curve.a90, curve.a90_95]).all()
+    assert curve.bracket == between
+
+
+def test_nothing_detected_has_no_upper_end():
+    with pytest.warns(UserWarning, match=r"a90 lies above 0\.3"):
+        curve = pod_curve(SEVERITIES, np.zeros(5), RECORDS)
+    assert curve.bracket[0] == 0.3
+    assert np.isnan(curve.bracket[1])
+
+
+def test_a_bound_that_never_reaches_the_level_is_infinite():
+    curve = pod_curve([0.1, 0.2], [1, 2], [3, 3])
+    assert np.isfinite(curve.a90)
+    assert curve.a90_95 == np.inf
+
+
+def test_unfavourable_starts_converge():
+    truth = expit(-30 + 100 * SEVERITIES)
+    curve = pod_curve(SEVERITIES, truth, np.ones(5))
+    assert (curve.intercept, curve.slope) == pytest.approx((-30, 100), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([0.1, 0.2], [9, 3], [10, 10]), "does not increase"),
+        (([0.1, 0.2], [5, 5], [10, 10]), "does not increase"),
+        (([0.1, 0.2], [5, 0], [10, 10]), "does not increase"),
+        (([0.1, 0.2], [1, 3], [10, 0]), "0 <= n_detected <= n_records"),
+        (([0.1, 0.2], [1, 0], [10, 0]), "expected at least two severities"),
+        (([0.1, 0.1], [1, 3], [10, 10]), "expected at least two severities"),
+        (([0.1, 0.2], [1, 11], [10, 10]), "0 <= n_detected <= n_records"),
+        (([0.1, 0.2], [1, np.nan], [10, 10]), "0 <= n_detected <= n_records"),
+        (([0.0, 0.2], [1, 3], [10, 10]), "all above 0"),
+        (([10, 20], [1, 3], [10, 10]), "below 1"),
+        (([0.1, 0.2, 0.3], [1, 3], [10, 10]), "vectors of one length"),
+    ],
+)
+def test_impossible_data_are_errors(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        pod_curve(*arguments)
+
+
+def test_impossible_questions_are_errors():
+    curve = pod_curve(SEVERITIES, DETECTED, RECORDS)
+    with pytest.raises(ValueError, match="pod is 90; expected a probability"):
+        curve.severity_at(90)
+    with pytest.raises(ValueError, match="expected the sign"):
+        curve.predict(-0.2)
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_bounds_hold_a90_as_often_as_they_say(log):
+    random = np.random.RandomState(0)
+    x = np.log(SEVERITIES) if log else SEVERITIES
+    slope = 5 if log else 30
+    intercept = -slope * x[2]
+    truth = (logit(0.9) - intercept) / slope
+    truth = np.exp(truth) if log else truth
+    draws = random.binomial(100, expit(intercept + slope * x), size=(500, 5))
+    bounds = [pod_curve(SEVERITIES, draw, np.full(5, 100), log=log).a90_95 for draw in draws]
+    assert 0.92 < np.mean(np.array(bounds) >= truth) < 0.98
