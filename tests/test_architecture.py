@@ -25,6 +25,7 @@ MAY_IMPORT = {
     "surrogate": {"fem", "metrics", "preprocessing", "updating"},
     "updating": {"fem", "metrics"},
     "datasets": {"fem"},
+    "plotting": {"fem", "surrogate", "updating", "detection", "metrics", "datasets", "studies"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -122,7 +123,7 @@ def test_private_scikit_learn_is_imported_in_one_place(path):
 def test_import_loads_no_optional_package():
     code = (
         "import sys, skthermo, skthermo.fem, skthermo.preprocessing, skthermo.surrogate, skthermo.detection, "
-        "skthermo.metrics, skthermo.datasets, skthermo.updating; "
+        "skthermo.metrics, skthermo.datasets, skthermo.updating, skthermo.plotting; "
         "print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') if m in sys.modules])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
