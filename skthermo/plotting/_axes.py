@@ -1,6 +1,7 @@
 """New axes, or those that the user gives; panels, dates and legends."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -79,23 +80,30 @@ def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
         ax.set_xlabel(label or str(index.name or "record"))
 
 
-def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None) -> None:
+def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Index) -> None:
     """Vertical lines in all panels, with their labels above the first."""
     for text, place in (marks or {}).items():
         for ax in axes:
-            ax.axvline(on_axis(place), color=GREY, linestyle="--", linewidth=1)
-        axes[0].annotate(
-            text,
-            (on_axis(place), 1),
-            xycoords=axes[0].get_xaxis_transform(),
-            xytext=(2, 2),
-            textcoords="offset points",
-            fontsize="small",
-        )
+            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
+        above = axes[0].get_xaxis_transform()
+        axes[0].text(on_axis(place, index), 1.03, f" {text}", transform=above, fontsize="small")
 
 
-def on_axis(place: Any) -> Any:
-    """A place on the horizontal axis: a time without its time zone, or a number."""
-    if isinstance(place, str | pd.Timestamp | np.datetime64) or hasattr(place, "isoformat"):
-        return pd.Timestamp(place).tz_localize(None).to_datetime64()
-    return place
+def on_axis(place: Any, index: pd.Index) -> Any:
+    """A time without its time zone, or a number; on an axis of time a number is the position of a record.
+
+    Raises
+    ------
+    ValueError
+        If there is no such record, or the place is a time on an axis of numbers.
+    """
+    is_number = isinstance(place, Real)
+    if not isinstance(index, pd.DatetimeIndex):
+        if not is_number:
+            raise ValueError(f"{place!r} is no number; expected one, since the records have no DatetimeIndex")
+        return place
+    if is_number:
+        if not 0 <= place < len(index):
+            raise ValueError(f"there is no record number {place!r}; expected a time, or 0 to {len(index) - 1}")
+        place = index[int(place)]
+    return pd.Timestamp(place).tz_localize(None).to_datetime64()

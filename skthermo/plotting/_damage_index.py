@@ -89,7 +89,7 @@ class DamageIndexDisplay:
         X : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such
             What the detector judges, in Hz for frequencies; several tables by label.
         onset : time or number, optional
-            When damage began; a number counts records.
+            When damage began; on an axis of time, a number is the position of a record of the first table.
         **options : dict
             Options of `plot`, and ``label`` of `from_predictions`.
 
@@ -132,7 +132,7 @@ class DamageIndexDisplay:
         threshold : float
             A damage index above it is an alarm.
         onset : time or number, optional
-            When damage began; a number counts records.
+            When damage began; on an axis of time, a number is the position of a record of the first table.
         label : str, default="damage index (Mahalanobis, unsquared)"
             Label of the vertical axis.
         **options : dict
@@ -168,7 +168,7 @@ class DamageIndexDisplay:
         threshold : float or mapping of str to float
             A damage index above it is an alarm; one for all panels, or one for each title.
         onset : time or number, optional
-            When damage began; a number counts records.
+            When damage began; on an axis of time, a number is the position of a record of the first table.
         label : str, default="damage index (Mahalanobis, unsquared)"
             Label of the vertical axes.
         **options : dict
@@ -198,7 +198,13 @@ class DamageIndexDisplay:
         return cls(tables, thresholds, onset=onset, label=label).plot(**options)
 
     def plot(
-        self, ax: Axes = None, *, n_columns: int = 1, threshold_label: str = "threshold", log: bool = False
+        self,
+        ax: Axes = None,
+        *,
+        n_columns: int = 1,
+        colours: Mapping[str, str] | None = None,
+        threshold_label: str = "threshold",
+        log: bool = False,
     ) -> "DamageIndexDisplay":
         """Draw into axes.
 
@@ -208,6 +214,8 @@ class DamageIndexDisplay:
             One for each scenario. A new figure by default.
         n_columns : int, default=1
             Panels beside each other in a new figure.
+        colours : mapping of str to str, optional
+            Colours by label; by default those of the palette in their order.
         threshold_label : str, default="threshold"
             Legend of the threshold.
         log : bool, default=False
@@ -217,6 +225,11 @@ class DamageIndexDisplay:
         -------
         DamageIndexDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If the onset is not on the axis.
         """
         titles = list(self.scenarios)
         width = 9.0 if n_columns == 1 else 4.6
@@ -225,11 +238,14 @@ class DamageIndexDisplay:
         self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
         self.points_, self.threshold_lines_ = {}, []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
-            self.points_[title] = self._draw_points(one, self.scenarios[title])
+            self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
             style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": threshold_label}
             self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
             if self.onset is not None:
-                one.axvline(on_axis(self.onset), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage")
+                first = next(iter(self.scenarios[title].values()))
+                one.axvline(
+                    on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
+                )
             one.set_title(title)
             if log:
                 one.set_yscale("log")
@@ -243,12 +259,12 @@ class DamageIndexDisplay:
         return self
 
     @staticmethod
-    def _draw_points(ax: Axes, tables: Mapping[str, pd.DataFrame]) -> list[Any]:
+    def _draw_points(ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Any]:
         drawn = []
-        n_points = sum(len(table) for table in tables.values())
         for number, (label, table) in enumerate(tables.items()):
             x, values = in_time(table)
-            drawn += ax.plot(x, values[:, 0], **marker_style(number, n_points), label=label)
+            style = marker_style(number, len(x))
+            drawn += ax.plot(x, values[:, 0], **{**style, "color": colours.get(label, style["color"])}, label=label)
         return drawn
 
 

@@ -39,7 +39,7 @@ class FitReportDisplay:
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
     >>> display = FitReportDisplay.from_estimator(fem)
     >>> [ax.get_xlabel() for ax in display.axes_]
-    ['MAPE (%)', 'measured minus model (%)', 'standard deviation (%)', 'rows (%)']
+    ['MAPE (%)', 'measured against model (%)', 'standard deviation of the estimate (%)', 'rows (%)']
     >>> plt.close(display.figure_)
     """
 
@@ -99,13 +99,14 @@ class FitReportDisplay:
             name: draw_bars(errors, values, shift, 0.4, **style)
             for shift, (name, (values, style)) in zip((-0.2, 0.2), styles.items(), strict=True)
         }
-        errors.legend(frameon=False, fontsize="small")
+        errors.margins(x=0.6)
+        errors.legend(frameon=False, fontsize="small", loc="center right")
         errors.set(title="error in the training records", xlabel="MAPE (%)")
         self.bars_["offsets"] = draw_bars(offsets, report.offsets, color=BLUE)
         offsets.axvline(0, color=BLACK, linewidth=0.8)
-        offsets.set(title="offset of the mean frequencies", xlabel="measured minus model (%)")
+        offsets.set(title="offset of the mean frequencies", xlabel="measured against model (%)")
         self.bars_["deviations"] = draw_bars(deviations, 100 * report.deviations, color=GREY)
-        deviations.set(title="smallest possible, from one record", xlabel="standard deviation (%)")
+        deviations.set(title="smallest possible, from one record", xlabel="standard deviation of the estimate (%)")
         self.bars_["outside"] = draw_bars(outside, 100 * report.outside, color=GREY)
         bounds = "without bounds" if report.n_outside is None else f"{report.n_outside} of {report.n_rows} rows"
         outside.set(title=f"outside the bounds: {bounds}", xlabel="rows (%)")

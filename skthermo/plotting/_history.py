@@ -156,7 +156,7 @@ class HistoryDisplay:
             How records are drawn: "auto" draws the first table as points and the others as lines. Lines break at NaN
             and in long gaps of time.
         marks : mapping of str to time or number, optional
-            Vertical lines by their label.
+            Vertical lines by their label; on an axis of time, a number is the position of a record of the first table.
         n_columns : int, default=1
             Panels beside each other in a new figure.
 
@@ -168,7 +168,7 @@ class HistoryDisplay:
         Raises
         ------
         ValueError
-            If ``kind`` is something else.
+            If ``kind`` is something else, or a mark is not on the axis.
         """
         if kind not in ("auto", "points", "lines"):
             raise ValueError(f"kind is {kind!r}; expected 'auto', 'points' or 'lines'")
@@ -188,7 +188,7 @@ class HistoryDisplay:
             one.set_ylabel(with_unit(f"{name}\n{self.quantity}" if self.quantity else name, self.unit))
         for one in self.axes_[-n_columns:] if ax is None else self.axes_:
             date_axis(one, first.index)
-        draw_marks(self.axes_, marks)
+        draw_marks(self.axes_, marks, first.index)
         if len(self.histories) > 1:
             figure_legend(self.axes_, ax is None)
         return self

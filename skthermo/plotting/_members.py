@@ -25,21 +25,25 @@ def structure_axes(ax: Axes, structure: Structure, width: float) -> Axes:
         If two-dimensional axes are given for a structure in space.
     """
     if ax is None:
-        ratio = 0.62 if structure.dimension == 3 else height_of(structure)
+        height = width * height_of(np.array(list(structure.nodes.values()))) + 0.8
         if structure.dimension == 2:
-            return one_axes(None, (width, width * ratio + 0.8))
-        figure = pyplot().figure(figsize=(width, width * ratio))
-        return space_axes(figure)
+            return one_axes(None, (width, height))
+        return space_axes(pyplot().figure(figsize=(width, height)))
     ax = one_axes(ax, (width, width))
     if structure.dimension == 3 and not hasattr(ax, "get_zlim"):
         raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
     return ax
 
 
-def height_of(structure: Structure) -> float:
-    """Height of a plane structure as a share of its width, kept within reason for a figure."""
-    extent = np.ptp(np.array(list(structure.nodes.values())), axis=0)
-    return float(np.clip(extent[1] / max(extent[0], 1e-9), 0.12, 1.6))
+def height_of(points: Array) -> float:
+    """Height of what is seen of points as a share of its width, kept within reason for a figure."""
+    if points.shape[1] == 3:
+        azimuth, elevation = np.radians([AZIMUTH, ELEVATION])
+        across = points[:, 1] * np.cos(azimuth) - points[:, 0] * np.sin(azimuth)
+        away = points[:, 0] * np.cos(azimuth) + points[:, 1] * np.sin(azimuth)
+        points = np.column_stack([across, points[:, 2] * np.cos(elevation) - away * np.sin(elevation)])
+    width, height = np.ptp(points, axis=0)
+    return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
 
 
 def space_axes(figure: Any) -> Axes:
@@ -52,7 +56,9 @@ def set_view(ax: Axes, points: Array, cell: Cell | None) -> None:
     ax.set_axis_off()
     if points.shape[1] == 2:
         ax.set_aspect("equal")
-        ax.margins(0.04, 0.1)
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = 0.03 * (high - low).max()
+        ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
         return
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 0.01 * (high - low).max())

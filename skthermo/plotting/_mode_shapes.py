@@ -178,42 +178,41 @@ class ModeShapesDisplay:
         ModeShapesDisplay
             Itself.
         """
-        cells = self._new_panels(n_columns) if ax is None else [None] * len(self.modes)
-        if ax is not None:
-            self.axes_ = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3))
+        moved = [moved_nodes(self.structure, shape, amplitude) for shape in self.shapes.T]
+        rest = self.structure.nodes
+        points = np.array([place for places in (rest, *moved) for place in places.values()])
+        if ax is None:
+            cells = self._new_panels(n_columns, height_of(points))
+        else:
+            self.axes_, cells = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3)), [None] * len(moved)
         self.figure_ = self.axes_[0].figure
         parts = self._parts(colour)
-        rest = self.structure.nodes
         self.lines_ = []
-        for ax_, cell, mode, shape, frequency in zip(
-            self.axes_, cells, self.modes, self.shapes.T, self.frequencies, strict=True
+        for ax_, cell, mode, places, frequency in zip(
+            self.axes_, cells, self.modes, moved, self.frequencies, strict=True
         ):
             if self.structure.dimension == 3 and not hasattr(ax_, "get_zlim"):
                 raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
-            moved = moved_nodes(self.structure, shape, amplitude)
             for names, part_colour in parts:
                 _, lines, surfaces = sort_members(self.structure, names)
                 if surfaces:
                     add_surfaces(ax_, corners(self.structure, surfaces, rest), facecolors=LIGHT, alpha=0.3)
-                    add_surfaces(ax_, corners(self.structure, surfaces, moved), facecolors=part_colour, alpha=0.3)
+                    add_surfaces(ax_, corners(self.structure, surfaces, places), facecolors=part_colour, alpha=0.3)
                 if lines:
                     add_lines(ax_, corners(self.structure, lines, rest), colors=LIGHT, linewidths=0.8, zorder=1)
             drawn = [
                 add_lines(
-                    ax_, corners(self.structure, lines, moved), colors=part_colour, linewidths=linewidth, zorder=2
+                    ax_, corners(self.structure, lines, places), colors=part_colour, linewidths=linewidth, zorder=2
                 )
                 for names, part_colour in parts
                 if (lines := sort_members(self.structure, names)[1])
             ]
             self.lines_.append(drawn)
             draw_supports(ax_, self.structure, size=7)
-            set_view(ax_, np.array([*rest.values(), *moved.values()]), cell)
-            title = (
-                f"$f_{{{mode + 1}}}$ = {frequency:.3f} Hz"
-                if frequency < 10
-                else (f"$f_{{{mode + 1}}}$ = {frequency:.2f} Hz")
-            )
-            ax_.set_title(title, fontsize="medium", y=title_height(ax_, cell))
+            set_view(ax_, points, cell)
+            ax_.set_title(f"$f_{{{mode + 1}}}$ = {frequency:.{3 if frequency < 10 else 2}f} Hz", fontsize="medium")
+            if cell is not None:
+                ax_.title.set_y(title_height(ax_, cell))
         return self
 
     def _parts(self, colour: str | Mapping[str, str]) -> list[tuple[list[Hashable], str]]:
@@ -226,20 +225,21 @@ class ModeShapesDisplay:
             for group in self.groups
         ]
 
-    def _new_panels(self, n_columns: int) -> list[Cell | None]:
+    def _new_panels(self, n_columns: int, ratio: float) -> list[Cell | None]:
         """Axes of a new figure, and in space the cell of the figure that each of them should fill."""
         n_columns = min(n_columns, len(self.modes))
         n_rows = -(-len(self.modes) // n_columns)
         if self.structure.dimension == 2:
             names = [f"mode {mode + 1}" for mode in self.modes]
-            self.axes_ = panels(None, names, (5.0, 5.0 * height_of(self.structure) + 0.7), n_columns)
+            self.axes_ = panels(None, names, (5.0, 5.0 * ratio + 0.5), n_columns)
             return [None] * len(self.modes)
-        figure = pyplot().figure(figsize=(5.5 * n_columns, 3.1 * n_rows))
+        inches = 5.5 * ratio + 0.5
+        figure = pyplot().figure(figsize=(5.5 * n_columns, inches * n_rows))
         self.axes_ = np.array([space_axes(figure) for _ in self.modes], dtype=object)
         width, height = 1 / n_columns, 1 / n_rows
         places = (divmod(number, n_columns) for number in range(len(self.modes)))
         return [
-            (column * width + GAP, 1 - (row + 1) * height + GAP, width - 2 * GAP, 0.86 * height - GAP)
+            (column * width + GAP, 1 - (row + 1) * height + GAP, width - 2 * GAP, (1 - 0.4 / inches) * height - GAP)
             for row, column in places
         ]
 
@@ -258,9 +258,7 @@ def moved_nodes(structure: Structure, shape: Array, amplitude: float) -> dict[Ha
     return {node: nodes[node] + scale * move for node, move in moves.items()}
 
 
-def title_height(ax: Axes, cell: Cell | None) -> float | None:
+def title_height(ax: Axes, cell: Cell) -> float:
     """Height of a title above the cell of a figure in shares of its axes, which may be larger than the cell."""
-    if cell is None:
-        return None
     place = ax.get_position(original=True)
     return (cell[1] + cell[3] - place.y0) / place.height

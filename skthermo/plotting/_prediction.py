@@ -190,7 +190,7 @@ class PredictionDisplay:
         titles : sequence of str, optional
             Names of the panels; by default those of the columns.
         marks : mapping of str to time or number, optional
-            Vertical lines by their label, for ``kind="time"``.
+            Vertical lines by their label, for ``kind="time"``; on an axis of time, a number is a record's position.
         n_columns : int, optional
             Panels beside each other in a new figure; by default 1 in time and 3 in a scatter plot.
 
@@ -202,7 +202,7 @@ class PredictionDisplay:
         Raises
         ------
         ValueError
-            If ``kind`` is something else.
+            If ``kind`` is something else, or a mark is not on the axis.
         """
         if kind not in ("time", "scatter"):
             raise ValueError(f"kind is {kind!r}; expected 'time' or 'scatter'")
@@ -223,7 +223,7 @@ class PredictionDisplay:
             one.set_ylabel(with_unit(name, self.unit))
         for one in self.axes_[-n_columns:] if ax is None else self.axes_:
             date_axis(one, self.measured.index)
-        draw_marks(self.axes_, marks)
+        draw_marks(self.axes_, marks, self.measured.index)
         figure_legend(self.axes_, ax is None)
         return self
 

@@ -1,5 +1,6 @@
 """Structures with a value for each member."""
 
+import itertools
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +12,9 @@ from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes
 from skthermo.plotting._members import add_lines, add_surfaces, corners, draw_supports, set_view, sort_members
 from skthermo.plotting._members import structure_axes as new_axes
-from skthermo.plotting._style import COLOURS, LIGHT, pyplot
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, pyplot
+
+WIDTH, THIN = 2.5, 0.8
 
 
 class StructureDisplay:
@@ -135,70 +138,79 @@ class StructureDisplay:
         StructureDisplay
             Itself.
         """
-        is_new = ax is None
+        is_own_figure = ax is None
         self.ax_ = new_axes(ax, self.structure, width=9.0)
         self.figure_ = self.ax_.figure
         self.members_: dict[str, Any] = {}
-        self.colorbar_ = None
-        widths = linewidth if isinstance(linewidth, Mapping) else {}
-        width = 2.5 if isinstance(linewidth, Mapping) else float(linewidth)
         if self.values is not None:
+            width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
             self._draw_values(self.values, cmap, limits, width)
         else:
-            self._draw_groups(widths, width)
+            self._draw_groups(linewidth)
         supports = draw_supports(self.ax_, self.structure)
         nodes = np.array(list(self.structure.nodes.values()))
-        cell = (0.03, 0.12, 0.84 if self.values is not None else 0.94, 0.84)
-        set_view(self.ax_, nodes, cell if is_new else None)
-        self._legend(supports)
+        below = 0.9 / self.figure_.get_figheight()
+        cell = (0.03, below, 0.84 if self.members_ and self.values is not None else 0.94, 0.97 - below)
+        set_view(self.ax_, nodes, cell if is_own_figure else None)
+        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure)
+        self._draw_legend(supports, is_own_figure)
         return self
 
     def _draw_values(self, values: Array, cmap: str, limits: tuple[float, float] | None, width: float) -> None:
-
+        """Members in the colours of their values; those without are grey and thin, and surfaces among them left out."""
         known = values[np.isfinite(values)]
         low, high = limits or ((known.min(), known.max()) if known.size else (0.0, 1.0))
         colours = pyplot().get_cmap(cmap).with_extremes(bad=LIGHT)
         of_member = dict(zip(self.structure.members, values, strict=True))
-        _, lines, surfaces = sort_members(self.structure, of_member)
-        for kind, names, add, style in (
-            ("surfaces", surfaces, add_surfaces, {"alpha": 0.6}),
-            ("lines", lines, add_lines, {"linewidths": width}),
-        ):
+        _, lines, surfaces = sort_members(self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m])))
+        surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
+        for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):
             if names:
-                places = corners(self.structure, names, self.structure.nodes)
-                drawn = add(self.ax_, places, cmap=colours, **style)
-                drawn.set_array(np.ma.masked_invalid([of_member[name] for name in names]))
-                drawn.set_clim(low, high)
-                self.members_[kind] = drawn
-        shown = self.members_.get("lines", self.members_.get("surfaces"))
-        shrink = 0.6 if self.structure.dimension == 3 else 0.9
-        self.colorbar_ = self.figure_.colorbar(shown, ax=self.ax_, label=self.label or "", shrink=shrink, pad=0.02)
+                shown = np.ma.masked_invalid([of_member[name] for name in names])
+                widths = np.where(np.ma.getmaskarray(shown), THIN, width)
+                style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
+                self.members_[kind] = add(
+                    self.ax_, corners(self.structure, names, self.structure.nodes), cmap=colours, **style
+                )
+                self.members_[kind].set_array(shown)
+                self.members_[kind].set_clim(low, high)
 
-    def _draw_groups(self, widths: Mapping[str, float], width: float) -> None:
-        groups = self.structure.groups
-        coloured = dict(zip(self.groups or (), COLOURS * 9, strict=False))
+    def _draw_colorbar(self, is_own_figure: bool) -> Any:
+        """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
+        shown = self.members_.get("lines", self.members_.get("surfaces"))
+        place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
+        if is_own_figure and self.structure.dimension == 3:
+            place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
+        return self.figure_.colorbar(shown, label=self.label or "", **place)
+
+    def _draw_groups(self, linewidth: float | Mapping[str, float]) -> None:
+        groups, nodes = self.structure.groups, self.structure.nodes
+        widths = linewidth if isinstance(linewidth, Mapping) else {}
+        width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
+        coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
         rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
-        parts = {
-            "other members": (rest, LIGHT),
-            **{group: (groups[group], colour) for group, colour in coloured.items()},
-        }
+        parts = {"other members": (rest, GREY if not coloured else LIGHT)}
+        parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
         for name, (members, colour) in parts.items():
             _, lines, surfaces = sort_members(self.structure, members)
             if surfaces:
-                places = corners(self.structure, surfaces, self.structure.nodes)
-                self.members_[name] = add_surfaces(self.ax_, places, facecolors=colour, alpha=0.35, label=name)
+                style = {"facecolors": colour, "alpha": 0.35, "label": name}
+                self.members_[name] = add_surfaces(self.ax_, corners(self.structure, surfaces, nodes), **style)
             if lines:
-                places = corners(self.structure, lines, self.structure.nodes)
                 style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
-                self.members_[name] = add_lines(self.ax_, places, **style)
+                self.members_[name] = add_lines(self.ax_, corners(self.structure, lines, nodes), **style)
 
-    def _legend(self, supports: Mapping[str, Any]) -> None:
+    def _draw_legend(self, supports: Mapping[str, Any], is_own_figure: bool) -> None:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
-        if handles:
-            labels = [handle.get_label().replace("_", " ") for handle in handles]
-            self.ax_.legend(
-                handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=5, frameon=False, fontsize="small"
-            )
+        if not handles:
+            return
+        labels = [handle.get_label().replace("_", " ") for handle in handles]
+        style = {"ncols": 5, "frameon": False, "fontsize": "small"}
+        if not is_own_figure:
+            self.ax_.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), **style)
+        else:
+            place = "lower center" if self.structure.dimension == 3 else "outside lower center"
+            self.figure_.legend(handles, labels, loc=place, **style)
 
 
 def values_by_member(structure: Structure, values: Any) -> Array:
