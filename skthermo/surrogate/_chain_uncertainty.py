@@ -146,7 +146,7 @@ class ChainUncertainty:
             options = {} if weights is None else weights_for(last_step(self.mapper_), weights[order][rows][train])
             mapper = clone(last_step(self.mapper_)).fit(inputs[rows][train], theta[rows][train], **options)
             predicted[test], folds[test] = as_columns(mapper.predict(inputs[rows][test])), fold
-        own = as_columns(last_step(self.mapper_).predict(inputs[rows]))
+        own = as_columns(self.mapper_.predict(T))[order][rows]
         values, own = (measured[rows] / self._of_parameters(theta) - 1 for theta in (predicted, own))
         known = ~np.isnan(values).all(axis=1)
         return WeatherResiduals(inputs[rows][known], values[known], own[known], folds[known])
