@@ -25,7 +25,8 @@ MAY_IMPORT = {
     "surrogate": {"fem", "metrics", "preprocessing", "updating"},
     "updating": {"fem", "metrics"},
     "datasets": {"fem"},
-    "studies": {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets"},
+    "plotting": {"fem", "surrogate", "updating", "detection", "metrics", "datasets"},
+    "studies": {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "plotting"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -123,7 +124,7 @@ def test_private_scikit_learn_is_imported_in_one_place(path):
 def test_import_loads_no_optional_package():
     code = (
         "import sys, skthermo, skthermo.fem, skthermo.preprocessing, skthermo.surrogate, skthermo.detection, "
-        "skthermo.metrics, skthermo.datasets, skthermo.updating, skthermo.studies; "
+        "skthermo.metrics, skthermo.datasets, skthermo.updating, skthermo.plotting, skthermo.studies; "
         "print([m for m in ('matplotlib', 'dask', 'distributed', 'hypothesis') if m in sys.modules])"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

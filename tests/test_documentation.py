@@ -34,7 +34,9 @@ def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
 
 
-@pytest.mark.parametrize("room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets"])
+@pytest.mark.parametrize(
+    "room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "plotting"]
+)
 def test_the_reference_lists_every_public_name(room):
     index = (ROOT / "docs" / "api" / "index.rst").read_text()
     listed = re.search(rf"currentmodule:: skthermo\.{room}\n.*?\n\n((?:   \w+\n)+)", index, flags=re.DOTALL)[1].split()

@@ -95,6 +95,32 @@ class ChainUncertainty:
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
+    def expected_residuals(self, X: ArrayLike) -> Any:
+        """Mean relative residual of the training records in weather like that of each row.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            Measured frequency over the out-of-fold prediction, minus 1: what the chain leaves unexplained in such
+            weather. NaN where an input of M2 is missing.
+        """
+        inputs, known = self._weather(X)
+        expected = np.full((len(inputs), len(self.mode_names_)), np.nan)
+        if known.any():
+            expected[known] = self.residuals_.expected(inputs[known])
+        return frame_like(X, expected, self.mode_names_)
+
+    @property
+    def training_records_(self) -> tuple[Any, Any]:
+        """Temperatures and frequencies that `fit` has seen."""
+        check_is_fitted(self)
+        return self._records[:2]
+
     @property
     def residuals_(self) -> WeatherResiduals:
         """Out-of-fold residuals of the training records by weather, computed on first use."""

@@ -16,6 +16,9 @@ DRAWN_FROM = 25
 SPREAD_OF = 100
 """Number of records with the most similar weather whose residuals give the spread."""
 
+COMPARED_WITH = 50
+"""Number of records with the most similar weather that a record's residual is compared with."""
+
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a drawn run of records goes on while it lasts."""
 
@@ -51,6 +54,26 @@ class WeatherResiduals:
     def spread(self, weather: Array) -> Array:
         """Root mean square of the residuals in similar weather, (n_samples, n_modes)."""
         return self._spread(weather, np.ones(len(self.values), dtype=bool))
+
+    def expected(self, weather: Array, rows: NDArray[np.bool_] | None = None) -> Array:
+        """Mean residual of the records, or of some of them, in similar weather, (n_samples, n_modes)."""
+        wanted, expected = self.coordinates.transform(weather), np.full((len(weather), self.values.shape[1]), np.nan)
+        chosen = np.ones(len(self.values), dtype=bool) if rows is None else rows
+        for mode, values in enumerate(self.values.T):
+            known = np.flatnonzero(chosen & ~np.isnan(values))
+            if known.size:
+                near = known[nearest(self.places[known], wanted, COMPARED_WITH)[1]]
+                expected[:, mode] = values[near].mean(axis=1)
+        return expected
+
+    def by_period(self, n_periods: int) -> list[Array]:
+        """Residuals of each of some periods less those expected from the other periods, (n_records, n_modes) each."""
+        parts = []
+        for period in np.array_split(np.arange(len(self.values)), n_periods):
+            others = np.ones(len(self.values), dtype=bool)
+            others[period] = False
+            parts.append(self.values[period] - self.expected(self.weather[period], others))
+        return parts
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""

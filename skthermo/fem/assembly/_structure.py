@@ -85,6 +85,7 @@ class Structure:
         self._groups = {group: _read_group(group, names) for group, names in (groups or {}).items()}
         self._check_groups()
         self.dofs = self._free_dofs(supports)
+        self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
 
     @property
     def dimension(self) -> int:
@@ -105,6 +106,11 @@ class Structure:
     def groups(self) -> dict[str, frozenset]:
         """Members of every named group."""
         return dict(self._groups)
+
+    @property
+    def supports(self) -> dict[Hashable, tuple[str, ...]]:
+        """Fixed directions of every supported node."""
+        return dict(self._supports)
 
     def assemble(
         self,

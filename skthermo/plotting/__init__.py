@@ -1,0 +1,25 @@
+"""Display objects, as scikit-learn has them; matplotlib is imported when something is drawn."""
+
+from skthermo.plotting._damage_index import DamageIndexDisplay
+from skthermo.plotting._fit_report import FitReportDisplay
+from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
+from skthermo.plotting._history import HistoryDisplay
+from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
+from skthermo.plotting._mode_shapes import ModeShapesDisplay
+from skthermo.plotting._pod_curve import PODCurveDisplay
+from skthermo.plotting._prediction import PredictionDisplay
+from skthermo.plotting._sensitivity import SensitivityDisplay
+from skthermo.plotting._structure_display import StructureDisplay
+
+__all__ = [
+    "DamageIndexDisplay",
+    "FitReportDisplay",
+    "FrequencyTemperatureDisplay",
+    "HistoryDisplay",
+    "IdentifiedDamageDisplay",
+    "ModeShapesDisplay",
+    "PODCurveDisplay",
+    "PredictionDisplay",
+    "SensitivityDisplay",
+    "StructureDisplay",
+]

@@ -1,0 +1,109 @@
+"""New axes, or those that the user gives; panels, dates and legends."""
+
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from skthermo.plotting._style import GREY, drawing, pyplot
+
+Axes: TypeAlias = Any
+"""Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
+
+
+def one_axes(ax: Axes, size: tuple[float, float]) -> Axes:
+    """The axes that are given, or those of a new figure.
+
+    Raises
+    ------
+    ValueError
+        If several are given.
+    """
+    if ax is None:
+        return pyplot().subplots(figsize=size, layout="constrained")[1]
+    return panels(ax, ["one display"], size)[0]
+
+
+def panels(
+    ax: Axes, names: Sequence[Any], size: tuple[float, float], n_columns: int = 1, share_x: bool = False
+) -> np.ndarray:
+    """One axes for each name: those that are given, or those of a new figure.
+
+    Raises
+    ------
+    ValueError
+        If the number of axes is not that of the names, or something else is given.
+    """
+    if ax is None:
+        n_columns = min(n_columns, len(names))
+        n_rows = -(-len(names) // n_columns)
+        figure = pyplot().figure(figsize=(size[0] * n_columns, size[1] * n_rows), layout="constrained")
+        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False).ravel()
+        for unused in axes[len(names) :]:
+            unused.remove()
+        for above in axes[max(len(names) - n_columns, 0) : len(names)] if share_x else ():
+            above.tick_params(labelbottom=True)
+        return axes[: len(names)]
+    given = np.ravel(np.asarray(ax, dtype=object))
+    if not all(hasattr(one, "plot") and hasattr(one, "figure") for one in given):
+        raise ValueError(f"ax is {ax!r:.200}; expected matplotlib's axes")
+    if len(given) != len(names):
+        raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
+    return given
+
+
+def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
+    """One legend above all panels of a new figure, or within the first of given axes."""
+    handles, labels = axes[0].get_legend_handles_labels()
+    scale = 2.0 if any(getattr(h, "get_markersize", lambda: 9)() < 4 for h in handles) else 1.0
+    if not handles:
+        return
+    if is_own_figure:
+        axes[0].figure.legend(
+            handles, labels, loc="outside upper center", ncols=n_columns, frameon=False, markerscale=scale
+        )
+    else:
+        axes[0].legend(frameon=False, markerscale=scale, fontsize="small")
+
+
+def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
+    """Ticks and label of an axis of time, or of the number of the record."""
+    if isinstance(index, pd.DatetimeIndex):
+        dates = drawing("matplotlib.dates")
+        locator = dates.AutoDateLocator()
+        ax.xaxis.set_major_locator(locator)
+        ax.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
+        ax.set_xlabel(label or "date")
+    else:
+        ax.set_xlabel(label or str(index.name or "record"))
+
+
+def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Index) -> None:
+    """Vertical lines in all panels, with their labels above the first."""
+    for text, place in (marks or {}).items():
+        for ax in axes:
+            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
+        above = axes[0].get_xaxis_transform()
+        axes[0].text(on_axis(place, index), 1.03, f" {text}", transform=above, fontsize="small")
+
+
+def on_axis(place: Any, index: pd.Index) -> Any:
+    """A time without its time zone, or a number; on an axis of time a number is the position of a record.
+
+    Raises
+    ------
+    ValueError
+        If there is no such record, or the place is a time on an axis of numbers.
+    """
+    is_number = isinstance(place, Real)
+    if not isinstance(index, pd.DatetimeIndex):
+        if not is_number:
+            raise ValueError(f"{place!r} is no number; expected one, since the records have no DatetimeIndex")
+        return place
+    if is_number:
+        if not 0 <= place < len(index):
+            raise ValueError(f"there is no record number {place!r}; expected a time, or 0 to {len(index) - 1}")
+        place = index[int(place)]
+    return pd.Timestamp(place).tz_localize(None).to_datetime64()

@@ -1,0 +1,287 @@
+"""Damage indices of detectors over time."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+from numpy.typing import ArrayLike
+from sklearn.pipeline import Pipeline
+
+from skthermo.detection import MahalanobisDetector
+from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
+from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style
+from skthermo.plotting._tables import as_tables, in_time
+
+
+class DamageIndexDisplay:
+    """Damage index of every record, the threshold above which it is an alarm, and the onset of damage.
+
+    It is best made by `from_estimator`, `from_predictions` or, with a panel for each scenario, `from_scenarios`.
+
+    Parameters
+    ----------
+    scenarios : dict of str to dict of str to DataFrame of shape (n_samples, 1)
+        Damage indices by the title of their panel and by their label.
+    thresholds : dict of str to float
+        Threshold of each panel.
+    onset : time or number, optional
+        When damage began.
+    label : str
+        Label of the vertical axes.
+
+    Attributes
+    ----------
+    axes_ : ndarray of Axes of shape (n_scenarios,)
+        One panel for each scenario.
+    ax_ : Axes
+        The first of them.
+    figure_ : Figure
+        Their figure.
+    points_ : dict of str to list of Line2D
+        Points of each panel, in the order of their labels.
+    threshold_lines_ : list of Line2D
+        Threshold of each panel.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector
+    >>> from skthermo.plotting import DamageIndexDisplay
+    >>> healthy, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.3}))
+    >>> detector = MahalanobisDetector().fit(healthy.frequencies)
+    >>> display = DamageIndexDisplay.from_estimator(
+    ...     detector, {"healthy": healthy.frequencies, "damaged": damaged.frequencies})
+    >>> display.ax_.get_ylabel()
+    'damage index (Mahalanobis, unsquared)'
+    >>> plt.close(display.figure_)
+    """
+
+    def __init__(
+        self,
+        scenarios: Mapping[str, Mapping[str, pd.DataFrame]],
+        thresholds: Mapping[str, float],
+        *,
+        onset: Any = None,
+        label: str = DAMAGE_INDEX,
+    ):
+        self.scenarios = scenarios
+        self.thresholds = thresholds
+        self.onset = onset
+        self.label = label
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator: Any,
+        X: Mapping[str, ArrayLike] | ArrayLike,
+        *,
+        onset: Any = None,
+        **options: Any,
+    ) -> "DamageIndexDisplay":
+        """Draw the damage index that a fitted detector gives to records.
+
+        Parameters
+        ----------
+        estimator : fitted outlier detector
+            A detector of this package, one of scikit-learn's with ``score_samples`` and ``offset_``, or a pipeline
+            that ends with one.
+        X : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such
+            What the detector judges, in Hz for frequencies; several tables by label.
+        onset : time or number, optional
+            When damage began; on an axis of time, a number is the position of a record of the first table.
+        **options : dict
+            Options of `plot`, and ``label`` of `from_predictions`.
+
+        Returns
+        -------
+        DamageIndexDisplay
+
+        Raises
+        ------
+        ValueError
+            If the detector has no scores or no threshold.
+        """
+        last = estimator[-1] if isinstance(estimator, Pipeline) else estimator
+        if not hasattr(estimator, "score_samples"):
+            raise ValueError(f"{estimator!r:.200} has no method 'score_samples'; expected an outlier detector")
+        threshold = getattr(last, "threshold_", None)
+        if threshold is None:
+            threshold = -getattr(last, "offset_", float("nan"))
+        tables = X if isinstance(X, Mapping) else {"records": X}
+        indices = {label: index_of(estimator, records) for label, records in tables.items()}
+        name = DAMAGE_INDEX if isinstance(last, MahalanobisDetector) else "damage index"
+        return cls.from_predictions(indices, threshold, onset=onset, **{"label": name, **options})
+
+    @classmethod
+    def from_predictions(
+        cls,
+        index: Mapping[str, ArrayLike] | ArrayLike,
+        threshold: float,
+        *,
+        onset: Any = None,
+        label: str = DAMAGE_INDEX,
+        **options: Any,
+    ) -> "DamageIndexDisplay":
+        """Draw damage indices.
+
+        Parameters
+        ----------
+        index : array-like or Series of shape (n_samples,), or mapping of str to such
+            Damage index of each record; several by label.
+        threshold : float
+            A damage index above it is an alarm.
+        onset : time or number, optional
+            When damage began; on an axis of time, a number is the position of a record of the first table.
+        label : str, default="damage index (Mahalanobis, unsquared)"
+            Label of the vertical axis.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        DamageIndexDisplay
+
+        Raises
+        ------
+        ValueError
+            If an index is not a column of numbers, or the threshold not a number.
+        """
+        return cls.from_scenarios({"": index}, threshold, onset=onset, label=label, **options)
+
+    @classmethod
+    def from_scenarios(
+        cls,
+        scenarios: Mapping[str, Any],
+        threshold: float | Mapping[str, float],
+        *,
+        onset: Any = None,
+        label: str = DAMAGE_INDEX,
+        **options: Any,
+    ) -> "DamageIndexDisplay":
+        """Draw damage indices, one panel for each scenario.
+
+        Parameters
+        ----------
+        scenarios : mapping of str to index, or to mapping of str to index
+            Damage indices by the title of their panel, and by their label.
+        threshold : float or mapping of str to float
+            A damage index above it is an alarm; one for all panels, or one for each title.
+        onset : time or number, optional
+            When damage began; on an axis of time, a number is the position of a record of the first table.
+        label : str, default="damage index (Mahalanobis, unsquared)"
+            Label of the vertical axes.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        DamageIndexDisplay
+
+        Raises
+        ------
+        ValueError
+            If an index is not a column of numbers, or a threshold missing or not a number.
+        """
+        if not isinstance(scenarios, Mapping) or not scenarios:
+            raise ValueError(f"scenarios is {scenarios!r:.200}; expected a mapping of title to damage index")
+        tables = {
+            title: as_tables(index if isinstance(index, Mapping) else {"records": index}, "damage index", "index")
+            for title, index in scenarios.items()
+        }
+        for by_label in tables.values():
+            for name, table in by_label.items():
+                if table.shape[1] != 1:
+                    raise ValueError(f"damage index {name!r} has {table.shape[1]} columns; expected one")
+        given = threshold if isinstance(threshold, Mapping) else dict.fromkeys(scenarios, threshold)
+        thresholds = {title: as_threshold(given.get(title), title) for title in scenarios}
+        return cls(tables, thresholds, onset=onset, label=label).plot(**options)
+
+    def plot(
+        self,
+        ax: Axes = None,
+        *,
+        n_columns: int = 1,
+        colours: Mapping[str, str] | None = None,
+        threshold_label: str = "threshold",
+        log: bool = False,
+    ) -> "DamageIndexDisplay":
+        """Draw into axes.
+
+        Parameters
+        ----------
+        ax : matplotlib's Axes or array of Axes, optional
+            One for each scenario. A new figure by default.
+        n_columns : int, default=1
+            Panels beside each other in a new figure.
+        colours : mapping of str to str, optional
+            Colours by label; by default those of the palette in their order.
+        threshold_label : str, default="threshold"
+            Legend of the threshold.
+        log : bool, default=False
+            Whether the damage index is drawn on a logarithmic scale.
+
+        Returns
+        -------
+        DamageIndexDisplay
+            Itself.
+
+        Raises
+        ------
+        ValueError
+            If the onset is not on the axis.
+        """
+        titles = list(self.scenarios)
+        width = 9.0 if n_columns == 1 else 4.6
+        height = 3.4 if len(titles) == 1 else 2.6
+        self.axes_ = panels(ax, titles, (width, height), n_columns, share_x=True)
+        self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
+        self.points_, self.threshold_lines_ = {}, []
+        for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
+            self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
+            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": threshold_label}
+            self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
+            if self.onset is not None:
+                first = next(iter(self.scenarios[title].values()))
+                one.axvline(
+                    on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
+                )
+            one.set_title(title)
+            if log:
+                one.set_yscale("log")
+            else:
+                one.set_ylim(bottom=0)
+            if ax is not None or number % n_columns == 0:
+                one.set_ylabel(self.label if height > 3 else self.label.replace(", ", ",\n"))
+        for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
+            date_axis(one, next(iter(self.scenarios[title].values())).index)
+        figure_legend(self.axes_, ax is None, n_columns=5)
+        return self
+
+    @staticmethod
+    def _draw_points(ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Any]:
+        drawn = []
+        for number, (label, table) in enumerate(tables.items()):
+            x, values = in_time(table)
+            style = marker_style(number, len(x))
+            drawn += ax.plot(x, values[:, 0], **{**style, "color": colours.get(label, style["color"])}, label=label)
+        return drawn
+
+
+def index_of(estimator: Any, records: ArrayLike) -> Any:
+    """Damage index of records: a detector's own, or minus its score."""
+    if hasattr(estimator, "damage_index"):
+        return estimator.damage_index(records)
+    index = -estimator.score_samples(records)
+    return pd.Series(index, records.index) if isinstance(records, pd.DataFrame) else index
+
+
+def as_threshold(value: Any, title: str) -> float:
+    """A threshold as a number."""
+    try:
+        threshold = float(value)
+    except (TypeError, ValueError):
+        threshold = float("nan")
+    if not abs(threshold) < float("inf"):
+        raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
+    return threshold

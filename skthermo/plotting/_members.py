@@ -1,0 +1,155 @@
+"""Members of structures as lines and surfaces, and their supports, in two and three dimensions."""
+
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo.fem import Structure
+from skthermo.plotting._axes import Axes, one_axes
+from skthermo.plotting._style import BLACK, drawing, pyplot
+
+TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
+ELEVATION, AZIMUTH = 22, -60
+Cell = tuple[float, float, float, float]
+
+
+def structure_axes(ax: Axes, structure: Structure, width: float) -> Axes:
+    """Axes of the structure's dimension: those that are given, or those of a new figure.
+
+    Raises
+    ------
+    ValueError
+        If two-dimensional axes are given for a structure in space.
+    """
+    if ax is None:
+        height = width * height_of(np.array(list(structure.nodes.values()))) + 0.8
+        if structure.dimension == 2:
+            return one_axes(None, (width, height))
+        return space_axes(pyplot().figure(figsize=(width, height)))
+    ax = one_axes(ax, (width, width))
+    if structure.dimension == 3 and not hasattr(ax, "get_zlim"):
+        raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+    return ax
+
+
+def height_of(points: Array) -> float:
+    """Height of what is seen of points as a share of its width, kept within reason for a figure."""
+    if points.shape[1] == 3:
+        azimuth, elevation = np.radians([AZIMUTH, ELEVATION])
+        across = points[:, 1] * np.cos(azimuth) - points[:, 0] * np.sin(azimuth)
+        away = points[:, 0] * np.cos(azimuth) + points[:, 1] * np.sin(azimuth)
+        points = np.column_stack([across, points[:, 2] * np.cos(elevation) - away * np.sin(elevation)])
+    width, height = np.ptp(points, axis=0)
+    return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
+
+
+def space_axes(figure: Any) -> Axes:
+    """Three-dimensional axes without perspective."""
+    return figure.add_subplot(projection="3d", proj_type="ortho", computed_zorder=False)
+
+
+def set_view(ax: Axes, points: Array, cell: Cell | None) -> None:
+    """Equal scales around the points; in space, new axes are enlarged until the points fill a cell of the figure."""
+    ax.set_axis_off()
+    if points.shape[1] == 2:
+        ax.set_aspect("equal")
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = 0.03 * (high - low).max()
+        ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+        return
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = np.maximum(high - low, 0.01 * (high - low).max())
+    middle = (low + high) / 2
+    limits = np.column_stack([middle - extent / 2, middle + extent / 2])
+    ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
+    ax.set_box_aspect(extent)
+    ax.patch.set_visible(False)
+    if cell is not None:
+        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
+        fill_cell(ax, points, cell)
+
+
+def fill_cell(ax: Axes, points: Array, cell: Cell) -> None:
+    """Place square axes so that the projected points fill a cell (left, bottom, width, height) of the figure."""
+    size = ax.figure.get_size_inches()
+    ax.set_position((0, 0, *(1 / size)))  # one inch, from the lower left corner
+    ax.apply_aspect()
+    project = drawing("mpl_toolkits.mplot3d.proj3d").proj_transform
+    x, y, _ = project(*points.T, ax.get_proj())
+    inches = ax.transData.transform(np.column_stack([x, y])) / ax.figure.dpi
+    low, high = inches.min(axis=0), inches.max(axis=0)
+    place, room = np.array(cell[:2]) * size, np.array(cell[2:]) * size
+    scale = (room / np.maximum(high - low, 1e-9)).min()
+    origin = place + room / 2 - scale * (low + high) / 2
+    ax.set_position((*(origin / size), *(scale / size)))
+
+
+def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[Hashable], ...]:
+    """Names of members that are points, lines and surfaces."""
+    elements = structure.members
+    points: list[Hashable] = []
+    lines: list[Hashable] = []
+    surfaces: list[Hashable] = []
+    for name in names:
+        n_nodes = len(elements[name].nodes)
+        (points if n_nodes == 1 else lines if n_nodes == 2 else surfaces).append(name)
+    return points, lines, surfaces
+
+
+def corners(structure: Structure, names: Iterable[Hashable], places: Mapping[Hashable, Array]) -> list[Array]:
+    """Nodes of every member, (n_nodes, dimension) each."""
+    elements = structure.members
+    return [np.array([places[node] for node in elements[name].nodes]) for name in names]
+
+
+def add_lines(ax: Axes, lines: list[Array], **style: Any) -> Any:
+    """Add a collection of lines in two or three dimensions."""
+    return add_collection(ax, "LineCollection", lines, capstyle="round", **style)
+
+
+def add_surfaces(ax: Axes, surfaces: list[Array], **style: Any) -> Any:
+    """Add a collection of polygons in two or three dimensions."""
+    return add_collection(ax, "PolyCollection", surfaces, edgecolors="none", **style)
+
+
+def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> Any:
+    """Add a collection of the kind that the axes' dimension needs."""
+    is_space = hasattr(ax, "get_zlim")
+    if is_space:
+        factory = getattr(drawing("mpl_toolkits.mplot3d.art3d"), kind.replace("Coll", "3DColl"))
+    else:
+        factory = getattr(drawing("matplotlib.collections"), kind)
+    collection = factory(places, **style)
+    (ax.add_collection3d if is_space else ax.add_collection)(collection)
+    return collection
+
+
+def draw_supports(ax: Axes, structure: Structure, size: float = 11.0) -> dict[str, Any]:
+    """Triangles below nodes whose translations are fixed: filled where all are, open where some are free."""
+    translations = ("x", "y", "z")[: structure.dimension]
+    places: dict[str, list[NDArray]] = {"fixed in every direction": [], "free in some direction": []}
+    for node, along in structure.supports.items():
+        n_fixed = sum(direction in along for direction in translations)
+        if n_fixed:
+            places["fixed in every direction" if n_fixed == len(translations) else "free in some direction"].append(
+                structure.nodes[node]
+            )
+    drawn = {}
+    for label, nodes in places.items():
+        if nodes:
+            face = BLACK if label.startswith("fixed") else "white"
+            drawn[label] = ax.plot(
+                *np.array(nodes).T,
+                linestyle="",
+                marker=TRIANGLE,
+                markersize=size,
+                color=BLACK,
+                markerfacecolor=face,
+                label=label,
+                clip_on=False,
+                zorder=3,
+            )[0]
+    return drawn

@@ -1,0 +1,162 @@
+"""Curves of the probability of detection."""
+
+from typing import Any
+
+import numpy as np
+
+from skthermo._arrays import Array
+from skthermo.plotting._axes import Axes, one_axes
+from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS
+
+NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
+QUANTILE = 1.959964
+N_DRAWN = 200
+
+
+class PODCurveDisplay:
+    """Probability of detection over severity: observed shares, fitted curve and its confidence bounds.
+
+    It is best made by `from_predictions`. Several curves can be drawn into the same axes; each gets its own colour,
+    marker and dashes.
+
+    Parameters
+    ----------
+    curve : PODCurve
+        With the attributes ``severities``, ``n_detected``, ``n_records``, ``a90`` and ``a90_95`` and the method
+        ``predict(severity)``, which returns the probability of detection and its lowest and highest values.
+    label : str, optional
+        Legend of the curve.
+
+    Attributes
+    ----------
+    ax_, figure_ : matplotlib's Axes and Figure
+        Where it is drawn.
+    line_ : Line2D
+        The curve.
+    band_ : PolyCollection
+        Its bounds.
+    errorbar_ : ErrorbarContainer
+        Observed shares with Wilson's intervals of 95 %, which hold for independent records.
+    marks_ : dict of str to Line2D
+        Lines at ``"a90"`` and ``"a90_95"``, where they are finite.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import numpy as np
+    >>> from scipy.special import expit
+    >>> from skthermo.plotting import PODCurveDisplay
+    >>> class Curve:
+    ...     severities, n_detected, n_records = np.array([0.1, 0.2, 0.3]), np.array([10, 50, 95]), 100
+    ...     a90, a90_95 = 0.28, 0.30
+    ...     def predict(self, severity):
+    ...         return tuple(expit(25 * (np.asarray(severity) - middle)) for middle in (0.19, 0.21, 0.17))
+    >>> display = PODCurveDisplay.from_predictions(Curve(), label="bottom")
+    >>> display.ax_.get_xlabel(), display.ax_.get_ylabel(), sorted(display.marks_)
+    ('severity (%)', 'probability of detection (%)', ['a90', 'a90_95'])
+    >>> plt.close(display.figure_)
+    """
+
+    def __init__(self, curve: Any, *, label: str | None = None):
+        self.curve = curve
+        self.label = label
+
+    @classmethod
+    def from_predictions(cls, curve: Any, *, label: str | None = None, **options: Any) -> "PODCurveDisplay":
+        """Draw a curve.
+
+        Parameters
+        ----------
+        curve : PODCurve
+            As in `PODCurveDisplay`.
+        label : str, optional
+            Legend of the curve.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        PODCurveDisplay
+
+        Raises
+        ------
+        ValueError
+            If the curve lacks an attribute or method.
+        """
+        missing = [name for name in NEEDED if not hasattr(curve, name)]
+        if missing:
+            raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
+        return cls(curve, label=label).plot(**options)
+
+    def plot(self, ax: Axes = None, *, colour: str | None = None, marks: bool = True) -> "PODCurveDisplay":
+        """Draw into axes.
+
+        Parameters
+        ----------
+        ax : matplotlib's Axes, optional
+            Those of another curve, for example. A new figure by default.
+        colour : str, optional
+            Colour of the curve; by default the next one of the palette.
+        marks : bool, default=True
+            Whether the severities that are found with a probability of 90 %, and so with a confidence of 95 %, are
+            marked.
+
+        Returns
+        -------
+        PODCurveDisplay
+            Itself.
+        """
+        self.ax_ = one_axes(ax, (6.5, 4.2))
+        self.figure_ = self.ax_.figure
+        number = sum(line.get_gid() == "POD" for line in self.ax_.lines)
+        colour = colour or COLOURS[number % len(COLOURS)]
+        marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
+        severities = np.asarray(self.curve.severities, dtype=float)
+        self._draw_shares(severities, colour, marker)
+        drawn = np.linspace(severities.min(), severities.max(), N_DRAWN)
+        pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
+        style = {"color": colour, "linestyle": dashes, "label": self.label or "fitted curve", "gid": "POD"}
+        self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
+        self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
+        self.marks_ = self._draw_marks(colour) if marks else {}
+        self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
+        self.ax_.legend(frameon=False, fontsize="small", loc="best")
+        return self
+
+    def _draw_shares(self, severities: Array, colour: str, marker: str) -> None:
+        n_detected, n_records, severities = np.broadcast_arrays(
+            np.asarray(self.curve.n_detected, dtype=float), np.asarray(self.curve.n_records, dtype=float), severities
+        )
+        share = n_detected / n_records
+        ends = wilson(n_detected, n_records)
+        errors = 100 * np.abs(np.array(ends) - share)
+        self.errorbar_ = self.ax_.errorbar(
+            *(100 * severities, 100 * share, errors),
+            linestyle="",
+            marker=marker,
+            markersize=5,
+            color=colour,
+            capsize=2,
+            elinewidth=0.8,
+        )
+
+    def _draw_marks(self, colour: str) -> dict[str, Any]:
+        """Vertical lines from the axis up to 90 %."""
+        drawn = {}
+        for name, text, dashes in (("a90", "$a_{90}$", ":"), ("a90_95", "$a_{90/95}$", "-.")):
+            value = getattr(self.curve, name)
+            if value is not None and np.isfinite(value):
+                style = {"color": colour, "linestyle": dashes, "linewidth": 1}
+                label = f"{text} = {100 * value:.1f} %"
+                drawn[name] = self.ax_.plot([100 * value] * 2, [-3, 90], **style, label=label)[0]
+        if drawn and not any(line.get_gid() == "90" for line in self.ax_.lines):
+            self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":", gid="90")
+        return drawn
+
+
+def wilson(n_detected: Array, n_records: Array) -> tuple[Array, Array]:
+    """Wilson's interval of 95 % of a share of independent records."""
+    square = QUANTILE**2
+    middle = (n_detected + square / 2) / (n_records + square)
+    half = QUANTILE / (n_records + square) * np.sqrt(n_detected * (n_records - n_detected) / n_records + square / 4)
+    return middle - half, middle + half

@@ -1,0 +1,236 @@
+"""Structures with a value for each member."""
+
+import itertools
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, real_array
+from skthermo.fem import Structure
+from skthermo.plotting._axes import Axes
+from skthermo.plotting._members import add_lines, add_surfaces, corners, draw_supports, set_view, sort_members
+from skthermo.plotting._members import structure_axes as new_axes
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, pyplot
+
+WIDTH, THIN = 2.5, 0.8
+
+
+class StructureDisplay:
+    """Members of a structure in two or three dimensions, coloured by value or by group, and its supports.
+
+    It is best made by `from_structure`.
+
+    Parameters
+    ----------
+    structure : Structure
+        What is drawn.
+    values : ndarray of shape (n_members,), optional
+        Value of each member in the order of ``structure.members``; NaN draws a member in grey.
+    groups : sequence of str, optional
+        Groups that get a colour each, and a line in the legend.
+    label : str, optional
+        Label of the colour bar, with its unit.
+
+    Attributes
+    ----------
+    ax_, figure_ : matplotlib's Axes and Figure
+        Where it is drawn.
+    members_ : dict
+        Collections of lines and surfaces, by ``"lines"`` and ``"surfaces"`` or by group.
+    colorbar_ : Colorbar or None
+        None without values.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> from skthermo.datasets import kw51_structure
+    >>> from skthermo.plotting import StructureDisplay
+    >>> errors = {"arch": 0.2, "girders": 0.5, "braces": 1.4}
+    >>> display = StructureDisplay.from_structure(kw51_structure(), errors, label="error (%)")
+    >>> display.colorbar_.ax.get_ylabel(), display.members_["lines"].get_clim()
+    ('error (%)', (0.2, 1.4))
+    >>> plt.close(display.figure_)
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        values: Array | None = None,
+        *,
+        groups: Sequence[str] | None = None,
+        label: str | None = None,
+    ):
+        self.structure = structure
+        self.values = values
+        self.groups = groups
+        self.label = label
+
+    @classmethod
+    def from_structure(
+        cls,
+        structure: Structure,
+        values: Mapping[Hashable, float] | ArrayLike | None = None,
+        *,
+        groups: Sequence[str] | None = None,
+        label: str | None = None,
+        **options: Any,
+    ) -> "StructureDisplay":
+        """Draw a structure.
+
+        Parameters
+        ----------
+        structure : Structure
+            Nodes, members, groups and supports.
+        values : mapping of group or member to float, or array-like of shape (n_members,), optional
+            What colours the members. A member's own value comes before its group's; members without a value are grey.
+        groups : sequence of str, optional
+            Without values: groups that get a colour each; the last is drawn on top.
+        label : str, optional
+            Label of the colour bar, with its unit.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        StructureDisplay
+
+        Raises
+        ------
+        ValueError
+            If a group or member is unknown, two groups give a member different values, or the number of values is not
+            that of the members.
+        """
+        if not isinstance(structure, Structure):
+            raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
+        if values is not None and groups is not None:
+            raise ValueError("values and groups are both given; expected one of them to colour the members")
+        for group in groups or ():
+            if group not in structure.groups:
+                raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
+        by_member = None if values is None else values_by_member(structure, values)
+        return cls(structure, by_member, groups=groups, label=label).plot(**options)
+
+    def plot(
+        self,
+        ax: Axes = None,
+        *,
+        cmap: str = "viridis",
+        limits: tuple[float, float] | None = None,
+        linewidth: float | Mapping[str, float] = 2.5,
+    ) -> "StructureDisplay":
+        """Draw into axes.
+
+        Parameters
+        ----------
+        ax : matplotlib's Axes, optional
+            Three-dimensional for a structure in space. A new figure by default.
+        cmap : str, default="viridis"
+            Colour map of the values.
+        limits : tuple of float, optional
+            Values at the ends of the colour map; by default the lowest and the highest.
+        linewidth : float or mapping of group to float, default=2.5
+            Width of lines in points.
+
+        Returns
+        -------
+        StructureDisplay
+            Itself.
+        """
+        is_own_figure = ax is None
+        self.ax_ = new_axes(ax, self.structure, width=9.0)
+        self.figure_ = self.ax_.figure
+        self.members_: dict[str, Any] = {}
+        if self.values is not None:
+            width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
+            self._draw_values(self.values, cmap, limits, width)
+        else:
+            self._draw_groups(linewidth)
+        supports = draw_supports(self.ax_, self.structure)
+        nodes = np.array(list(self.structure.nodes.values()))
+        below = 0.9 / self.figure_.get_figheight()
+        cell = (0.03, below, 0.84 if self.members_ and self.values is not None else 0.94, 0.97 - below)
+        set_view(self.ax_, nodes, cell if is_own_figure else None)
+        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure)
+        self._draw_legend(supports, is_own_figure)
+        return self
+
+    def _draw_values(self, values: Array, cmap: str, limits: tuple[float, float] | None, width: float) -> None:
+        """Members in the colours of their values; those without are grey and thin, and surfaces among them left out."""
+        known = values[np.isfinite(values)]
+        low, high = limits or ((known.min(), known.max()) if known.size else (0.0, 1.0))
+        colours = pyplot().get_cmap(cmap).with_extremes(bad=LIGHT)
+        of_member = dict(zip(self.structure.members, values, strict=True))
+        _, lines, surfaces = sort_members(self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m])))
+        surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
+        for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):
+            if names:
+                shown = np.ma.masked_invalid([of_member[name] for name in names])
+                widths = np.where(np.ma.getmaskarray(shown), THIN, width)
+                style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
+                self.members_[kind] = add(
+                    self.ax_, corners(self.structure, names, self.structure.nodes), cmap=colours, **style
+                )
+                self.members_[kind].set_array(shown)
+                self.members_[kind].set_clim(low, high)
+
+    def _draw_colorbar(self, is_own_figure: bool) -> Any:
+        """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
+        shown = self.members_.get("lines", self.members_.get("surfaces"))
+        place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
+        if is_own_figure and self.structure.dimension == 3:
+            place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
+        return self.figure_.colorbar(shown, label=self.label or "", **place)
+
+    def _draw_groups(self, linewidth: float | Mapping[str, float]) -> None:
+        groups, nodes = self.structure.groups, self.structure.nodes
+        widths = linewidth if isinstance(linewidth, Mapping) else {}
+        width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
+        coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
+        rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
+        parts = {"other members": (rest, GREY if not coloured else LIGHT)}
+        parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
+        for name, (members, colour) in parts.items():
+            _, lines, surfaces = sort_members(self.structure, members)
+            if surfaces:
+                style = {"facecolors": colour, "alpha": 0.35, "label": name}
+                self.members_[name] = add_surfaces(self.ax_, corners(self.structure, surfaces, nodes), **style)
+            if lines:
+                style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
+                self.members_[name] = add_lines(self.ax_, corners(self.structure, lines, nodes), **style)
+
+    def _draw_legend(self, supports: Mapping[str, Any], is_own_figure: bool) -> None:
+        handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
+        if not handles:
+            return
+        labels = [handle.get_label().replace("_", " ") for handle in handles]
+        style = {"ncols": 5, "frameon": False, "fontsize": "small"}
+        if not is_own_figure:
+            self.ax_.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), **style)
+        else:
+            place = "lower center" if self.structure.dimension == 3 else "outside lower center"
+            self.figure_.legend(handles, labels, loc=place, **style)
+
+
+def values_by_member(structure: Structure, values: Any) -> Array:
+    """Value of each member, NaN where there is none."""
+    members, groups = list(structure.members), structure.groups
+    if hasattr(values, "to_dict"):
+        values = values.to_dict()
+    if not isinstance(values, Mapping):
+        array = real_array(values, "values")
+        if array.shape != (len(members),):
+            raise ValueError(f"values has shape {array.shape}; expected ({len(members)},), one for each member")
+        return array
+    found: dict[Hashable, float] = {}
+    for key in [key for key in values if key in groups]:
+        for member in groups[key]:
+            value = float(values[key])
+            if found.setdefault(member, value) != value and member not in values:
+                raise ValueError(f"member {member!r} is in several groups with different values; expected one value")
+    for key in [key for key in values if key not in groups]:
+        if key not in structure.members:
+            raise ValueError(f"values names {key!r}; expected members, or groups among {sorted(groups)}")
+        found[key] = float(values[key])
+    return np.array([found.get(member, np.nan) for member in members])

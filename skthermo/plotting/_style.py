@@ -1,0 +1,61 @@
+"""Colours, markers and labels that all displays share."""
+
+import re
+from collections.abc import Hashable
+from types import ModuleType
+
+from skthermo._optional import import_optional
+
+BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
+BLACK, GREY, LIGHT = "#000000", "#555555", "#BBBBBB"
+
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
+"""Okabe and Ito's palette for colour-blind readers. What is measured is blue, what is predicted or simulated orange."""
+
+MARKERS = ("o", "x", "^", "s", "+", "v", "D")
+LINES = ("-", "--", "-.", ":")
+DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
+
+
+def drawing(module: str) -> ModuleType:
+    """A module of matplotlib, imported when something is drawn."""
+    return import_optional(module, extra="plot")
+
+
+def pyplot() -> ModuleType:
+    """Matplotlib's pyplot."""
+    return drawing("matplotlib.pyplot")
+
+
+def label_of(name: Hashable) -> str:
+    """A column's name as text; f1 becomes a symbol with an index."""
+    text = str(name)
+    found = re.fullmatch(r"([fT])_?(\d+)", text)
+    return f"${found[1]}_{{{found[2]}}}$" if found else text
+
+
+def with_unit(quantity: str, unit: str) -> str:
+    """Label of an axis."""
+    return f"{quantity} ({unit})" if unit else quantity
+
+
+def marker_style(number: int, n_points: int) -> dict[str, object]:
+    """Options of plot for unconnected points: colour, and a marker that tells them apart in greyscale too."""
+    size = 5.0 if n_points <= 100 else 3.5 if n_points <= 1000 else 2.0
+    marker = MARKERS[number % len(MARKERS)]
+    return {
+        "linestyle": "",
+        "marker": marker,
+        "markersize": size,
+        "color": COLOURS[number % len(COLOURS)],
+        "markeredgewidth": 0.8 if marker in "x+" else 0.0,
+    }
+
+
+def line_style(number: int, dashes: int = 0) -> dict[str, object]:
+    """Options of plot for lines: colour, and dashes that tell them apart in greyscale too."""
+    return {
+        "linestyle": LINES[dashes % len(LINES)],
+        "color": COLOURS[number % len(COLOURS)],
+        "linewidth": 1.0,
+    }
