@@ -129,12 +129,6 @@ class ChainUncertainty:
             self._residuals = self._out_of_fold()
         return self._residuals
 
-    @property
-    def training_records_(self) -> tuple[Any, Any]:
-        """Temperatures and frequencies that `fit` was given."""
-        check_is_fitted(self)
-        return self._records[:2]
-
     def _out_of_fold(self) -> WeatherResiduals:
         """Relative residuals of the training records, each predicted by a mapper fitted on other periods of time."""
         T, F, targets, weights = self._records
