@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo.studies._intervals import rate_of
@@ -69,7 +70,7 @@ def damage_index(detector: Any, table: Any, rows: Any) -> pd.Series:
     return pd.Series(-np.asarray(detector.score_samples(table), dtype=float), index=index, name="damage_index")
 
 
-def _mean_wait(alarms: Array, waits: Array, rows: Any) -> Any:
+def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Any) -> Any:
     """Mean time to the first alarm over the repeats that have one, in records or as a Timedelta."""
     detected = alarms[alarms.any(axis=1)].argmax(axis=1)
     if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
