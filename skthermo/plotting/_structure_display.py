@@ -224,12 +224,12 @@ def values_by_member(structure: Structure, values: Any) -> Array:
             raise ValueError(f"values has shape {array.shape}; expected ({len(members)},), one for each member")
         return array
     found: dict[Hashable, float] = {}
+    own = [key for key in values if key not in groups]
     for key in [key for key in values if key in groups]:
-        for member in groups[key]:
-            value = float(values[key])
-            if found.setdefault(member, value) != value and member not in values:
+        for member in groups[key].difference(own):
+            if found.setdefault(member, float(values[key])) != float(values[key]):
                 raise ValueError(f"member {member!r} is in several groups with different values; expected one value")
-    for key in [key for key in values if key not in groups]:
+    for key in own:
         if key not in structure.members:
             raise ValueError(f"values names {key!r}; expected members, or groups among {sorted(groups)}")
         found[key] = float(values[key])
