@@ -1,7 +1,7 @@
 """Structures with a value for each member."""
 
 import itertools
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -189,7 +189,7 @@ class StructureDisplay:
         width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
         coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
         rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
-        parts = {"other members": (rest, GREY if not coloured else LIGHT)}
+        parts: dict[str, tuple[Iterable[Hashable], str]] = {"other members": (rest, GREY if not coloured else LIGHT)}
         parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
         for name, (members, colour) in parts.items():
             _, lines, surfaces = sort_members(self.structure, members)
