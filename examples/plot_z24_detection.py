@@ -207,16 +207,15 @@ def plot_spread(records, inputs):
     return fig
 
 
-def plot_indices(panels, onset):
+def plot_indices(panels, onset, **options):
     """Damage index over time, a panel for each detector and the records that it sees."""
     indices, thresholds = {}, {}
     for title, (detector, records) in panels.items():
         index = records.each(detector.fit(records.baseline).damage_index)
         indices[title] = {label: getattr(index, kind) for kind, (label, _) in KINDS.items()}
         thresholds[title] = detector.threshold_
-    display = DamageIndexDisplay.from_scenarios(
-        indices, thresholds, onset=onset, colours=dict(KINDS.values()), label="damage index"
-    )
+    colours = dict(KINDS.values())
+    display = DamageIndexDisplay.from_scenarios(indices, thresholds, onset=onset, colours=colours, **options)
     display.axes_[-1].set_xlabel("time, by the hour counter of the records")
     return display.figure_
 
@@ -258,7 +257,7 @@ def main():
         "z24_detection": plot_indices(
             {title: (MahalanobisDetector(), seen) for title, seen in mahalanobis.items()}, records.onset
         ),
-        "z24_days": plot_indices(windows, records.onset),
+        "z24_days": plot_indices(windows, records.onset, label="damage index of a day"),
         "z24_spread": plot_spread(records, inputs),
     }
     save(figures, folder)

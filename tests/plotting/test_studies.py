@@ -15,6 +15,7 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay, SensitivityDisplay
+from skthermo.studies import pod_curve
 from skthermo.updating import sensitivity
 
 
@@ -122,6 +123,17 @@ def test_several_curves_in_one_axes_differ_without_colour():
     assert PODCurveDisplay.from_predictions(Curve(0.3, a90_95=None), marks=False).marks_ == {}
     with pytest.raises(ValueError, match=r"SimpleNamespace without \['severities'"):
         PODCurveDisplay.from_predictions(SimpleNamespace())
+
+
+def test_curves_of_strengthenings_and_of_records_without_a_slope():
+    display = PODCurveDisplay.from_predictions(pod_curve([-0.1, -0.2, -0.3], [10, 60, 99], [100] * 3))
+    assert display.line_.get_xdata()[[0, -1]].tolist() == [-30.0, -10.0]
+    assert display.marks_["a90"].get_xdata()[0] == pytest.approx(100 * display.curve.a90)
+    with pytest.warns(UserWarning, match="a90 lies between 0.1 and 0.2"):
+        steep = pod_curve([0.1, 0.2, 0.3], [0, 100, 100], [100] * 3)
+    display = PODCurveDisplay.from_predictions(steep)
+    assert list(display.marks_) == ["bracket"]
+    assert display.marks_["bracket"].get_label() == "$a_{90}$ between 10.0 and 20.0 %"
 
 
 def test_sensitivities_as_a_map_with_numbers():
