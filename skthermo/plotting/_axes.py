@@ -54,6 +54,12 @@ def panels(
     return given
 
 
+def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
+    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
+    n_rows = -(-n_panels // n_columns)
+    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
+
+
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
     """One legend above all panels of a new figure, or within the first of given axes."""
     handles, labels = axes[0].get_legend_handles_labels()
