@@ -16,7 +16,7 @@ from skthermo.studies._bounded_fit import (
 )
 from skthermo.studies._comparison import Comparison
 from skthermo.studies._identified import IdentifiedDamage
-from skthermo.studies._separability import confused_groups, cosines
+from skthermo.studies._separability import confused_groups, cosines, errors_alone
 from skthermo.studies._shift import Shift
 
 N_DRAWS = 500
@@ -38,12 +38,11 @@ def findings(
     errors = redrawn(fit.slopes, fit.slopes @ fit.severities, N_DRAWS, random) - fit.severities
     covariance = errors.T @ errors / N_DRAWS
     p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
-    alone = 1 / np.linalg.norm(fit.slopes, axis=0)
     table = pd.DataFrame(
         {
             "severity": fit.severities,
             "standard_error": np.sqrt(np.diag(covariance)),
-            "error_alone": alone,
+            "error_alone": errors_alone(fit.slopes),
             "p_value": p_values,
             "significant": np.array(p_values) < significance / len(names),
         },
@@ -117,7 +116,7 @@ def _single_fits(comparison: Comparison, names: Sequence[str], shift: Shift) -> 
     return pd.DataFrame(
         {
             "severity": [fit.severities[0] for fit in fits],
-            "standard_error": [1 / np.linalg.norm(fit.slopes[:, 0]) for fit in fits],
+            "standard_error": [errors_alone(fit.slopes)[0] for fit in fits],
             "misfit": [fit.misfit for fit in fits],
             "misfit_p_value": [p_of_misfit(fit, shift.n_periods) for fit in fits],
         },

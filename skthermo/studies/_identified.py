@@ -13,7 +13,7 @@ from skthermo.studies._uncertain import UncertainDamage
 class IdentifiedDamage:
     """Damage that explains a shift of frequencies, with its uncertainty.
 
-    Attributes
+    Parameters
     ----------
     table : DataFrame
         One row a damage group: ``severity``; ``standard_error`` of that estimate; ``error_alone``, the standard error
@@ -32,7 +32,8 @@ class IdentifiedDamage:
     draws : DataFrame
         Severities of the model's groups that would also explain the shift, within its error; one draw a row.
     confused : list of tuple of str
-        Sets of groups of which one has nearly the effect of the others together: only their common effect is known.
+        Sets of groups of which damage in one looks like damage in the others: beside these, the standard error of its
+        severity would be above 10 %, so that only their common effect is known.
     unseen : list of str
         Groups whose severity would have a standard error above 10 %: they are left out.
     members : mapping of str to list of str
@@ -46,6 +47,22 @@ class IdentifiedDamage:
         Error rate of ``significant`` over all groups together.
     converged : bool
         Whether the severities settled.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.studies import identify_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
+    >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["bottom", "top"], random_state=0)
+    >>> print(found.summary())
+    Damage is certain: a healthy structure shows such a shift with probability 0.002.
+    bottom: 1.1% of its stiffness lost (not significant, standard error 0.8%).
+    top: 19.0% of its stiffness lost (standard error 0.7%).
+    >>> found.scenario().name
+    'identified damage'
     """
 
     table: pd.DataFrame

@@ -15,12 +15,9 @@ from skthermo.studies._effects import FrequencyEffects
 from skthermo.studies._findings import doubts, findings
 from skthermo.studies._groups import read_groups
 from skthermo.studies._identified import IdentifiedDamage
-from skthermo.studies._separability import merge_confused
+from skthermo.studies._separability import VISIBLE, errors_alone, merge_confused
 from skthermo.studies._shape_effects import ShapeEffects
 from skthermo.studies._shift import measured_shift
-
-VISIBLE = 0.1
-"""Largest standard error, of the group alone, with which a severity is estimated."""
 
 
 def identify_damage(
@@ -121,7 +118,7 @@ def identify_damage(
         parts.append(_of_shapes(fem, parts[0].effects.theta, of_model, shapes, dofs, shape_noise))
     every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
     slopes = every.slopes()
-    alone = 1 / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+    alone = errors_alone(slopes)
     seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
     if not seen:
         errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))

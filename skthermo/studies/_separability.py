@@ -7,9 +7,8 @@ from scipy.optimize import nnls
 
 from skthermo._arrays import Array
 
-ALIKE = 0.9
-"""Cosine from which effects cannot be told apart: the error of a severity is more than twice that of the group
-alone."""
+VISIBLE = 0.1
+"""Largest standard error with which a severity counts as known."""
 
 PART = 0.25
 """Share of an effect from which another group counts as one of those that imitate it."""
@@ -21,18 +20,26 @@ def cosines(slopes: Array) -> Array:
     return unit.T @ unit
 
 
+def errors_alone(slopes: Array) -> Array:
+    """Standard error of each severity if no other group could be damaged, (n_groups,)."""
+    return 1 / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+
+
 def confused_groups(slopes: Array) -> list[tuple[int, ...]]:
-    """Sets of groups of which one has nearly the effect of the others together, most alike first."""
+    """Sets of groups of which damage in one looks like damage in the others, most alike first.
+
+    What others together imitate adds nothing to the knowledge of a severity: only the rest of its effect counts.
+    """
     found: dict[tuple[int, ...], float] = {}
-    unit = slopes / np.linalg.norm(slopes, axis=0)
+    lengths = np.linalg.norm(slopes, axis=0)
+    unit = slopes / lengths
     for group in range(unit.shape[1] if unit.shape[1] > 1 else 0):
         others = np.delete(np.arange(unit.shape[1]), group)
-        shares, distance = nnls(unit[:, others], unit[:, group])
-        cosine = np.sqrt(max(1 - distance**2, 0.0))
-        if cosine >= ALIKE:
+        shares, rest = nnls(unit[:, others], unit[:, group])
+        if rest * lengths[group] * VISIBLE < 1:
             members = tuple(sorted([group, *others[shares >= PART].tolist()]))
-            found[members] = max(cosine, found.get(members, 0.0))
-    return sorted(found, key=lambda members: -found[members])
+            found[members] = min(rest, found.get(members, 1.0))
+    return sorted((members for members in found if len(members) > 1), key=lambda members: found[members])
 
 
 def merge_confused(slopes: Array, members: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:

@@ -179,7 +179,7 @@ def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.residuals_.values
+    records = fem.residuals_.noise
     for row in (noisy / clean - 1).to_numpy():
         assert np.isclose(records, row, rtol=0, atol=1e-12, equal_nan=True).all(axis=1).any()
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
