@@ -116,6 +116,12 @@ class ChainUncertainty:
         return frame_like(X, expected, self.mode_names_)
 
     @property
+    def training_records_(self) -> tuple[Any, Any]:
+        """Temperatures and frequencies that `fit` was given."""
+        check_is_fitted(self)
+        return self._records[:2]
+
+    @property
     def residuals_(self) -> WeatherResiduals:
         """Out-of-fold residuals of the training records by weather, computed on first use."""
         check_is_fitted(self)
