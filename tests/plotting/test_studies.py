@@ -195,6 +195,10 @@ def test_identified_damage_is_drawn_in_percent_with_two_standard_errors():
     assert severities.get_xlabel() == "severity (%)"
     assert display.image_.get_clim() == (-1, 1)
     assert collinearity.get_title() == "cosine between groups"
+    assert not severities.texts
+    given.unseen = ["vertical"]
+    text = IdentifiedDamageDisplay.from_predictions(given).axes_[0].texts[0].get_text()
+    assert text == "left out, as these modes do not show them: vertical"
 
 
 def test_incomplete_results_are_named():
