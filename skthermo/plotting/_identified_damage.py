@@ -26,8 +26,8 @@ class IdentifiedDamageDisplay:
     ----------
     identified : IdentifiedDamage
         With the frames ``table`` (groups in rows; severity, standard_error, significant), ``shifts`` (modes in rows;
-        measured, explained, standard_error; relative) and ``similarity`` (cosine between groups); and, if it has them, the
-        names ``unseen`` of groups that are left out.
+        measured, explained, standard_error; relative) and ``similarity`` (cosine between groups), and perhaps the names
+        ``unseen`` of groups that are left out.
 
     Attributes
     ----------
