@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo.plotting._style import GREY, drawing, pyplot
+from skthermo.plotting._style import GREY, drawing, label_of, pyplot
 
 Axes: TypeAlias = Any
 """Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
@@ -52,6 +52,19 @@ def panels(
     if len(given) != len(names):
         raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
     return given
+
+
+def panel_names(titles: Sequence[str] | None, columns: Sequence[Any]) -> list[str]:
+    """Names of the panels: those that are given, or those of the columns.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many titles as columns.
+    """
+    if titles is not None and len(titles) != len(columns):
+        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
+    return [label_of(name) for name in (columns if titles is None else titles)]
 
 
 def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:

@@ -174,6 +174,8 @@ def test_tables_that_do_not_fit_are_refused(later):
         PredictionDisplay.from_predictions(F, F[1:])
     with pytest.raises(ValueError, match="measured has 6 columns and predicted 5"):
         PredictionDisplay.from_predictions(F, F.iloc[:, :5])
+    with pytest.raises(ValueError, match=r"titles is \['a'\]; expected 6"):
+        PredictionDisplay.from_predictions(F, F, titles=["a"])
     with pytest.raises(ValueError, match="kind is 'bar'"):
         PredictionDisplay.from_predictions(F, F, kind="bar")
     with pytest.raises(ValueError, match="different indices"):

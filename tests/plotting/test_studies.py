@@ -61,6 +61,9 @@ def test_a_panel_for_each_scenario():
     np.testing.assert_array_equal(display.points_["SH-0"][1].get_ydata(), index + 1)
     np.testing.assert_array_equal(display.points_["SB-30"][0].get_ydata(), 3 * index)
     assert display.axes_[0].get_ylim()[0] == 0
+    for ax in DamageIndexDisplay.from_scenarios(scenarios, 2.0, log=True, colours={"true": "#555555"}).axes_:
+        assert ax.get_yscale() == "log"
+        assert ax.lines[0].get_color() in ("#555555", "#0072B2")
 
 
 @pytest.mark.parametrize(
@@ -192,6 +195,10 @@ def test_identified_damage_is_drawn_in_percent_with_two_standard_errors():
     assert severities.get_xlabel() == "severity (%)"
     assert display.image_.get_clim() == (-1, 1)
     assert collinearity.get_title() == "cosine between groups"
+    assert not severities.texts
+    given.unseen = ["vertical"]
+    text = IdentifiedDamageDisplay.from_predictions(given).axes_[0].texts[0].get_text()
+    assert text == "left out, as these modes do not show them: vertical"
 
 
 def test_incomplete_results_are_named():
