@@ -41,7 +41,7 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     start = times.min() if scenario.onset is None else time_of(rows, scenario.onset, "onset")
     order = np.argsort(times, kind="stable")
     order = order[times[order] >= start]
-    rate = rate_of(decisions[:, order], **options)
+    rate = rate_of(decisions[:, order], whole_repeats=scenario.n_draws > 1, **options)
     band = band_of(decisions[:, order], options["confidence"])
     if not rate.n_records:
         raise ValueError(
