@@ -42,12 +42,12 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     order = np.argsort(times, kind="stable")
     order = order[times[order] >= start]
     rate = rate_of(decisions[:, order], whole_repeats=scenario.n_draws > 1, **options)
-    band = band_of(decisions[:, order], options["confidence"])
     if not rate.n_records:
         raise ValueError(
             f"none of {decisions.shape[1]} records of scenario {scenario.name!r}, source {source!r}, can be judged: "
             "they lack what the detector needs, or are before the onset; expected some that it can judge"
         )
+    band = band_of(decisions[:, order], options["confidence"])
     return {
         "scenario": scenario.name,
         "family": scenario.family,
