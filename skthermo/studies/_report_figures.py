@@ -1,0 +1,183 @@
+"""Drawings of a report, as SVG within the page."""
+
+import textwrap
+import warnings
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arrays import as_floats
+from skthermo._optional import import_optional
+from skthermo.detection import MahalanobisDetector
+from skthermo.plotting import (
+    DamageIndexDisplay,
+    FrequencyTemperatureDisplay,
+    HistoryDisplay,
+    IdentifiedDamageDisplay,
+    PODCurveDisplay,
+    StructureDisplay,
+)
+from skthermo.studies._report_findings import Finding
+from skthermo.studies._report_html import Html, image
+from skthermo.studies._report_numbers import percent, shortened, tested
+
+WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
+MANY_POINTS = 1000
+"""Number of points of one line from which on it is drawn as pixels."""
+
+SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 200}
+
+
+def draw(make: Callable[[], Any], alt: str, title: str = "", height: float = HEIGHT, width: float = WIDTH) -> Html:
+    """A display as an image of fixed width, in matplotlib's own style and on white.
+
+    Parameters
+    ----------
+    make : callable
+        Returns the display.
+    alt : str
+        What the drawing shows.
+    title : str, default=""
+        Of its first axes.
+    height, width : float
+        In inches.
+
+    Returns
+    -------
+    Html
+    """
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    others = set(plt.get_fignums())
+    try:
+        with plt.style.context("default"), plt.rc_context(SETTINGS):
+            display = make()
+            display.figure_.set_size_inches(width, height)
+            if title:
+                display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
+            return image(_svg(display.figure_), alt)
+    finally:
+        for number in set(plt.get_fignums()) - others:
+            plt.close(number)
+
+
+def _svg(figure: Any) -> bytes:
+    """A figure as SVG: letters as shapes or, if the font lacks some, as text in fonts of the reader."""
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    parser = import_optional("matplotlib.mathtext", extra="plot").MathTextParser("path")
+    for text in figure.findobj(lambda artist: hasattr(artist, "set_parse_math")):
+        text.set_parse_math(_is_formula(text.get_text(), parser))
+    for line in figure.findobj(lambda artist: hasattr(artist, "get_xdata")):
+        line.set_rasterized(len(line.get_xdata()) > MANY_POINTS)
+    drawn = b""
+    for letters in ("path", "none"):
+        buffer = BytesIO()
+        with warnings.catch_warnings(record=True) as caught, plt.rc_context({"svg.fonttype": letters}):
+            warnings.simplefilter("always")
+            figure.savefig(buffer, format="svg", metadata={"Date": None})
+        drawn = buffer.getvalue()
+        if not any("missing from" in str(warning.message) for warning in caught):
+            break
+    return drawn
+
+
+def _is_formula(text: str, parser: Any) -> bool:
+    """Whether matplotlib can read a text with dollar signs."""
+    try:
+        parser.parse(text)
+    except ValueError:
+        return False
+    return True
+
+
+def histories(F: pd.DataFrame) -> list[Html]:
+    """Measured frequencies over time, one drawing for each mode."""
+    drawn = []
+    for mode in range(F.shape[1]):
+        table = F.iloc[:, [mode]]
+        low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
+        alt = (
+            f"Measured frequency {F.columns[mode]} over time: between {shortened(low, 4)} and {shortened(high, 4)} Hz."
+        )
+        drawn.append(draw(lambda t=table: HistoryDisplay.from_predictions(t), alt, height=2.2))
+    return drawn
+
+
+def over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: pd.DataFrame) -> list[Html]:
+    """Measured and predicted frequencies over one temperature, one drawing for each mode."""
+    drawn = []
+    for mode in range(measured.shape[1]):
+        tables = temperature, measured.iloc[:, [mode]], predicted.iloc[:, [mode]]
+        alt = (
+            f"Frequency {measured.columns[mode]} over the temperature {temperature.name}, measured and predicted by "
+            "the model."
+        )
+        drawn.append(draw(lambda t=tables: FrequencyTemperatureDisplay.from_predictions(*t), alt))
+    return drawn
+
+
+def curve(finding: Finding) -> Html:
+    """Probability of detection of one family of scenarios."""
+    fitted = finding.curve
+    is_curve = bool(np.isfinite(fitted.slope))
+    rates = ", ".join(
+        f"{percent(rate)} at {tested(severity)}"
+        for severity, rate in zip(finding.severities, finding.rates, strict=True)
+    )
+    alt = f"Share of records in alarm over the severity of {finding.family}: {rates}."
+    label = "fitted curve" if is_curve else "no curve can be fitted"
+    return draw(lambda: PODCurveDisplay.from_predictions(fitted, label=label), alt, str(finding.family), 3.2)
+
+
+def damage_indices(study: Any, shown: dict[str, Any], title: str, onset: Any = None) -> Html:
+    """Damage index of some scenarios over time, and the threshold of the alarm."""
+    last = study.detector_[-1] if hasattr(study.detector_, "steps") else study.detector_
+    options = {} if isinstance(last, MahalanobisDetector) else {"label": "damage index"}
+    threshold = study.threshold_
+    above = "; ".join(
+        f"{name}: {percent(float((index.dropna() > threshold).mean()))} of the records above the threshold"
+        for name, index in shown.items()
+    )
+
+    def make() -> DamageIndexDisplay:
+        return DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, **options)
+
+    return draw(make, f"Damage index over time. {above}.", title, 3.4)
+
+
+def groups_of(structure: Any, families: list[str]) -> Html:
+    """Where the damage groups are."""
+    known = [family for family in families if family in structure.groups]
+    alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
+    make: Callable[[], Any] = lambda: StructureDisplay.from_structure(structure, groups=known)  # noqa: E731
+    figure = make().figure_
+    size = figure.get_size_inches() * 7.0 / 9.0
+    import_optional("matplotlib.pyplot", extra="plot").close(figure)
+    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.4)
+
+
+def identified_damage(identified: Any) -> Html:
+    """Severities, shifts and likeness of the groups, one below the other."""
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    n_groups = len(identified.table)
+    heights = [1.2 + 0.45 * n_groups, 2.8, 3.4]
+
+    def make() -> IdentifiedDamageDisplay:
+        axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
+        return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
+
+    severities = ", ".join(
+        f"{group} {percent(row['severity'])}" for group, row in identified.table.iterrows() if row["severity"] > 0
+    )
+    alt = f"Identified severities ({severities or 'none'}), measured and explained shifts, and likeness of the groups."
+    return draw(make, alt, height=sum(heights))
+
+
+def chosen_sensor(T: pd.DataFrame, F: pd.DataFrame) -> pd.Series:
+    """The temperature that goes most closely with the frequencies."""
+    X, y = as_floats(T), as_floats(F)
+    both = pd.DataFrame(np.hstack([X, y])).corr().to_numpy()[: X.shape[1], X.shape[1] :]
+    closeness = np.nan_to_num(np.abs(both)).mean(axis=1)
+    return T.iloc[:, int(closeness.argmax())]

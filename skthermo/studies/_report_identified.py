@@ -1,0 +1,84 @@
+"""Section of a report on identified damage."""
+
+from typing import Any
+
+import numpy as np
+
+from skthermo.studies import _report_figures as figures
+from skthermo.studies._report_html import Html, bullets, element, figure, paragraphs, section, table
+from skthermo.studies._report_numbers import listed, percent, probability
+
+UNLIKELY = 0.05
+
+
+def identified_damage(identified: Any) -> Html:
+    """Where damage is, how severe, what it explains, and what cannot be said."""
+    found = identified.table
+    rows = [
+        [
+            group,
+            percent(row["severity"]) if np.isfinite(row["severity"]) else "cannot be seen",
+            f"± {percent(2 * row['standard_error'])}" if np.isfinite(row["standard_error"]) else "",
+            probability(row["p_value"]) if np.isfinite(row["severity"]) else "",
+            "yes" if row["significant"] else "no",
+        ]
+        for group, row in found.iterrows()
+    ]
+    shifts = [
+        [
+            mode,
+            *(f"{100 * row[name]:+.2f} %" for name in ("measured", "explained")),
+            f"± {200 * row['standard_error']:.2f} %",
+        ]
+        for mode, row in identified.shifts.iterrows()
+    ]
+    parts = [
+        paragraphs(
+            "Records of the structure as it is now were compared with what the healthy structure would do in the same "
+            "weather. The severities below explain how the frequencies have shifted."
+        ),
+        bullets(_findings(identified)),
+        table(
+            "Identified damage: share of the stiffness that is lost, and its uncertainty (two standard errors). The "
+            "probability is that of such a severity, or a larger one, by chance in a healthy structure.",
+            ["Group", "Severity", "Uncertainty", "Probability by chance", "Beyond doubt"],
+            rows,
+        ),
+        table(
+            "Mean shift of each natural frequency: measured, and explained by the identified damage.",
+            ["Mode", "Measured", "Explained", "Uncertainty of the measured shift"],
+            shifts,
+        ),
+        element("h3", "What cannot be said"),
+        bullets(_limits(identified)) or paragraphs("All groups can be seen and told apart by the measured modes."),
+        figure(
+            "Severity of each group; shift of each natural frequency, measured and explained; and how alike the "
+            "effects of the groups are: 1 means that two groups have the same effect on all modes and cannot be told apart.",
+            [figures.identified_damage(identified)],
+        ),
+    ]
+    return section("identified", "Identified damage", *parts)
+
+
+def _findings(identified: Any) -> list[str]:
+    found = identified.table[identified.table["significant"].astype(bool)]
+    sentences = [
+        f"{group} has lost {percent(row['severity'])} of its stiffness (± {percent(2 * row['standard_error'])})."
+        for group, row in found.iterrows()
+    ]
+    return sentences or ["No group is damaged beyond doubt."]
+
+
+def _limits(identified: Any) -> list[str]:
+    sentences = [f"{listed(groups)} cannot be told apart by these modes." for groups in identified.confused]
+    if len(identified.unseen):
+        sentences.append(f"Damage in {listed(identified.unseen)} cannot be seen in these modes.")
+    misfit = float(identified.misfit_p_value)
+    if np.isnan(misfit):
+        sentences.append("There are no more modes than groups, so that any shift can be explained: it proves little.")
+    elif misfit < UNLIKELY:
+        sentences.append(
+            "Damage of these groups does not explain all shifts, so that something else has changed too (the "
+            f"probability of such a misfit by chance is {probability(misfit)})."
+        )
+    return sentences
