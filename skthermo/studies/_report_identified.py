@@ -52,8 +52,8 @@ def identified_damage(identified: Any) -> Html:
         element("h3", "What cannot be said"),
         bullets(_limits(identified)) or paragraphs("All groups can be seen and told apart by the measured modes."),
         figure(
-            "Severity of each group; shift of each natural frequency, measured and explained; and how alike the "
-            "effects of the groups are: 1 means that two groups have the same effect on all modes and cannot be told apart.",
+            "Severity of each group; shift of each natural frequency, measured and explained; and how alike "
+            "the effects of the groups are: 1 means that two groups change all modes alike and cannot be told apart.",
             [figures.identified_damage(identified)],
         ),
     ]
