@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from sklearn.pipeline import Pipeline
 
+from skthermo.detection import MahalanobisDetector
 from skthermo.studies import _report_figures as figures
 from skthermo.studies._report_findings import LEVEL, Finding
 from skthermo.studies._report_html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
@@ -53,11 +55,18 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     results = study.results_
     scenarios = {scenario.name: scenario for scenario in study.scenarios}
     has_truth = (results["source"] == TRUE).any()
-    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds", "Records", "Time to the first alarm"]
+    columns = [
+        "Scenario",
+        "What is changed",
+        "Records in alarm",
+        "Bounds",
+        "Records judged",
+        "Mean time to the first alarm",
+    ]
     cells = [
         [
-            row["scenario"] + (" (measured)" if row["source"] == TRUE else ""),
-            described(scenarios.get(row["scenario"])),
+            row["scenario"] + (" (reference)" if row["source"] == TRUE else ""),
+            element("span", described(scenarios.get(row["scenario"])), class_="text"),
             bar(row["rate"], percent(row["rate"])),
             between(row["lowest"], row["highest"]),
             f"{row['n_records']:,}",
@@ -65,14 +74,14 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         ]
         for _, row in results.iterrows()
     ]
-    measured = " Rows called measured are records of the true structure, with which the simulations are compared."
+    reference = " Rows called reference are of records that were given to compare the simulations with."
     introduction = (
         "Every scenario was simulated in the same weather, "
         f"{counted(int(results['n_repeats'].max()), 'time')}, each time with other scatter of the measurements. For "
         "the healthy structure, alarms are false and should be few; for a damaged one, they should be many."
     )
     if has_truth:
-        introduction += measured
+        introduction += reference
     parts = [paragraphs(introduction), table("Alarms in every scenario.", columns, cells)]
     curves = [figures.curve(found) for found in findings if found.curve is not None]
     if curves:
@@ -86,13 +95,14 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         )
     )
     drawn = _damage_indices(study, findings, scenarios)
+    distance = " The index is the Mahalanobis distance, not squared." if _is_mahalanobis(study.detector_) else ""
     if drawn:
         parts.append(element("h3", "What the alarm system sees"))
     parts.append(
         figure(
             "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
             "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
-            "records of the damaged structure above.",
+            f"records of the damaged structure above.{distance}",
             drawn,
         )
     )
@@ -127,6 +137,10 @@ def _change(severity: float) -> str:
 
 def _place(onset: Any) -> str:
     return f"record {onset}" if isinstance(onset, int | np.integer) else f"{pd.Timestamp(onset):%Y-%m-%d %H:%M}"
+
+
+def _is_mahalanobis(detector: Any) -> bool:
+    return isinstance(detector[-1] if isinstance(detector, Pipeline) else detector, MahalanobisDetector)
 
 
 def _sentence(found: Finding) -> Html:
@@ -179,5 +193,5 @@ def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str
     for name in shown[:MOST_LISTED]:
         indices = {scenario: study.indices_[scenario, SIMULATED] for scenario in (*healthy, name)}
         onset = scenarios[name].onset if name in scenarios else None
-        drawn.append(figures.damage_indices(study, indices, name, onset))
+        drawn.append(figures.damage_indices(study, indices, onset))
     return drawn

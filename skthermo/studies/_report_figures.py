@@ -11,7 +11,6 @@ import pandas as pd
 
 from skthermo._arrays import as_floats
 from skthermo._optional import import_optional
-from skthermo.detection import MahalanobisDetector
 from skthermo.plotting import (
     DamageIndexDisplay,
     FrequencyTemperatureDisplay,
@@ -31,7 +30,15 @@ MANY_POINTS = 1000
 SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 200}
 
 
-def draw(make: Callable[[], Any], alt: str, title: str = "", height: float = HEIGHT, width: float = WIDTH) -> Html:
+def draw(
+    make: Callable[[], Any],
+    alt: str,
+    title: str = "",
+    *,
+    height: float = HEIGHT,
+    width: float = WIDTH,
+    n_columns: int = 2,
+) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
 
     Parameters
@@ -44,6 +51,8 @@ def draw(make: Callable[[], Any], alt: str, title: str = "", height: float = HEI
         Of its first axes.
     height, width : float
         In inches.
+    n_columns : int, default=2
+        Of its legend.
 
     Returns
     -------
@@ -55,6 +64,8 @@ def draw(make: Callable[[], Any], alt: str, title: str = "", height: float = HEI
         with plt.style.context("default"), plt.rc_context(SETTINGS):
             display = make()
             display.figure_.set_size_inches(width, height)
+            for legend in display.figure_.legends:
+                legend.set_ncols(n_columns)
             if title:
                 display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
             return image(_svg(display.figure_), alt)
@@ -127,14 +138,19 @@ def curve(finding: Finding) -> Html:
         for severity, rate in zip(finding.severities, finding.rates, strict=True)
     )
     alt = f"Share of records in alarm over the severity of {finding.family}: {rates}."
-    label = "fitted curve" if is_curve else "no curve can be fitted"
-    return draw(lambda: PODCurveDisplay.from_predictions(fitted, label=label), alt, str(finding.family), 3.2)
+    title = finding.family if is_curve else f"{finding.family}: no curve can be fitted"
+
+    def make() -> PODCurveDisplay:
+        display = PODCurveDisplay.from_predictions(fitted, label="fitted curve")
+        if not is_curve:
+            display.ax_.get_legend().remove()
+        return display
+
+    return draw(make, alt, title, height=3.2)
 
 
-def damage_indices(study: Any, shown: dict[str, Any], title: str, onset: Any = None) -> Html:
+def damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
-    last = study.detector_[-1] if hasattr(study.detector_, "steps") else study.detector_
-    options = {} if isinstance(last, MahalanobisDetector) else {"label": "damage index"}
     threshold = study.threshold_
     above = "; ".join(
         f"{name}: {percent(float((index.dropna() > threshold).mean()))} of the records above the threshold"
@@ -142,9 +158,9 @@ def damage_indices(study: Any, shown: dict[str, Any], title: str, onset: Any = N
     )
 
     def make() -> DamageIndexDisplay:
-        return DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, **options)
+        return DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
 
-    return draw(make, f"Damage index over time. {above}.", title, 3.4)
+    return draw(make, f"Damage index over time. {above}.", height=3.4)
 
 
 def groups_of(structure: Any, families: list[str]) -> Html:
@@ -153,9 +169,9 @@ def groups_of(structure: Any, families: list[str]) -> Html:
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
     make: Callable[[], Any] = lambda: StructureDisplay.from_structure(structure, groups=known)  # noqa: E731
     figure = make().figure_
-    size = figure.get_size_inches() * 7.0 / 9.0
+    size = figure.get_size_inches() * 6.5 / 9.0
     import_optional("matplotlib.pyplot", extra="plot").close(figure)
-    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.4)
+    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5, n_columns=3)
 
 
 def identified_damage(identified: Any) -> Html:

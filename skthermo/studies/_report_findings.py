@@ -65,6 +65,8 @@ class Finding:
         """Its bounds, for a table."""
         if np.isnan(self.lowest):
             return f"above {self.largest}"
+        if self.lowest == self.highest:
+            return tested(self.lowest)
         upper = tested(self.highest) if np.isfinite(self.highest) else f"above {self.largest}"
         return f"{tested(self.lowest)} to {upper}"
 
@@ -103,7 +105,7 @@ class Finding:
                 return ""
             return f"The limit lies between {tested(low)} and {tested(high)}; nothing in between was tested."
         a90, a90_95 = self._on_curve(self.curve.a90), self._on_curve(self.curve.a90_95)
-        return f"A curve through the tested severities gives {a90}, and {a90_95} with 95 % confidence."
+        return f"A curve through the tested severities puts this limit at {a90} and, with 95 % confidence, at {a90_95}."
 
     def _on_curve(self, severity: float) -> str:
         """A severity within those that were tested; beyond them a curve is a guess."""

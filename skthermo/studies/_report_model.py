@@ -13,6 +13,8 @@ from skthermo.studies._report_numbers import counted, percent, period, shortened
 from skthermo.studies._simulate import SIMULATED, TRUE
 
 MOST_PREDICTED = 1000
+LARGE_OFFSET = 15.0  # percent
+LARGE_DEVIATION, MANY_OUTSIDE = 0.5, 0.05
 
 
 def monitored(study: Any, structure: Any, families: list[str]) -> Html:
@@ -61,8 +63,6 @@ def quality(study: Any) -> Html:
         for i, (name, deviation) in enumerate(report.deviations.items())
     ]
     error, mean = report.errors["MAPE"].mean(), report.errors["MAPE of the mean"].mean()
-    doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
-    doubts += [f"{message}." for _, message in report.warnings()]
     measured, predicted, temperature = _over_temperature(study.fem, T, F)
     sensor = temperature.name
     parts = [
@@ -93,7 +93,7 @@ def quality(study: Any) -> Html:
             parameters,
         ),
         element("h3", "What is doubtful"),
-        bullets(doubts) or paragraphs("Nothing was doubtful about the records."),
+        bullets(_doubts(report)) or paragraphs("Nothing is doubtful about the records, the modes or the stiffnesses."),
         *_agreement(study.results_),
     ]
     return section("model", "How good the model is", *parts)
@@ -106,6 +106,29 @@ def training_tables(fem: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
     names = column_names(T, "T"), column_names(F, "f")
     first, second = (pd.DataFrame(as_floats(t), index, [str(n) for n in c]) for t, c in zip((T, F), names, strict=True))
     return first, second
+
+
+def _doubts(report: Any) -> list[str]:
+    """Records, modes and parameters that are doubtful, in sentences."""
+    doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
+    doubts += [f"{message}." for _, message in report.warnings()]
+    for mode, error in report.errors.iterrows():
+        if not error["MAPE"] < error["MAPE of the mean"]:
+            doubts.append(f"The model predicts mode {mode} no better than its mean frequency does.")
+    for mode, offset in report.offsets.items():
+        if abs(offset) > LARGE_OFFSET:
+            doubts.append(f"Mode {mode} is {offset:+.0f} % from the model before it learned; it may be another mode.")
+    for name, deviation in report.deviations.items():
+        if not deviation < LARGE_DEVIATION:
+            doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")
+        elif report.outside[name] > MANY_OUTSIDE:
+            share = percent(report.outside[name])
+            doubts.append(
+                f"The stiffness {name} is outside the range that was thought possible in {share} of the records."
+            )
+    if report.n_unconverged:
+        doubts.append(f"The stiffnesses of {counted(report.n_unconverged, 'record')} could not be found exactly.")
+    return doubts
 
 
 def _ranges(values: pd.DataFrame, unit: str, digits: int) -> list[list[str]]:
@@ -138,18 +161,23 @@ def _over_temperature(fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.Da
 def _agreement(results: pd.DataFrame) -> list[Html]:
     """Simulated and true rates side by side, where there are both."""
     rates = results.pivot(index="scenario", columns="source", values="rate").reindex(results["scenario"].unique())
-    heading = element("h3", "Do simulated and measured alarms agree?")
+    heading = element("h3", "Do the simulations agree with other records?")
     if TRUE not in rates:
-        return [heading, paragraphs("No records of the damaged structure were given to compare the simulations with.")]
+        return [heading, paragraphs("No other records were given to compare the simulations with.")]
     both = rates.dropna()
     gaps = 100 * (both[SIMULATED] - both[TRUE])
     cells = [
         [name, percent(row[SIMULATED]), percent(row[TRUE]), f"{gap:+.1f}"]
         for (name, row), gap in zip(both.iterrows(), gaps, strict=True)
     ]
+    mean, largest = shortened(gaps.abs().mean()), shortened(gaps.abs().max())
     text = (
-        f"In {counted(len(both), 'scenario')}, shares of records in alarm differ by {shortened(gaps.abs().mean())} "
-        f"percentage points on average, and by {shortened(gaps.abs().max())} at most."
+        f"In {counted(len(both), 'scenario')}, the simulations were compared with reference records. Shares of records "
+        f"in alarm differ by {mean} percentage points on average, and by {largest} at most."
     )
-    columns = ["Scenario", "Simulated", "Measured", "Difference in percentage points"]
-    return [heading, paragraphs(text), table("Share of records in alarm, simulated and measured.", columns, cells)]
+    columns = ["Scenario", "Simulated", "Reference", "Difference in percentage points"]
+    return [
+        heading,
+        paragraphs(text),
+        table("Share of records in alarm: of simulated and of reference records.", columns, cells),
+    ]

@@ -25,13 +25,12 @@ def shortened(value: float, digits: int = 2) -> str:
     if value == 0 or not np.isfinite(value):
         return "0" if value == 0 else UNKNOWN
     decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
-    text = f"{value:.{decimals}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
+    return f"{value:.{decimals}f}"
 
 
 def between(lowest: float, highest: float) -> str:
-    """Bounds in percent."""
-    return f"{percent(lowest)} to {percent(highest)}"
+    """Bounds in percent, on one line."""
+    return f"{percent(lowest)}{SPACE}to{SPACE}{percent(highest)}"
 
 
 def tested(severity: float) -> str:
@@ -67,13 +66,13 @@ def duration(wait: Any) -> str:
     if pd.isna(wait):
         return "no alarm"
     if not isinstance(wait, pd.Timedelta):
-        return f"{shortened(float(wait))} records" if wait else "first record"
+        return f"{float(wait):.3g} records" if wait else "first record"
     hours = wait.total_seconds() / 3600
     if hours == 0:
         return "first record"
     if hours >= 48:
-        return f"{shortened(hours / 24)} days"
-    return f"{shortened(hours)} hours" if hours >= 1 else f"{shortened(60 * hours)} minutes"
+        return f"{hours / 24:.2g} days" if hours < 2400 else f"{hours / 24:.0f} days"
+    return f"{hours:.2g} hours" if hours >= 1 else f"{60 * hours:.2g} minutes"
 
 
 def period(index: pd.Index | None) -> str:

@@ -28,7 +28,9 @@ section { background: var(--card); border: 1px solid var(--line); border-radius:
 .soft, figcaption, caption, footer { color: var(--soft); }
 .scroll { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92rem; }
-caption { text-align: left; padding-bottom: 0.4rem; min-width: 16rem; }
+caption { text-align: left; padding-bottom: 0.4rem; position: sticky; left: 0;
+  max-width: min(46rem, calc(100vw - 4rem)); }
+.text { display: block; min-width: 11rem; }
 th, td { padding: 0.35rem 0.8rem 0.35rem 0; border-bottom: 1px solid var(--line); text-align: left;
   vertical-align: top; min-width: 5rem; max-width: 34rem; }
 thead th { vertical-align: bottom; border-bottom-width: 2px; }
