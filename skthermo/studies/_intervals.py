@@ -19,7 +19,7 @@ LEAST_FREEDOM = 10
 FEW = 10
 """Number of alarms, or of records without one, below which their own variance says too little."""
 
-N_DRAWS = 2000
+N_DRAWS = 1000
 
 INTERVALS = ("clopper-pearson", "block-bootstrap")
 
@@ -78,6 +78,8 @@ def rate_of(
     n_alarms, n_records = int((decisions < 0).sum()), int(judged.sum())
     if not n_records:
         return Rate(0, 0, 0.0, 0.0, 1.0)
+    if all(np.array_equal(repeat, decisions[0], equal_nan=True) for repeat in decisions[1:]):
+        decisions = decisions[:1]  # repeats without noise count once
     blocks = Blocks.of(decisions)
     n_effective = _n_effective(blocks, decisions, confidence)
     if interval == "clopper-pearson":

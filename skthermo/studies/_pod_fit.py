@@ -19,7 +19,7 @@ FLAT = 1e-6
 
 def check_probability(value: Any, what: str) -> float:
     """A probability strictly between 0 and 1, or an error."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not 0 < value < 1:
+    if not isinstance(value, Real) or isinstance(value, bool) or not 0 < float(value) < 1:
         raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
     return float(value)
 

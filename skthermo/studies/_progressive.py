@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -79,4 +80,4 @@ class ProgressiveDamage(State):
         return {"damage": {group: np.clip(grown, 0, 1) * severity for group, severity in self.damage.items()}}
 
     def _is_negative_position(self) -> bool:
-        return isinstance(self.onset, int | np.integer) and self.onset < 0
+        return isinstance(self.onset, Real) and float(self.onset) < 0

@@ -21,7 +21,7 @@ MOST_LISTED = 12
 def answer(study: Any, findings: Sequence[Finding]) -> Html:
     """The answer in a few sentences."""
     rows = study.results_[study.results_["source"] == SIMULATED]
-    confidence = percent(study._confidence, 3)
+    confidence = tested(study._confidence)
     words = paragraphs(
         "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
         "learned from measurements how temperature moves this structure, simulated it in the same weather without "

@@ -37,7 +37,7 @@ def draw(
     *,
     height: float = HEIGHT,
     width: float = WIDTH,
-    n_columns: int = 2,
+    n_columns: int = 3,
 ) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
 
@@ -51,7 +51,7 @@ def draw(
         Of its first axes.
     height, width : float
         In inches.
-    n_columns : int, default=2
+    n_columns : int, default=3
         Of its legend.
 
     Returns
@@ -65,13 +65,21 @@ def draw(
             display = make()
             display.figure_.set_size_inches(width, height)
             for legend in display.figure_.legends:
-                legend.set_ncols(n_columns)
+                _fold(legend, n_columns)
             if title:
                 display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
             return image(_svg(display.figure_), alt)
     finally:
         for number in set(plt.get_fignums()) - others:
             plt.close(number)
+
+
+def _fold(legend: Any, n_columns: int) -> None:
+    """Put a legend with too many entries for one row above its figure into several rows."""
+    handles, labels = legend.legend_handles, [text.get_text() for text in legend.get_texts()]
+    if len(labels) > n_columns:
+        legend.remove()
+        legend.figure.legend(handles, labels, loc="outside upper center", ncols=n_columns - 1, frameon=False)
 
 
 def _svg(figure: Any) -> bytes:
@@ -171,7 +179,7 @@ def groups_of(structure: Any, families: list[str]) -> Html:
     figure = make().figure_
     size = figure.get_size_inches() * 6.5 / 9.0
     import_optional("matplotlib.pyplot", extra="plot").close(figure)
-    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5, n_columns=3)
+    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5, n_columns=4)
 
 
 def identified_damage(identified: Any) -> Html:

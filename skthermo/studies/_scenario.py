@@ -72,12 +72,12 @@ class Scenario(State):
     @property
     def groups(self) -> tuple[str, ...]:
         """Damage groups that it changes."""
-        return tuple(group for group, severity in self.damage.items() if severity)
+        return tuple(group for group, severity in (self.damage or {}).items() if severity)
 
     @property
     def is_healthy(self) -> bool:
         """Whether nothing is changed, so that alarms are false."""
-        return not (self.groups or any(factor != 1 for factor in self.parameters.values())) and (
+        return not (self.groups or any(factor != 1 for factor in (self.parameters or {}).values())) and (
             self.stiffness is None and self.mass is None
         )
 

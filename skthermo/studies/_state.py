@@ -29,7 +29,7 @@ class State(ABC):
 
     name: str
     family: str | None
-    severity: float
+    severity: float | None
     onset: Any = None
     n_draws: int = 1
 

@@ -11,7 +11,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
-from skthermo._validation import check_is_fitted, seed_parts, seeded
+from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
 from skthermo.studies._pod_fit import check_probability
@@ -164,6 +164,8 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             - ``measure``: "PFA", the probability of false alarm, of a healthy structure, else "POD", the probability of
               detection, from the onset of the damage on;
             - ``rate``, ``lowest``, ``highest``: share of records in alarm, and its bounds;
+            - ``band_lowest``, ``band_highest``: range of the rates of single repeats, which a measured campaign of this
+              length and state should lie in with the probability ``confidence``;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can judge;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
@@ -202,7 +204,9 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             rows = dict.fromkeys(tables, T)
             for name, records in measured.items():
                 tables[name, TRUE] = view.reference(records, T, name)
-                rows[name, TRUE] = records if isinstance(records, pd.DataFrame) or len(records) != len(T) else T
+                rows[name, TRUE] = (
+                    records if isinstance(records, pd.DataFrame) or _num_samples(records) != _num_samples(T) else T
+                )
             decisions = {key: [judge(self.detector_, table)] for key, table in tables.items()}
             self.indices_ = {key: damage_index(self.detector_, tables[key], rows[key]) for key in tables}
         for repeat in trial.repeated(seeds, self.n_jobs):

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo.studies._intervals import rate_of
@@ -41,6 +42,7 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     order = np.argsort(times, kind="stable")
     order = order[times[order] >= start]
     rate = rate_of(decisions[:, order], **options)
+    band = band_of(decisions[:, order], options["confidence"])
     if not rate.n_records:
         raise ValueError(
             f"none of {decisions.shape[1]} records of scenario {scenario.name!r}, source {source!r}, can be judged: "
@@ -55,6 +57,8 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
         "rate": rate.rate,
         "lowest": rate.lowest,
         "highest": rate.highest,
+        "band_lowest": band[0],
+        "band_highest": band[1],
         "n_alarms": rate.n_alarms,
         "n_records": rate.n_records,
         "n_effective": rate.n_effective,
@@ -63,13 +67,21 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     }
 
 
+def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
+    """Central range of the rates of single repeats, with this share of them."""
+    judged = (~np.isnan(decisions)).sum(axis=1)
+    rates = (decisions < 0).sum(axis=1)[judged > 0] / judged[judged > 0]
+    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2])
+    return float(lowest), float(highest)
+
+
 def damage_index(detector: Any, table: Any, rows: Any) -> pd.Series:
     """Minus the detector's ``score_samples``, on the index of the records."""
     index = rows.index if isinstance(rows, pd.DataFrame) else None
     return pd.Series(-np.asarray(detector.score_samples(table), dtype=float), index=index, name="damage_index")
 
 
-def _mean_wait(alarms: Array, waits: Array, rows: Any) -> Any:
+def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Any) -> Any:
     """Mean time to the first alarm over the repeats that have one, in records or as a Timedelta."""
     detected = alarms[alarms.any(axis=1)].argmax(axis=1)
     if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):

@@ -40,11 +40,7 @@ class View:
 
     def table(self, T: Any, F: Array) -> Any:
         """Temperatures and frequencies of all modes as the detector sees them."""
-        values = np.hstack([as_floats(T), F])[:, self.positions]
-        if not self.is_frame:
-            return values
-        index = T.index if isinstance(T, pd.DataFrame) else None
-        return pd.DataFrame(values, index=index, columns=[self.names[i] for i in self.positions])
+        return self._seen(np.hstack([as_floats(T), F]), T)
 
     def reference(self, records: Any, T: Any, name: str) -> Any:
         """Measured records of a scenario as the detector sees them.
@@ -52,7 +48,6 @@ class View:
         They may have temperatures of their own; without, and where the detector sees temperatures, those of T are
         theirs.
         """
-        n_modes = len(self.names) - self.n_sensors
         known = self._positions_of(records, f"the reference of scenario {name!r}")
         values = np.full((len(records), len(self.names)), np.nan)
         values[:, known] = as_columns(records)
@@ -62,12 +57,17 @@ class View:
                 f"the reference of scenario {name!r} lacks the modes {[self.names[i] for i in lacking]}; expected "
                 f"those that the detector sees"
             )
-        same_rows = len(values) == len(T)
         if lacking.size:
             check_same_rows(T, records, ("temperatures", f"the reference of scenario {name!r}"))
             values[:, : self.n_sensors] = as_floats(T)
-        rows = records if isinstance(records, pd.DataFrame) else T if same_rows else None
-        return self.table(frame_like(rows, values[:, : self.n_sensors]), values[:, -n_modes:])
+        return self._seen(values, records if isinstance(records, pd.DataFrame) or len(values) != len(T) else T)
+
+    def _seen(self, values: Array, rows: Any) -> Any:
+        """The detector's columns of all of the chain's, on the index of some rows."""
+        if not self.is_frame:
+            return values[:, self.positions]
+        index = rows.index if isinstance(rows, pd.DataFrame) else None
+        return pd.DataFrame(values[:, self.positions], index=index, columns=[self.names[i] for i in self.positions])
 
     def _positions_of(self, records: Any, what: str) -> Any:
         """Which of the chain's columns a table holds."""

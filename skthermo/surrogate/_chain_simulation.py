@@ -1,6 +1,6 @@
 """Frequencies of the structure under any weather: healthy, damaged or otherwise changed, with noise."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ from skthermo._arrays import Array, Matrix, as_floats, as_random_state, real_arr
 from skthermo._frames import frame_like
 from skthermo._validation import check_is_fitted
 from skthermo.fem import check_noise
+from skthermo.surrogate._simulator import Simulator
 
 
 class ChainSimulation:
@@ -44,9 +45,10 @@ class ChainSimulation:
             Mass added to the model's in kg; a vector holds lumped masses.
         noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
             Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals, out of fold, of a whole training record of similar weather, so that modes scatter together,
-            scatter more in frost, and are missing as in the training records. Runs of consecutive records are drawn if
-            residuals are serially correlated; rows of X should then be in order of time.
+            residuals of a whole training record of similar weather: their scatter out of fold, around the mean that
+            the fit leaves in such weather. So modes scatter together, scatter more in frost, and are missing as in the
+            training records. Runs of consecutive records are drawn if residuals are serially correlated; rows of X
+            should then be in order of time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -104,17 +106,62 @@ class ChainSimulation:
         shape = (np.shape(X)[0], len(self.mode_names_))
         return check_noise(noise, shape[1]) * random.standard_normal(shape)
 
-    def _frequencies(
+    def simulate_modes(
         self,
+        X: ArrayLike,
+        modes: Sequence[int],
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: Matrix | ArrayLike | None = None,
+        mass: Matrix | ArrayLike | None = None,
+    ) -> Array:
+        """Frequencies of other modes than the measured ones, without noise and as the model gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        modes : sequence of int
+            Ranks of modes of the healthy nominal model, the lowest being 0.
+        damage : mapping of str to float or array-like of shape (n_samples,), optional
+            As in `simulate`.
+        parameters : mapping of str to float, optional
+            As in `simulate`.
+        stiffness : matrix of shape (n_dof, n_dof), optional
+            As in `simulate`.
+        mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+            As in `simulate`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_chosen)
+            In Hz, in the numerical domain: no aligner knows how these modes differ from measured ones.
+
+        Raises
+        ------
+        ValueError
+            As in `simulate`; if the model has no such modes.
+        """
+        check_is_fitted(self)
+        changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        return self._numerical(self.simulator_.changed("with_modes", modes), X, **changes)
+
+    def _frequencies(self, X: ArrayLike, **changes: Any) -> NDArray[np.float64]:
+        """Frequencies of the changed structure at given temperatures, in the measured domain."""
+        check_is_fitted(self)
+        return as_floats(self.aligner_.inverse_transform(self._numerical(self.simulator_, X, **changes)))
+
+    def _numerical(
+        self,
+        simulator: Simulator,
         X: ArrayLike,
         damage: Mapping[str, float | ArrayLike] | None = None,
         parameters: Mapping[str, float] | None = None,
         stiffness: Matrix | ArrayLike | None = None,
         mass: Matrix | ArrayLike | None = None,
     ) -> NDArray[np.float64]:
-        """Frequencies of the changed structure at given temperatures, in the measured domain."""
-        check_is_fitted(self)
-        simulator = self.simulator_
+        """The same in the numerical domain."""
         if stiffness is not None or mass is not None:
             simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
         theta = self._predict_theta(X) * self._factors(parameters)
@@ -124,8 +171,7 @@ class ChainSimulation:
             severities = np.column_stack(list(growing.values()))
             simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
             theta = np.hstack([theta, 1 - severities])
-        frequencies = simulator.frequencies(theta, self.n_jobs)
-        return as_floats(self.aligner_.inverse_transform(frequencies))
+        return simulator.frequencies(theta, self.n_jobs)
 
     def _factors(self, parameters: Mapping[str, float] | None) -> Array:
         """The factor of every parameter."""

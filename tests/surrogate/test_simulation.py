@@ -61,3 +61,12 @@ def test_noise_is_what_draw_noise_gives(fem, weather, noise):
 def test_impossible_changes_are_refused(fem, weather, changes, message):
     with pytest.raises(ValueError, match=message):
         fem.simulate(weather, **changes)
+
+
+def test_other_modes_are_those_of_the_model_at_the_same_parameters(fem, weather):
+    seven = make_truss(7).damaged({"top": 0.3}).frequencies(fem.predict_parameters(weather))
+    found = fem.simulate_modes(weather, [6, 1], damage={"top": 0.3})
+    np.testing.assert_allclose(found, seven[:, [6, 1]], rtol=2e-5)
+    assert fem.model.with_modes([6, 1]).mode_ranks == (6, 1)
+    with pytest.raises(ValueError, match="is none of the model's"):
+        fem.simulate_modes(weather, [fem.model.n_available])

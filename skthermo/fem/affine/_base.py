@@ -46,6 +46,16 @@ class AffineBase(Interventions, ABC):
         return self._core.n_modes
 
     @property
+    def mode_ranks(self) -> tuple[int, ...]:
+        """Which modes of the healthy nominal model the columns are; the lowest is 0."""
+        return tuple(int(rank) for rank in self._full_core.ranks)
+
+    @property
+    def n_available(self) -> int:
+        """Number of modes that `with_modes` can choose from."""
+        return self._full_core.available
+
+    @property
     def n_dof(self) -> int:
         """Number of degrees of freedom."""
         return self._full_core.stiffness.n_dof

@@ -1,0 +1,352 @@
+"""Detectability studies of the truss."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from joblib import parallel_config
+from sklearn.base import clone
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.metrics import probability_of_detection, time_to_detection
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, sweep
+from skthermo.surrogate import DataInformedFEM
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures
+SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
+MODES = list(YEAR.frequencies)
+
+
+@pytest.fixture(scope="module")
+def fem():
+    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
+
+
+def compensated(last=None):
+    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
+
+
+def first_seed(random_state):
+    return int(np.random.RandomState(random_state).randint(np.iinfo(np.int32).max, size=(1, 2))[0, 0])
+
+
+@pytest.mark.parametrize("noise", [0.01, "fitted"])
+def test_records_are_those_that_the_chain_simulates(fem, noise):
+    scenarios = [Scenario("healthy"), Scenario("a fifth", {"bottom": 0.2})]
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3)
+    results = study.run(WEATHER).set_index("scenario")
+    detector = MahalanobisDetector().fit(YEAR.frequencies)
+    assert study.threshold_ == detector.threshold_
+    for name, damage in (("healthy", None), ("a fifth", {"bottom": 0.2})):
+        records = fem.simulate(WEATHER, damage=damage, noise=noise, random_state=first_seed(3))
+        index = detector.damage_index(records)
+        pd.testing.assert_series_equal(study.indices_[name, "data-informed"], index)
+        assert results.loc[name, "rate"] == probability_of_detection(index, detector.threshold_)
+        wait = time_to_detection(index, detector.threshold_)
+        assert results.loc[name, "time_to_detection"] == wait
+    assert results["measure"].tolist() == ["PFA", "POD"]
+
+
+def test_same_bits_whatever_the_jobs(fem):
+    scenarios = [*sweep(fem, (0.1, 0.3), ["bottom", "top"]), ProgressiveDamage("crack", {"top": 0.3}, 100, 200)]
+    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=4, random_state=0)
+    expected = study.run(WEATHER, SIDE_BY_SIDE, interval="block-bootstrap")
+    pd.testing.assert_frame_equal(
+        clone(study).set_params(n_jobs=2).run(WEATHER, SIDE_BY_SIDE, interval="block-bootstrap"), expected
+    )
+    with parallel_config("threading"):
+        threads = clone(study).set_params(n_jobs=2).run(WEATHER, SIDE_BY_SIDE, interval="block-bootstrap")
+    pd.testing.assert_frame_equal(threads, expected)
+
+
+def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
+    scenarios = [Scenario("one", {"top": 0.2}), Scenario("other", {"top": 0.2})]
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0)
+    one, other = study.run(WEATHER).drop(columns="scenario").itertuples(index=False)
+    assert one == other
+    alarms = [
+        DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=n, random_state=0).run(WEATHER)["n_alarms"][
+            0
+        ]
+        for n in (1, 2, 3)
+    ]
+    assert alarms[2] == one.n_alarms
+    assert len({alarms[0], alarms[1] - alarms[0], alarms[2] - alarms[1]}) == 3
+
+
+def test_without_a_baseline_the_detector_learns_what_the_chain_has_learned(fem):
+    scenarios = sweep(fem, (0.2,), ["top"])
+    for detector, baseline in ((MahalanobisDetector(), YEAR.frequencies), (compensated(), SIDE_BY_SIDE)):
+        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0)
+        pd.testing.assert_frame_equal(study.run(WEATHER), study.run(WEATHER, baseline))
+
+
+def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
+    scenarios = sweep(fem, (0.1,), ["top"])
+    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=1, noise=0.01, random_state=0)
+    study.run(WEATHER, SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
+    detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
+    records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
+    expected = -detector.score_samples(records.join(WEATHER)[[*MODES, "T2", "T1", "T3"]])
+    np.testing.assert_allclose(study.indices_["top 10 %", "data-informed"], expected)
+
+
+def test_a_detector_may_see_some_of_the_modes(fem):
+    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1, random_state=0)
+    few = study.run(WEATHER, YEAR.frequencies[["f3", "f1"]])
+    assert few["rate"][1] < study.run(WEATHER)["rate"][1]
+    assert list(study.detector_.feature_names_in_) == MODES
+
+
+def test_arrays_give_the_rates_of_frames(fem):
+    scenarios = sweep(fem, (0.1, 0.2), ["top"])
+    twin = DataInformedFEM(make_truss(), random_state=0)
+    twin.fit(YEAR.temperatures.to_numpy(), YEAR.frequencies.to_numpy())
+    for detector, baseline in (
+        (MahalanobisDetector(), YEAR.frequencies),
+        (
+            make_pipeline(
+                TemperatureCompensator(LinearRegression(), targets=[3, 4, 5, 6, 7, 8]), MahalanobisDetector()
+            ),
+            SIDE_BY_SIDE,
+        ),
+    ):
+        arrays = DetectabilityStudy(twin, detector, scenarios, n_repeats=2, random_state=0)
+        expected = DetectabilityStudy(fem, clone(detector), scenarios, n_repeats=2, random_state=0)
+        if isinstance(detector, MahalanobisDetector):
+            frames = expected.run(WEATHER, baseline)
+        else:
+            frames = expected.set_params(detector=compensated()).run(WEATHER, baseline)
+        columns = ["rate", "lowest", "highest", "n_effective"]
+        pd.testing.assert_frame_equal(arrays.run(WEATHER.to_numpy(), baseline.to_numpy())[columns], frames[columns])
+        assert arrays.results_["time_to_detection"].dtype == float
+    assert isinstance(arrays.indices_["healthy", "data-informed"].index, pd.RangeIndex)
+
+
+def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
+    scenarios = sweep(fem, (0.1,), ["top"])
+
+    def truth(scenario, seed):
+        if scenario.is_healthy:
+            return None
+        return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
+
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01, random_state=0)
+    results = study.run(WEATHER, reference=truth)
+    assert results["source"].tolist() == ["data-informed", "data-informed", "reference"]
+    simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
+    simulated_index, true_index = (study.indices_["top 10 %", source] for source in results["source"][1:])
+    assert (simulated_index != true_index).all()  # other seeds
+    assert true.lowest < simulated.rate < true.highest
+    np.testing.assert_array_equal(results["n_repeats"], 3)
+
+
+def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
+    measured = make_truss_campaign(2, damage={"top": 0.3}, random_state=5)
+    frequencies = measured.frequencies.mask(np.random.RandomState(0).uniform(size=(730, 6)) < 0.1)
+    frequencies.iloc[10:30] = np.nan
+    side_by_side = measured.temperatures.join(frequencies)
+    scenarios = sweep(fem, (0.3,), ["top"])
+    for detector, records in ((MahalanobisDetector(), frequencies), (compensated(), side_by_side)):
+        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0)
+        results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
+        row = results.loc[("top 30 %", "reference")]
+        decision = study.detector_.decision_function(records)
+        assert row["n_records"] == np.count_nonzero(~np.isnan(decision)) == 710
+        assert row["rate"] == np.mean(decision[~np.isnan(decision)] < 0)
+        assert row["n_repeats"] == 1
+        pd.testing.assert_index_equal(study.indices_["top 30 %", "reference"].index, measured.frequencies.index)
+        np.testing.assert_array_equal(study.indices_["top 30 %", "reference"], -study.detector_.score_samples(records))
+
+
+def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
+    study = DetectabilityStudy(fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1, random_state=0)
+    damaged = make_truss_campaign(damage={"top": 0.3}, random_state=1)
+    alone = study.run(WEATHER, reference={"top 30 %": damaged.frequencies})
+    pd.testing.assert_frame_equal(
+        study.run(WEATHER, reference={"top 30 %": damaged.temperatures.join(damaged.frequencies)}), alone
+    )
+    pd.testing.assert_frame_equal(study.run(WEATHER, reference={"top 30 %": damaged.frequencies.to_numpy()}), alone)
+
+
+def test_progressive_damage_counts_from_its_onset(fem):
+    onset = pd.Timestamp("2025-03-01")
+    scenarios = [
+        ProgressiveDamage("by time", {"top": 0.4}, onset, "2025-09-01"),
+        ProgressiveDamage("by number", {"top": 0.4}, 59, 243),
+    ]
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01, random_state=0)
+    by_time, by_number = study.run(WEATHER).drop(columns="scenario").itertuples(index=False)
+    assert by_time == by_number
+    index = study.indices_["by time", "data-informed"]
+    assert by_time.rate == probability_of_detection(index[index.index >= onset], study.threshold_)
+    assert by_time.n_records == 306
+    assert by_time.time_to_detection == time_to_detection(index, study.threshold_, onset)
+    growing = index[onset:"2025-09-01"]
+    assert growing[-60:].mean() > 2 * growing[:60].mean()
+
+
+def test_uncertain_damage_takes_another_draw_in_every_repeat(fem):
+    draws = [0.05, 0.3]
+    uncertain = UncertainDamage("top", pd.DataFrame({"top": draws}))
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], n_repeats=4, noise=0.01, random_state=0)
+    alarms = study.run(WEATHER)["n_alarms"][0]
+    seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(4, 2))[:, 0]
+    expected = [
+        study.detector_.predict(fem.simulate(WEATHER, damage={"top": draws[r % 2]}, noise=0.01, random_state=int(seed)))
+        for r, seed in enumerate(seeds)
+    ]
+    assert alarms == np.count_nonzero(np.array(expected) == -1)
+
+
+def test_changes_that_are_no_damage_can_be_detected_too(fem):
+    scenarios = [
+        Scenario("ballast", mass=np.full(23, 500.0), family="mass", severity=0.1),
+        Scenario("stiffer", parameters={"top": 1.3}),
+    ]
+    results = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0).run(WEATHER)
+    assert (results["measure"] == "POD").all()
+    assert (results["rate"] > 0.2).all()
+
+
+@pytest.mark.parametrize(
+    "detector",
+    [
+        make_pipeline(StandardScaler(), IsolationForest(random_state=0, contamination=0.02)),
+        make_pipeline(StandardScaler(), MahalanobisDetector()),
+        OutlierDetector(IsolationForest()),
+        WindowedAlarm(7),
+    ],
+)
+def test_any_outlier_detector_can_be_studied(fem, detector):
+    study = DetectabilityStudy(fem, detector, sweep(fem, (0.3,), ["bottom"]), n_repeats=2, noise=0.01, random_state=0)
+    results = study.run(WEATHER).set_index("scenario")
+    assert results["rate"]["bottom 30 %"] > results["rate"]["healthy"] + 0.3
+    repeated = clone(study).run(WEATHER).set_index("scenario")
+    pd.testing.assert_frame_equal(repeated, results)  # random_state seeds the detector, too
+    single = DetectabilityStudy(fem, detector, study.scenarios, n_repeats=1, noise=0.01, random_state=0)
+    rates = single.run(WEATHER)["rate"]
+    for rate, index in zip(rates, single.indices_.values(), strict=True):
+        assert rate == pytest.approx(probability_of_detection(index, single.threshold_), abs=1 / 365)
+
+
+def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
+    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"])
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
+    rates = study.run(WEATHER, confidence=0.9).set_index("scenario")["rate"]
+    grid, curve = (study.minimum_detectable_damage(method=method) for method in ("grid", "curve"))
+    for group in ("bottom", "top"):
+        smallest = next(s for s in (0.1, 0.2, 0.3) if rates[f"{group} {100 * s:g} %"] >= 0.9)
+        assert grid.loc[(group, "data-informed"), "mdd"] == smallest
+        found = curve.loc[(group, "data-informed")]
+        assert smallest - 0.1 < found["mdd"] < smallest
+        assert found["lowest"] < found["mdd"] < found["highest"]
+        fitted = study.pod_curve(group)
+        assert found["mdd"] == fitted.a90
+        assert found["highest"] == fitted.a90_95  # two-sided 90 % bounds
+    assert np.isnan(study.minimum_detectable_damage(level=0.999).loc[("top", "data-informed"), "mdd"])
+
+
+def test_damage_between_two_severities_is_bracketed(fem):
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), sweep(fem, (0.1, 0.5), ["diagonal"]), n_repeats=2, random_state=0
+    )
+    study.run(WEATHER)
+    with pytest.warns(UserWarning, match="infinite or unknown"):
+        found = study.minimum_detectable_damage(method="curve").iloc[0]
+    assert np.isnan(found["mdd"])
+    assert (found["lowest"], found["highest"]) == (0.1, 0.5)
+
+
+def test_records_that_cannot_be_judged_do_not_count():
+    frequencies = YEAR.frequencies.copy()
+    frequencies.iloc[::3, :3] = np.nan
+    frequencies.iloc[::5] = np.nan
+    gappy = DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, frequencies)
+    weather = WEATHER.copy()
+    weather.iloc[5:15, 0] = np.nan
+    detector = OutlierDetector(IsolationForest())
+    study = DetectabilityStudy(gappy, detector, [Scenario("healthy")], n_repeats=2, random_state=0)
+    n_records = study.run(weather)["n_records"][0]
+    assert 0.4 * 730 < n_records < 0.75 * 730
+    assert study.indices_["healthy", "data-informed"].iloc[5:15].isna().all()
+
+
+def test_foreign_weather_is_said_once(fem):
+    study = DetectabilityStudy(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2, random_state=0)
+    with pytest.warns(UserWarning, match="far outside") as caught:
+        study.run(WEATHER + 60)
+    texts = [str(warning.message) for warning in caught]
+    assert len(texts) == len(set(texts)) <= 3
+    assert sum("far outside those of the training records" in text for text in texts) == 1
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scenarios": [Scenario("a"), Scenario("a", {"top": 0.1})]}, "each with a name of its own"),
+        ({"scenarios": []}, "one or more"),
+        ({"scenarios": ["healthy"]}, "scenarios are"),
+        ({"scenarios": [Scenario("a", {"pier": 0.1})]}, r"\['pier'\] are unknown; expected some of"),
+        ({"n_repeats": 0}, "n_repeats is 0"),
+        ({"noise": "measured"}, "noise is 'measured'"),
+        ({"detector": LinearRegression()}, "expected an outlier detector"),
+    ],
+)
+def test_impossible_studies_are_errors(fem, options, message):
+    arguments = {"fem": fem, "detector": MahalanobisDetector(), "scenarios": [Scenario("healthy")]} | options
+    if isinstance(arguments["detector"], LinearRegression):
+        arguments["detector"] = make_pipeline(StandardScaler())
+    with pytest.raises(ValueError, match=message):
+        DetectabilityStudy(**arguments).run(WEATHER)
+
+
+@pytest.mark.parametrize(
+    ("detector", "arguments", "message"),
+    [
+        (MahalanobisDetector(), {"baseline": SIDE_BY_SIDE}, "which would judge them"),
+        (compensated(), {"baseline": YEAR.frequencies}, "compensates for temperature, and the baseline has none"),
+        (MahalanobisDetector(), {"baseline": YEAR.frequencies.add_suffix(" Hz")}, "expected modes"),
+        (MahalanobisDetector(), {"baseline": YEAR.temperatures}, "expected modes"),
+        (MahalanobisDetector(), {"baseline": YEAR.frequencies.to_numpy()[:, :4]}, "expected 6 columns of frequencies"),
+        (MahalanobisDetector(), {"interval": "normal"}, "interval is 'normal'"),
+        (MahalanobisDetector(), {"confidence": 95}, "confidence is 95"),
+        (MahalanobisDetector(), {"reference": {"top": YEAR.frequencies}}, r"reference has the scenarios \['top'\]"),
+        (MahalanobisDetector(), {"reference": YEAR.frequencies.to_numpy()}, "expected {name of scenario: frequencies}"),
+        (MahalanobisDetector(), {"reference": {"healthy": YEAR.frequencies[["f1"]]}}, "lacks the modes"),
+        (MahalanobisDetector(), {"reference": {"healthy": YEAR.frequencies * np.nan}}, "none of 365 records"),
+        (MahalanobisDetector(), {"reference": lambda scenario, seed: YEAR.frequencies[:9]}, "expected frequencies for"),
+        (compensated(), {"reference": {"healthy": YEAR.frequencies[:99]}}, "temperatures has 365 rows"),
+    ],
+)
+def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
+    study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0)
+    with pytest.raises(ValueError, match=message):
+        study.run(WEATHER, **arguments)
+
+
+def test_a_study_must_be_run_before_it_is_asked(fem):
+    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1)
+    with pytest.raises(ValueError, match="expected a call of run before"):
+        study.minimum_detectable_damage()
+    study.run(WEATHER)
+    with pytest.raises(ValueError, match="family 'bottom', source 'data-informed' is not in the results"):
+        study.pod_curve("bottom")
+    with pytest.raises(ValueError, match="level is 90"):
+        study.minimum_detectable_damage(level=90)
+    with pytest.raises(ValueError, match="expected 'grid' or 'curve'"):
+        study.minimum_detectable_damage(method="spline")
+
+
+def test_a_clone_shares_the_fitted_chain(fem):
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [Scenario("healthy")], n_repeats=3)
+    twin = clone(study)
+    assert twin.fem is fem
+    assert twin.detector is not study.detector
+    assert twin.get_params(deep=False)["n_repeats"] == 3
