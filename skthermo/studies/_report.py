@@ -15,8 +15,9 @@ from sklearn.exceptions import NotFittedError
 from skthermo.studies._report_answer import answer, found_and_missed
 from skthermo.studies._report_findings import findings_of
 from skthermo.studies._report_html import Html, bullets, element, paragraphs, section, table
-from skthermo.studies._report_identified import identified_damage
+from skthermo.studies._report_identified import identified_damage, identified_sentences
 from skthermo.studies._report_model import monitored, quality
+from skthermo.studies._report_numbers import counted
 from skthermo.studies._report_page import page
 from skthermo.studies._simulate import SIMULATED
 
@@ -101,9 +102,10 @@ def report(
 
 def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[str, Html]]:
     findings = findings_of(study, SIMULATED)
+    now = [] if identified is None else identified_sentences(identified)
     families = [found.family for found in findings]
     sections = {
-        "answer": ("The answer", answer(study, findings)),
+        "answer": ("The answer", answer(study, findings, now)),
         "monitored": ("What was monitored", monitored(study, structure, families)),
         "model": ("How good the model is", quality(study)),
         "found": ("What would be found", found_and_missed(study, findings)),
@@ -115,7 +117,7 @@ def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[st
 
 def _introduction(study: Any) -> Html:
     n_states = study.results_["scenario"].nunique()
-    return paragraphs(f"A simulated test of the alarm system in {n_states} states of the structure.")
+    return paragraphs(f"The alarm system was tested by simulation, in {counted(n_states, 'state')} of the structure.")
 
 
 def _settings(study: Any) -> Html:

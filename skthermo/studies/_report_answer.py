@@ -18,8 +18,8 @@ from skthermo.studies._state import State
 MOST_LISTED = 12
 
 
-def answer(study: Any, findings: Sequence[Finding]) -> Html:
-    """The answer in a few sentences."""
+def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -> Html:
+    """The answer in a few sentences, those on identified damage first."""
     rows = study.results_[study.results_["source"] == SIMULATED]
     confidence = tested(study._confidence)
     words = paragraphs(
@@ -34,7 +34,8 @@ def answer(study: Any, findings: Sequence[Finding]) -> Html:
         f"{confidence} confidence; they cover the scatter of the measurements, but neither weather of another kind nor "
         "errors of the model."
     )
-    parts = [words, element("h3", "False alarms"), _false_alarms(rows)]
+    parts = [element("h3", "The structure as it is now"), bullets(identified)] if identified else []
+    parts += [words, element("h3", "False alarms"), _false_alarms(rows)]
     if findings:
         columns = ["Where", "Smallest damage found reliably", "Bounds", "From the curve; with 95 % confidence"]
         cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]

@@ -37,7 +37,6 @@ def draw(
     *,
     height: float = HEIGHT,
     width: float = WIDTH,
-    n_columns: int = 3,
 ) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
 
@@ -51,8 +50,6 @@ def draw(
         Of its first axes.
     height, width : float
         In inches.
-    n_columns : int, default=3
-        Of its legend.
 
     Returns
     -------
@@ -64,22 +61,12 @@ def draw(
         with plt.style.context("default"), plt.rc_context(SETTINGS):
             display = make()
             display.figure_.set_size_inches(width, height)
-            for legend in display.figure_.legends:
-                _fold(legend, n_columns)
             if title:
                 display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
             return image(_svg(display.figure_), alt)
     finally:
         for number in set(plt.get_fignums()) - others:
             plt.close(number)
-
-
-def _fold(legend: Any, n_columns: int) -> None:
-    """Put a legend with too many entries for one row above its figure into several rows."""
-    handles, labels = legend.legend_handles, [text.get_text() for text in legend.get_texts()]
-    if len(labels) > n_columns:
-        legend.remove()
-        legend.figure.legend(handles, labels, loc="outside upper center", ncols=n_columns - 1, frameon=False)
 
 
 def _svg(figure: Any) -> bytes:
@@ -166,7 +153,13 @@ def damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html
     )
 
     def make() -> DamageIndexDisplay:
-        return DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
+        display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
+        for legend in list(display.figure_.legends):  # two columns fit the narrow drawing
+            labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
+            handles = legend.legend_handles
+            legend.remove()
+            display.figure_.legend(handles, labels, loc="outside upper center", ncols=2, frameon=False)
+        return display
 
     return draw(make, f"Damage index over time. {above}.", height=3.4)
 
@@ -179,7 +172,7 @@ def groups_of(structure: Any, families: list[str]) -> Html:
     figure = make().figure_
     size = figure.get_size_inches() * 6.5 / 9.0
     import_optional("matplotlib.pyplot", extra="plot").close(figure)
-    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5, n_columns=4)
+    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5)
 
 
 def identified_damage(identified: Any) -> Html:

@@ -6,7 +6,7 @@ import numpy as np
 
 from skthermo.studies import _report_figures as figures
 from skthermo.studies._report_html import Html, bullets, element, figure, paragraphs, section, table
-from skthermo.studies._report_numbers import listed, percent, probability
+from skthermo.studies._report_numbers import exact, listed, probability
 
 UNLIKELY = 0.05
 
@@ -17,8 +17,8 @@ def identified_damage(identified: Any) -> Html:
     rows = [
         [
             group,
-            percent(row["severity"]) if np.isfinite(row["severity"]) else "cannot be seen",
-            f"± {percent(2 * row['standard_error'])}" if np.isfinite(row["standard_error"]) else "",
+            exact(row["severity"]) if np.isfinite(row["severity"]) else "cannot be seen",
+            f"± {exact(2 * row['standard_error'])}" if np.isfinite(row["standard_error"]) else "",
             probability(row["p_value"]) if np.isfinite(row["severity"]) else "",
             "yes" if row["significant"] else "no",
         ]
@@ -37,11 +37,11 @@ def identified_damage(identified: Any) -> Html:
             "Records of the structure as it is now were compared with what the healthy structure would do in the same "
             "weather. The severities below explain how the frequencies have shifted."
         ),
-        bullets(_findings(identified)),
+        bullets(identified_sentences(identified)),
         table(
             "Identified damage: share of the stiffness that is lost, and its uncertainty (two standard errors). The "
             "probability is that of such a severity, or a larger one, by chance in a healthy structure.",
-            ["Group", "Severity", "Uncertainty", "Probability by chance", "Beyond doubt"],
+            ["Group", "Severity", "Uncertainty", "Probability by chance", "Clearly damaged"],
             rows,
         ),
         table(
@@ -60,13 +60,18 @@ def identified_damage(identified: Any) -> Html:
     return section("identified", "Identified damage", *parts)
 
 
-def _findings(identified: Any) -> list[str]:
+def identified_sentences(identified: Any) -> list[str]:
+    """Which groups are damaged, and how surely."""
     found = identified.table[identified.table["significant"].astype(bool)]
     sentences = [
-        f"{group} has lost {percent(row['severity'])} of its stiffness (± {percent(2 * row['standard_error'])})."
+        f"{group} has lost {exact(row['severity'])} of its stiffness (± {exact(2 * row['standard_error'])})."
         for group, row in found.iterrows()
     ]
-    return sentences or ["No group is damaged beyond doubt."]
+    sentences = sentences or ["No group is clearly damaged."]
+    p_value = float(getattr(identified, "p_value", np.nan))
+    if np.isfinite(p_value):
+        sentences.append(f"The probability that a healthy structure shows such shifts is {probability(p_value)}.")
+    return sentences
 
 
 def _limits(identified: Any) -> list[str]:

@@ -175,6 +175,11 @@ def _agreement(results: pd.DataFrame) -> list[Html]:
         f"In {counted(len(both), 'scenario')}, the simulations were compared with reference records. Shares of records "
         f"in alarm differ by {mean} percentage points on average, and by {largest} at most."
     )
+    single = results[(results["source"] == TRUE) & (results["n_repeats"] == 1)].set_index("scenario")["rate"]
+    bands = results[results["source"] == SIMULATED].set_index("scenario").reindex(single.index)
+    if len(single):
+        inside = int(single.between(bands["band_lowest"], bands["band_highest"]).sum())
+        text += f" Of {counted(len(single), 'reference rate')}, {inside:,} lie where single simulated campaigns lie."
     columns = ["Scenario", "Simulated", "Reference", "Difference in percentage points"]
     return [
         heading,

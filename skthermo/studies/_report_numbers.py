@@ -43,6 +43,11 @@ def severity_text(severity: float) -> str:
     return f"{100 * float(severity):.3g}{SPACE}%"
 
 
+def exact(share: float) -> str:
+    """A share in percent with one decimal, for estimates with an error of their own."""
+    return f"{100 * float(share):.1f}{SPACE}%" if np.isfinite(share) else UNKNOWN
+
+
 def probability(value: float) -> str:
     """A probability as a number."""
     if not np.isfinite(value):
