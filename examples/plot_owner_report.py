@@ -4,8 +4,8 @@ A report for the owner of a bridge
 
 A truss was monitored for a year. The FE model learns how temperature moves its frequencies, a study simulates damage of
 three groups of members, and sixty later days, on which the lower chord has lost a quarter of its stiffness, are
-compared with what the healthy truss would do. One HTML file says in plain sentences what came out of it, for readers who
-are not engineers.
+compared with what the healthy truss would do. One HTML file says in plain sentences what came out of it, for readers
+who are not engineers.
 
 Run it with ``python examples/plot_owner_report.py``; the report goes to the folder ``figures``.
 """

@@ -133,7 +133,7 @@ def _damage(scenario: State) -> dict[str, float]:
 
 
 def _change(severity: float) -> str:
-    return f"{tested(abs(severity))} {'less' if severity > 0 else 'more'} stiffness"
+    return f"{tested(severity)} {'less' if severity > 0 else 'more'} stiffness"
 
 
 def _place(onset: Any) -> str:

@@ -58,7 +58,8 @@ class Finding:
         """Smallest severity, for a table."""
         if not self.is_found:
             return f"none up to {self.largest}"
-        return f"{tested(self.smallest)}{' or less' if self.smallest == self.severities[0] else ''}"
+        text = f"{tested(self.smallest)}{' or less' if self.smallest == self.severities[0] else ''}"
+        return text if self.smallest > 0 else f"{text} (strengthening)"
 
     @property
     def bounds(self) -> str:

@@ -34,13 +34,13 @@ def between(lowest: float, highest: float) -> str:
 
 
 def tested(severity: float) -> str:
-    """A severity that was tested, as it was given."""
-    return f"{100 * float(severity):.4g}{SPACE}%"
+    """Magnitude of a severity that was tested, as it was given."""
+    return f"{100 * abs(float(severity)):.4g}{SPACE}%"
 
 
 def severity_text(severity: float) -> str:
-    """A severity that was found by a curve."""
-    return f"{100 * float(severity):.3g}{SPACE}%"
+    """Magnitude of a severity that was found by a curve."""
+    return f"{100 * abs(float(severity)):.3g}{SPACE}%"
 
 
 def exact(share: float) -> str:
