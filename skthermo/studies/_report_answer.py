@@ -145,7 +145,7 @@ def _is_mahalanobis(detector: Any) -> bool:
 
 
 def _sentence(found: Finding) -> Html:
-    return joined([element("strong", f"{found.family}: "), element("span", found.sentence())])
+    return element("span", element("strong", f"{found.family}:"), f" {found.sentence()}")
 
 
 def _false_alarms(rows: pd.DataFrame) -> Html:

@@ -14,13 +14,14 @@ UNLIKELY = 0.05
 def identified_damage(identified: Any) -> Html:
     """Where damage is, how severe, what it explains, and what cannot be said."""
     found = identified.table
+    clear = found["significant"].eq(True)  # missing where a group cannot be seen
     rows = [
         [
             group,
             exact(row["severity"]) if np.isfinite(row["severity"]) else "cannot be seen",
             f"± {exact(2 * row['standard_error'])}" if np.isfinite(row["standard_error"]) else "",
             probability(row["p_value"]) if np.isfinite(row["severity"]) else "",
-            "yes" if row["significant"] else "no",
+            "yes" if clear[group] else "no",
         ]
         for group, row in found.iterrows()
     ]
@@ -62,7 +63,7 @@ def identified_damage(identified: Any) -> Html:
 
 def identified_sentences(identified: Any) -> list[str]:
     """Which groups are damaged, and how surely."""
-    found = identified.table[identified.table["significant"].astype(bool)]
+    found = identified.table[identified.table["significant"].eq(True)]
     sentences = [
         f"{group} has lost {exact(row['severity'])} of its stiffness (± {exact(2 * row['standard_error'])})."
         for group, row in found.iterrows()

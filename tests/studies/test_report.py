@@ -119,8 +119,7 @@ def test_identified_damage_is_said_first_and_in_full(page, identified):
 
 def test_what_cannot_be_identified_is_said(study, identified, tmp_path):
     changes = {"confused": [(HOSTILE, "deck")], "unseen": ["piers"], "misfit_p_value": 0.01}
-    table = identified.table.copy()
-    table.loc["piers"] = np.nan
+    table = identified.table.reindex([*identified.table.index, "piers"])
     table["significant"] = False
     likeness = identified.similarity
     doubtful = SimpleNamespace(**{"table": table, "shifts": identified.shifts, "similarity": likeness, **changes})
