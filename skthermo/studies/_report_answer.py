@@ -8,7 +8,7 @@ import pandas as pd
 from sklearn.pipeline import Pipeline
 
 from skthermo.detection import MahalanobisDetector
-from skthermo.studies import _report_figures as figures
+from skthermo.studies._report_figures import draw_curve, draw_damage_indices
 from skthermo.studies._report_findings import LEVEL, Finding
 from skthermo.studies._report_html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
 from skthermo.studies._report_numbers import between, counted, duration, percent, tested
@@ -84,7 +84,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     if has_truth:
         introduction += reference
     parts = [paragraphs(introduction), table("Alarms in every scenario.", columns, cells)]
-    curves = [figures.curve(found) for found in findings if found.curve is not None]
+    curves = [draw_curve(found) for found in findings if found.curve is not None]
     if curves:
         parts.append(element("h3", "How the share of alarms grows with damage"))
     parts.append(
@@ -194,5 +194,5 @@ def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str
     for name in shown[:MOST_LISTED]:
         indices = {scenario: study.indices_[scenario, SIMULATED] for scenario in (*healthy, name)}
         onset = scenarios[name].onset if name in scenarios else None
-        drawn.append(figures.damage_indices(study, indices, onset))
+        drawn.append(draw_damage_indices(study, indices, onset))
     return drawn

@@ -98,7 +98,7 @@ def _is_formula(text: str, parser: Any) -> bool:
     return True
 
 
-def histories(F: pd.DataFrame) -> list[Html]:
+def draw_histories(F: pd.DataFrame) -> list[Html]:
     """Measured frequencies over time, one drawing for each mode."""
     drawn = []
     for mode in range(F.shape[1]):
@@ -111,7 +111,7 @@ def histories(F: pd.DataFrame) -> list[Html]:
     return drawn
 
 
-def over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: pd.DataFrame) -> list[Html]:
+def draw_over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: pd.DataFrame) -> list[Html]:
     """Measured and predicted frequencies over one temperature, one drawing for each mode."""
     drawn = []
     for mode in range(measured.shape[1]):
@@ -124,7 +124,7 @@ def over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: 
     return drawn
 
 
-def curve(finding: Finding) -> Html:
+def draw_curve(finding: Finding) -> Html:
     """Probability of detection of one family of scenarios."""
     fitted = finding.curve
     is_curve = bool(np.isfinite(fitted.slope))
@@ -144,7 +144,7 @@ def curve(finding: Finding) -> Html:
     return draw(make, alt, title, height=3.2)
 
 
-def damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
+def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
     threshold = study.threshold_
     above = "; ".join(
@@ -164,7 +164,7 @@ def damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html
     return draw(make, f"Damage index over time. {above}.", height=3.4)
 
 
-def groups_of(structure: Any, families: list[str]) -> Html:
+def draw_groups(structure: Any, families: list[str]) -> Html:
     """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
@@ -175,7 +175,7 @@ def groups_of(structure: Any, families: list[str]) -> Html:
     return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5)
 
 
-def identified_damage(identified: Any) -> Html:
+def draw_identified_damage(identified: Any) -> Html:
     """Severities, shifts and likeness of the groups, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     n_groups = len(identified.table)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo.studies import _report_figures as figures
+from skthermo.studies._report_figures import draw_identified_damage
 from skthermo.studies._report_html import Html, bullets, element, figure, paragraphs, section, table
 from skthermo.studies._report_numbers import exact, listed, probability
 
@@ -55,7 +55,7 @@ def identified_damage(identified: Any) -> Html:
         figure(
             "Severity of each group; shift of each natural frequency, measured and explained; and how alike "
             "the effects of the groups are: 1 means that two groups change all modes alike and cannot be told apart.",
-            [figures.identified_damage(identified)],
+            [draw_identified_damage(identified)],
         ),
     ]
     return section("identified", "Identified damage", *parts)

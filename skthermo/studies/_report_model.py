@@ -7,7 +7,7 @@ import pandas as pd
 
 from skthermo._arrays import as_floats
 from skthermo._frames import column_names
-from skthermo.studies import _report_figures as figures
+from skthermo.studies._report_figures import chosen_sensor, draw_groups, draw_histories, draw_over_temperature
 from skthermo.studies._report_html import Html, bullets, element, figure, paragraphs, section, table
 from skthermo.studies._report_numbers import counted, percent, period, shortened
 from skthermo.studies._simulate import SIMULATED, TRUE
@@ -37,10 +37,10 @@ def monitored(study: Any, structure: Any, families: list[str]) -> Html:
             "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
         ),
         table("Natural frequencies.", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, "Hz", 4)),
-        figure("Measured natural frequencies over time.", figures.histories(F)),
+        figure("Measured natural frequencies over time.", draw_histories(F)),
     ]
     if structure is not None:
-        drawn = figures.groups_of(structure, families)
+        drawn = draw_groups(structure, families)
         parts.append(figure("The structure, with the groups of members whose damage was studied in colour.", [drawn]))
     return section("monitored", "What was monitored", *parts)
 
@@ -80,7 +80,7 @@ def quality(study: Any) -> Html:
         figure(
             f"Frequencies over the temperature {sensor}, which goes most closely with them: measured, and predicted by "
             "the model.",
-            figures.over_temperature(temperature, measured, predicted),
+            draw_over_temperature(temperature, measured, predicted),
         ),
         paragraphs(
             "Temperature changes the stiffness of parts of the model. The next table says how accurately one record "
@@ -155,7 +155,7 @@ def _over_temperature(fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.Da
     frequencies = as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
     measured = F.iloc[rows]
     predicted = pd.DataFrame(frequencies, measured.index, measured.columns)
-    return measured, predicted, figures.chosen_sensor(T, F).iloc[rows]
+    return measured, predicted, chosen_sensor(T, F).iloc[rows]
 
 
 def _agreement(results: pd.DataFrame) -> list[Html]:
