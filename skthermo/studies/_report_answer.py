@@ -25,7 +25,7 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     words = paragraphs(
         "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
         "learned from measurements how temperature moves this structure, simulated it in the same weather without "
-        "damage and with damage. The alarm system judged every simulated record. Here is what it would find.",
+        "damage and with damage. The alarm system judged every simulated record.",
     )
     meaning = paragraphs(
         "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
@@ -34,8 +34,10 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
         f"{confidence} confidence; they cover the scatter of the measurements, but neither weather of another kind nor "
         "errors of the model."
     )
-    parts = [element("h3", "The structure as it is now"), bullets(identified)] if identified else []
-    parts += [words, element("h3", "False alarms"), _false_alarms(rows)]
+    parts = [words]
+    if identified:
+        parts += [element("h3", "The structure as it is now"), bullets(identified)]
+    parts += [element("h3", "False alarms"), _false_alarms(rows)]
     if findings:
         columns = ["Where", "Smallest damage found reliably", "Bounds", "From the curve; with 95 % confidence"]
         cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]
@@ -45,7 +47,7 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
             table("Smallest damage found reliably: among the tested severities, and from a curve.", columns, cells),
         ]
     else:
-        text = "No damage group was tested with several severities, so that there is no smallest damage to report."
+        text = "No damage group was tested on its own, so that there is no smallest damage to report."
         parts.append(paragraphs(text))
     parts += [element("h3", "What would not be found"), _missed(rows), element("h3", "What the words mean"), meaning]
     return section("answer", "The answer", *parts)

@@ -106,7 +106,8 @@ class Finding:
                 return ""
             return f"The limit lies between {tested(low)} and {tested(high)}; nothing in between was tested."
         a90, a90_95 = self._on_curve(self.curve.a90), self._on_curve(self.curve.a90_95)
-        return f"A curve through the tested severities puts this limit at {a90} and, with 95 % confidence, at {a90_95}."
+        sure = f"with {tested(0.95)} confidence"
+        return f"A curve through the tested severities puts this limit at {a90} and, {sure}, at {a90_95}."
 
     def _on_curve(self, severity: float) -> str:
         """A severity within those that were tested; beyond them a curve is a guess."""

@@ -52,7 +52,7 @@ def probability(value: float) -> str:
     """A probability as a number."""
     if not np.isfinite(value):
         return UNKNOWN
-    return "less than 0.001" if value < 0.001 else shortened(value)
+    return "less than 0.001" if value < 0.001 else f"{value:.2g}"
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
