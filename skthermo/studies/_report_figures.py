@@ -27,7 +27,7 @@ WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
 MANY_POINTS = 1000
 """Number of points of one line from which on it is drawn as pixels."""
 
-SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 200}
+SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
 
 
 def draw(
@@ -74,7 +74,7 @@ def _svg(figure: Any) -> bytes:
     plt = import_optional("matplotlib.pyplot", extra="plot")
     parser = import_optional("matplotlib.mathtext", extra="plot").MathTextParser("path")
     for text in figure.findobj(lambda artist: hasattr(artist, "set_parse_math")):
-        text.set_parse_math(_is_formula(text.get_text(), parser))
+        text.set_parse_math("$" in text.get_text() and _is_formula(text.get_text(), parser))
     for line in figure.findobj(lambda artist: hasattr(artist, "get_xdata")):
         line.set_rasterized(len(line.get_xdata()) > MANY_POINTS)
     drawn = b""

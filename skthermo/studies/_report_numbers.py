@@ -75,9 +75,9 @@ def duration(wait: Any) -> str:
     hours = wait.total_seconds() / 3600
     if hours == 0:
         return "first record"
-    if hours >= 48:
-        return f"{hours / 24:.2g} days" if hours < 2400 else f"{hours / 24:.0f} days"
-    return f"{hours:.2g} hours" if hours >= 1 else f"{60 * hours:.2g} minutes"
+    size, unit = (hours / 24, "day") if hours >= 48 else (hours, "hour") if hours >= 1 else (60 * hours, "minute")
+    text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
+    return f"{text} {unit}{'' if text == '1' else 's'}"
 
 
 def period(index: pd.Index | None) -> str:

@@ -29,8 +29,17 @@ def test_shares_that_are_nearly_1_or_not_known():
 
 
 def test_times_are_said_in_fitting_units():
-    waits = [pd.Timedelta(0), pd.Timedelta("20min"), pd.Timedelta("5h"), pd.Timedelta("93.5D"), pd.NaT, 12.0, np.nan]
-    said = ["first record", "20 minutes", "5 hours", "94 days", "no alarm", "12 records", "no alarm"]
+    waits = [
+        pd.Timedelta(0),
+        pd.Timedelta("20min"),
+        pd.Timedelta("5h"),
+        pd.Timedelta("1h"),
+        pd.Timedelta("93.5D"),
+        pd.NaT,
+        12.0,
+        np.nan,
+    ]
+    said = ["first record", "20 minutes", "5 hours", "1 hour", "94 days", "no alarm", "12 records", "no alarm"]
     assert [duration(wait) for wait in waits] == said
 
 
