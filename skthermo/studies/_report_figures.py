@@ -135,8 +135,11 @@ def draw_curve(finding: Finding) -> Html:
     alt = f"Share of records in alarm over the severity of {finding.family}: {rates}."
     title = finding.family if is_curve else f"{finding.family}: no curve can be fitted"
 
+    largest = np.abs(finding.severities).max()
+    marks = is_curve and max(abs(fitted.a90), abs(fitted.a90_95)) <= largest  # beyond it, a curve is a guess
+
     def make() -> PODCurveDisplay:
-        display = PODCurveDisplay.from_predictions(fitted, label="fitted curve")
+        display = PODCurveDisplay.from_predictions(fitted, label="fitted curve", marks=marks)
         if not is_curve:
             display.ax_.get_legend().remove()
         return display

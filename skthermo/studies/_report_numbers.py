@@ -16,7 +16,7 @@ def percent(share: float, digits: int = 2) -> str:
         return UNKNOWN
     value = 100 * float(share)
     if 99.5 <= value < 100:
-        return f"{value:.1f}{SPACE}%" if value < 99.95 else f"more than 99.9{SPACE}%"
+        return f"{value:.1f}{SPACE}%" if value < 99.95 else f"over{SPACE}99.9{SPACE}%"
     return f"{shortened(value, digits)}{SPACE}%"
 
 

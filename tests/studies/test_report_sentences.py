@@ -23,7 +23,7 @@ def test_shares_are_said_to_two_digits_and_only_all_is_100_percent(share):
 
 
 def test_shares_that_are_nearly_1_or_not_known():
-    assert percent(0.9999) == "more than 99.9\xa0%"
+    assert percent(0.9999) == "over\xa099.9\xa0%"
     assert percent(np.nan) == "not known"
     assert probability(0.0001) == "less than 0.001"
 
