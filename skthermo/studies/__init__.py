@@ -9,6 +9,7 @@ from skthermo.studies._scenario import Scenario
 from skthermo.studies._study import DetectabilityStudy
 from skthermo.studies._sweep import sweep
 from skthermo.studies._uncertain import UncertainDamage
+from skthermo.studies._what_to_add import what_to_add
 
 __all__ = [
     "DetectabilityStudy",
@@ -21,4 +22,5 @@ __all__ = [
     "pod_curve",
     "report",
     "sweep",
+    "what_to_add",
 ]
