@@ -86,7 +86,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     if has_truth:
         introduction += reference
     parts = [paragraphs(introduction), table("Alarms in every scenario.", columns, cells)]
-    curves = [draw_curve(found) for found in findings if found.curve is not None]
+    curves = [draw_curve(found, found.curve) for found in findings if found.curve is not None]
     if curves:
         parts.append(element("h3", "How the share of alarms grows with damage"))
     parts.append(

@@ -3,6 +3,7 @@
 import textwrap
 import warnings
 from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -19,6 +20,7 @@ from skthermo.plotting import (
     PODCurveDisplay,
     StructureDisplay,
 )
+from skthermo.studies._pod_curve import PODCurve
 from skthermo.studies._report_findings import Finding
 from skthermo.studies._report_html import Html, image
 from skthermo.studies._report_numbers import percent, shortened, tested
@@ -35,7 +37,7 @@ def draw(
     alt: str,
     title: str = "",
     *,
-    height: float = HEIGHT,
+    height: float | None = HEIGHT,
     width: float = WIDTH,
 ) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
@@ -49,7 +51,7 @@ def draw(
     title : str, default=""
         Of its first axes.
     height, width : float
-        In inches.
+        In inches; without a height, the drawing keeps its proportions.
 
     Returns
     -------
@@ -60,7 +62,8 @@ def draw(
     try:
         with plt.style.context("default"), plt.rc_context(SETTINGS):
             display = make()
-            display.figure_.set_size_inches(width, height)
+            own_width, own_height = display.figure_.get_size_inches()
+            display.figure_.set_size_inches(width, own_height / own_width * width if height is None else height)
             if title:
                 display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
             return image(_svg(display.figure_), alt)
@@ -107,7 +110,7 @@ def draw_histories(F: pd.DataFrame) -> list[Html]:
         alt = (
             f"Measured frequency {F.columns[mode]} over time: between {shortened(low, 4)} and {shortened(high, 4)} Hz."
         )
-        drawn.append(draw(lambda t=table: HistoryDisplay.from_predictions(t), alt, height=2.2))
+        drawn.append(draw(partial(HistoryDisplay.from_predictions, table), alt, height=2.2))
     return drawn
 
 
@@ -120,13 +123,12 @@ def draw_over_temperature(temperature: pd.Series, measured: pd.DataFrame, predic
             f"Frequency {measured.columns[mode]} over the temperature {temperature.name}, measured and predicted by "
             "the model."
         )
-        drawn.append(draw(lambda t=tables: FrequencyTemperatureDisplay.from_predictions(*t), alt))
+        drawn.append(draw(partial(FrequencyTemperatureDisplay.from_predictions, *tables), alt))
     return drawn
 
 
-def draw_curve(finding: Finding) -> Html:
+def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
     """Probability of detection of one family of scenarios."""
-    fitted = finding.curve
     is_curve = bool(np.isfinite(fitted.slope))
     rates = ", ".join(
         f"{percent(rate)} at {tested(severity)}"
@@ -171,11 +173,7 @@ def draw_groups(structure: Any, families: list[str]) -> Html:
     """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
-    make: Callable[[], Any] = lambda: StructureDisplay.from_structure(structure, groups=known)  # noqa: E731
-    figure = make().figure_
-    size = figure.get_size_inches() * 6.5 / 9.0
-    import_optional("matplotlib.pyplot", extra="plot").close(figure)
-    return draw(make, alt, width=float(size[0]), height=float(size[1]) + 0.5)
+    return draw(partial(StructureDisplay.from_structure, structure, groups=known), alt, height=None, width=6.5)
 
 
 def draw_identified_damage(identified: Any) -> Html:

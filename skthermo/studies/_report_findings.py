@@ -130,7 +130,9 @@ def _finding(study: Any, family: Any, rows: pd.DataFrame, source: str) -> Findin
     rows = rows.iloc[np.argsort(rows["severity"].abs().to_numpy(), kind="stable")]
     severities = rows["severity"].to_numpy(dtype=float)
     try:
-        limits = [minimum_detectable_damage(severities, rows[name], LEVEL) for name in ("rate", "highest", "lowest")]
+        smallest, lowest, highest = (
+            minimum_detectable_damage(severities, rows[name], LEVEL) for name in ("rate", "highest", "lowest")
+        )
     except ValueError:  # damage and strengthening in one family, or one severity twice
         return None
     curve, problem = None, ""
@@ -143,4 +145,5 @@ def _finding(study: Any, family: Any, rows: pd.DataFrame, source: str) -> Findin
                 curve = study.pod_curve(family, source)
         except ValueError:
             problem = "The share of alarms does not increase with severity, so that no curve can be drawn."
-    return Finding(str(family), severities, rows["rate"].to_numpy(dtype=float), *limits, curve, problem)
+    rates = rows["rate"].to_numpy(dtype=float)
+    return Finding(str(family), severities, rates, smallest, lowest, highest, curve, problem)
