@@ -72,6 +72,15 @@ def draw(
             plt.close(number)
 
 
+def _fold_legend(figure: Any, place: str, n_columns: int) -> None:
+    """Put the legend of a figure into fewer columns, so that it fits a narrow drawing."""
+    for legend in list(figure.legends):
+        labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
+        legend.remove()
+        style = {"ncols": n_columns, "frameon": False, "fontsize": "medium" if n_columns == 2 else "small"}
+        figure.legend(legend.legend_handles, labels, loc=place, **style)
+
+
 def _svg(figure: Any) -> bytes:
     """A figure as SVG: letters as shapes or, if the font lacks some, as text in fonts of the reader."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
@@ -159,11 +168,7 @@ def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) ->
 
     def make() -> DamageIndexDisplay:
         display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
-        for legend in list(display.figure_.legends):  # two columns fit the narrow drawing
-            labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
-            handles = legend.legend_handles
-            legend.remove()
-            display.figure_.legend(handles, labels, loc="outside upper center", ncols=2, frameon=False)
+        _fold_legend(display.figure_, "outside upper center", n_columns=2)
         return display
 
     return draw(make, f"Damage index over time. {above}.", height=3.4)
@@ -173,7 +178,15 @@ def draw_groups(structure: Any, families: list[str]) -> Html:
     """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
-    return draw(partial(StructureDisplay.from_structure, structure, groups=known), alt, height=None, width=6.5)
+
+    def make() -> StructureDisplay:
+        display = StructureDisplay.from_structure(structure, groups=known)
+        _fold_legend(
+            display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=3
+        )
+        return display
+
+    return draw(make, alt, height=None, width=6.5)
 
 
 def draw_identified_damage(identified: Any) -> Html:

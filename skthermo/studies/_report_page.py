@@ -47,6 +47,7 @@ code { font-size: 0.88em; overflow-wrap: anywhere; }
   :root { color-scheme: light; --page: #fff; --card: #fff; --text: #000; --soft: #333; --line: #bbb; --bar: #ddd;
     --accent: #00466f; }
   body { font-size: 10pt; }
+  table, figcaption { font-size: 9pt; }
   header, main, footer { max-width: none; padding: 0; }
   nav { display: none; }
   section { border: 0; padding: 0.5rem 0; }
