@@ -4,6 +4,7 @@ from skthermo.studies._identified import IdentifiedDamage
 from skthermo.studies._identify import identify_damage
 from skthermo.studies._pod_curve import PODCurve, pod_curve
 from skthermo.studies._progressive import ProgressiveDamage
+from skthermo.studies._report import report
 from skthermo.studies._scenario import Scenario
 from skthermo.studies._study import DetectabilityStudy
 from skthermo.studies._sweep import sweep
@@ -19,6 +20,7 @@ __all__ = [
     "UncertainDamage",
     "identify_damage",
     "pod_curve",
+    "report",
     "sweep",
     "what_to_add",
 ]

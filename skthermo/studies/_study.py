@@ -61,6 +61,8 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         Columns that the detector sees, and the number of healthy records that it has learned.
     threshold_ : float or None
         Damage index above which there is an alarm, where the detector has one.
+    warnings_ : list of str
+        Texts of the warnings that the simulations gave.
 
     See Also
     --------
@@ -199,7 +201,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         if lacking:
             raise ValueError(f"the detector is {self.detector!r:.200}, without {lacking}; expected an outlier detector")
         measured = {} if reference is None or callable(reference) else reference
-        with warnings_once(), single_blas_thread():
+        with warnings_once() as self.warnings_, single_blas_thread():
             clean = clean_frequencies(self.fem, list(scenarios.values()), T, n_repeats)
             truth = reference if callable(reference) else None
             trial = Trial(self.fem, self.detector_, view, list(scenarios.values()), T, clean, self.noise, truth)
