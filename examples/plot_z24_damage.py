@@ -81,7 +81,7 @@ def detectors():
     return found
 
 
-def simulation_table(bridge, records, fem, found, names=None, n_repeats=20):
+def simulation_table(bridge, records, fem, found, names=None, n_repeats=40):
     """Alarms on measured records, and the band of simulated ones, in percent; the baseline is measured in both."""
     later = bridge.split()[2]
     states = {
@@ -142,7 +142,7 @@ def main():
         "Mean shift of every mode in percent, measured and explained:", 100 * found.shifts.drop(columns="n_records"), 2
     )
     show(
-        "Alarms in percent, measured and simulated (mean and band of 20 draws of damage and noise):",
+        "Alarms in percent, measured and simulated (mean and band of 40 draws of damage and noise):",
         simulation_table(bridge, records, fem, found),
     )
     damage = IdentifiedDamageDisplay.from_predictions(found)
