@@ -18,19 +18,18 @@ Run it with ``python examples/plot_gauss_newton_step.py``; the figure goes to th
 import argparse
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import linearise
+from skthermo.plotting import HistoryDisplay
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 NOISE = 0.002  # of the records, relative
 SCATTER = 0.005  # the same and what the model cannot follow
 WIDTH = 0.2
-BLUE, ORANGE = "#0072B2", "#D55E00"
 
 
 def gauss_newton_step(model, theta: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
@@ -77,13 +76,11 @@ def main(figures: Path) -> None:
     error = misfit(model, default.predict_parameters(later.temperatures), later.frequencies)
     print(f"The same where the surrogate refines its estimates itself, as by default: {error.mean():.3f} %")
 
-    fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
-    ax.plot(before.index, before, ".", color=BLUE, markersize=4, label="inverse surrogate")
-    ax.plot(after.index, after, ".", color=ORANGE, markersize=4, label="after one Gauss-Newton step")
-    ax.set(ylabel="misfit of six frequencies (%)", ylim=(0, None))
-    ax.legend(frameon=False)
+    histories = {"inverse surrogate": before, "after one Gauss-Newton step": after}
+    display = HistoryDisplay.from_predictions(histories, unit="%", kind="points", titles=["misfit of six frequencies"])
+    display.axes_[0].set_ylim(bottom=0)
     figures.mkdir(exist_ok=True, parents=True)
-    fig.savefig(figures / "gauss_newton_step.png", dpi=150)
+    display.figure_.savefig(figures / "gauss_newton_step.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo.datasets import kw51_structure, make_kw51
+from skthermo.plotting import SensitivityDisplay
 from skthermo.updating import ModelUpdater, identifiability, sensitivity
 
 MODES = [f"f{i}" for i in range(1, 7)]
@@ -117,16 +118,9 @@ def plot_a3(ours):
     paper = pd.DataFrame(PAPER_A3, index=MODES).T
     fig, axes = plt.subplots(1, 2, figsize=(8, 7.5), sharey=True, layout="constrained")
     for ax, table, title in zip(axes, (paper, ours), ("paper, Table A.3", "here"), strict=True):
-        image = ax.imshow(table, cmap="RdBu_r", vmin=-0.45, vmax=0.45, aspect="auto")
-        for (row, column), value in np.ndenumerate(table.to_numpy()):
-            if abs(value) >= 0.005:
-                colour = "white" if abs(value) > 0.25 else "black"
-                ax.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
-        ax.set_xticks(range(6), MODES)
-        ax.set_yticks(range(len(table)), table.index)
+        display = SensitivityDisplay.from_predictions(table.T, ax=ax, limit=0.45, colorbar=False)
         ax.set_title(title)
-        ax.tick_params(length=0)
-    fig.colorbar(image, ax=axes, label="normalised sensitivity, eq. (A.1)", shrink=0.6)
+    fig.colorbar(display.image_, ax=axes, label="normalised sensitivity, eq. (A.1)", shrink=0.6)
     return fig
 
 

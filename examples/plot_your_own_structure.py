@@ -19,7 +19,6 @@ import tempfile
 import warnings
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from sklearn.linear_model import LinearRegression, Ridge
@@ -28,6 +27,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skthermo.fem import Beam, Spring, Structure, add_noise, match_modes
 from skthermo.metrics import mape
+from skthermo.plotting import FrequencyTemperatureDisplay, PredictionDisplay
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater, identifiability
@@ -35,7 +35,6 @@ from skthermo.updating import ModelUpdater, identifiability
 HEIGHT, N_BEAMS = 25.0, 12
 PARAMETERS = {"E": ("E", "walls"), "G": ("G", "walls"), "rocking_x": "rocking_x", "rocking_y": "rocking_y"}
 LAGS, SCATTER = [0, 2, 6, 12, 24], 0.003  # half hours; of one record, relative
-BLUE, ORANGE = "#0072B2", "#D55E00"
 
 
 def read_log(path):
@@ -174,45 +173,25 @@ def provoked(model, fem, T, F):
     }
 
 
-def plot_over_temperature(T, F, predicted):
-    """Every frequency over T2, measured and predicted."""
-    fig, axes = plt.subplots(2, 4, figsize=(13, 6), sharex=True, layout="constrained")
-    for ax, mode in zip(axes.flat, F, strict=False):
-        ax.plot(T["T2"], F[mode], ".", ms=3, color=BLUE, label="measured")
-        ax.plot(T["T2"], predicted[mode], ".", ms=3, color=ORANGE, label="data-informed FE model")
-        ax.set_title(mode)
-    axes[1, 3].axis("off")
-    axes[0, 3].tick_params(labelbottom=True)
-    fig.supxlabel("T2 (°C)")
-    fig.supylabel("frequency (Hz)")
-    axes[1, 3].legend(*axes[0, 0].get_legend_handles_labels(), loc="center", markerscale=4, frameon=False)
-    return fig
-
-
-def plot_hold_out(F, predicted, n_train):
-    """Three frequencies over time, before and after the last training record."""
-    fig, axes = plt.subplots(3, 1, figsize=(11, 7), sharex=True, layout="constrained")
-    for ax, mode in zip(axes, ("f1", "f4", "f6"), strict=True):
-        ax.plot(F[mode], ".", ms=3, color=BLUE, label="measured")
-        ax.plot(predicted[mode], ".", ms=2, color=ORANGE, label="data-informed FE model")
-        ax.axvline(F.index[n_train], color="black", ls="--", lw=1)
-        ax.set_ylabel(f"{mode} (Hz)")
-    axes[0].text(F.index[n_train], 1.03, " hold-out", transform=axes[0].get_xaxis_transform())
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, markerscale=4)
-    return fig
-
-
-def plot_parameters(T, fem, n_train):
-    """Parameters over T2: estimated from frequencies, and predicted from temperatures."""
-    fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
-    learned = quietly(fem.predict_parameters, T)
-    for ax, name in zip(axes, learned, strict=True):
-        ax.plot(T["T2"][:n_train], fem.parameters_[name], ".", ms=3, color=BLUE, label="from frequencies")
-        ax.plot(T["T2"], learned[name], ".", ms=3, color=ORANGE, label="from temperatures")
-        ax.set(title=name.replace("_", " "), xlabel="T2 (°C)")
-    axes[0].set_ylabel("multiplier of the updated stiffness")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, markerscale=4)
-    return fig
+def draw(T, F, fem, n_train):
+    """Figures by name: frequencies over temperature and in time, and parameters over temperature."""
+    predicted, learned = quietly(fem.predict, T), quietly(fem.predict_parameters, T)
+    shown = ["f1", "f4", "f6"]
+    displays = {
+        "over_temperature": FrequencyTemperatureDisplay.from_predictions(T["T2"], F, predicted),
+        "hold_out": PredictionDisplay.from_predictions(
+            F[shown], predicted[shown], marks={"hold-out": F.index[n_train]}
+        ),
+        "parameters": FrequencyTemperatureDisplay.from_predictions(
+            T["T2"],
+            fem.parameters_.reindex(T.index),
+            learned,
+            labels=("from frequencies", "from temperatures"),
+            quantity="multiplier of the updated stiffness",
+            unit="",
+        ),
+    }
+    return {name: display.figure_ for name, display in displays.items()}
 
 
 def main():
@@ -241,14 +220,8 @@ def main():
     for mistake, messages in provoked(model, fem, T[:n_train], F[:n_train]).items():
         print(f"{mistake}:", *(messages or ["no warning"]), sep="\n  ")
 
-    predicted = quietly(fem.predict, T)
-    figures = {
-        "over_temperature": plot_over_temperature(T, F, predicted),
-        "hold_out": plot_hold_out(F, predicted, n_train),
-        "parameters": plot_parameters(T, fem, n_train),
-    }
     options.figures.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures.items():
+    for name, figure in draw(T, F, fem, n_train).items():
         path = options.figures / f"your_own_structure_{name}.png"
         figure.savefig(path, dpi=110)
         print(f"Figure: {path}")

@@ -30,6 +30,7 @@ from sklearn.multioutput import MultiOutputRegressor
 from skthermo.datasets import load_z24, make_z24
 from skthermo.fem import sample
 from skthermo.metrics import mape
+from skthermo.plotting import FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import sensitivity
@@ -40,7 +41,7 @@ Expected a CSV or MATLAB file as skthermo.datasets.load_z24 describes it, or a f
 {", ".join(FILES)}. The monitoring data of the Z24 bridge are provided by KU Leuven for
 non-commercial use on request: https://bwk.kuleuven.be/bwm/z24. Pass the path, or set SKTHERMO_DATA."""
 
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#777777"
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#777777"
 KINDS = ["vertical", "lateral", "vertical", "torsion"]
 MODES = [f"$f_{i}$ ({kind})" for i, kind in enumerate(KINDS, 1)]
 
@@ -132,48 +133,41 @@ def hold_out_table(bridge):
 
 def plot_over_time(bridge, fem):
     """Measured and predicted frequencies over the monitored year; the last fifth is hold-out data."""
-    fig, axes = plt.subplots(5, 1, figsize=(11, 9), sharex=True, layout="constrained")
-    predicted = fem.predict(bridge.T)
-    for ax, mode, name in zip(axes, bridge.F, MODES, strict=False):
-        ax.plot(bridge.F[mode], ".", ms=2, color=BLUE, label="measured")
-        ax.plot(predicted[mode], ".", ms=1.5, color=ORANGE, label="data-informed FE model")
-        ax.set_ylabel(f"{name}\n(Hz)")
-    axes[4].plot(bridge.T["TP"], ".", ms=2, color=GREY)
-    axes[4].axhline(0, color="black", lw=0.7)
-    axes[4].set(ylabel="pavement\n(°C)", xlabel="date")
-    for ax in axes:
-        ax.axvline(bridge.T.index[bridge.n_train], color="black", ls="--", lw=1)
-    axes[0].text(bridge.T.index[bridge.n_train], 1.03, " hold-out", transform=axes[0].get_xaxis_transform())
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, markerscale=5)
+    fig, axes = plt.subplots(5, 1, figsize=(11, 10), sharex=True, layout="constrained")
+    marks = {"hold-out": bridge.T.index[bridge.n_train]}
+    PredictionDisplay.from_estimator(fem, bridge.T, bridge.F, ax=axes[:4], titles=MODES, marks=marks)
+    HistoryDisplay.from_predictions(bridge.T["TP"], unit="°C", ax=axes[4], titles=["pavement"], marks=marks)
+    for ax in axes[:4]:
+        ax.set_xlabel("")
     return fig
 
 
 def plot_over_temperature(bridge, fem):
     """The knee at 0 °C, measured and predicted, in the hold-out records and in all others."""
-    fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
-    predicted = fem.predict(bridge.T)
-    for ax, mode, name in zip(axes, bridge.F, MODES, strict=True):
-        ax.plot(bridge.T["TP"], bridge.F[mode], ".", ms=2, color=BLUE, label="measured")
-        ax.plot(bridge.T["TP"], predicted[mode], ".", ms=1.5, color=ORANGE, label="data-informed FE model")
-        ax.axvline(0, color="black", lw=0.7)
-        ax.set(title=name, xlabel="pavement (°C)")
-    axes[0].set_ylabel("frequency (Hz)")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, markerscale=5)
-    return fig
+    display = FrequencyTemperatureDisplay.from_estimator(fem, bridge.T, bridge.F, sensor="TP", titles=MODES)
+    return with_freezing_point(display)
 
 
 def plot_parameters(bridge, fem):
     """Parameters over temperature: M1 estimates them from frequencies, M2 predicts them from temperatures."""
-    fig, axes = plt.subplots(1, 4, figsize=(13, 3.8), layout="constrained")
     learned = fem.predict_parameters(bridge.T)
-    for ax, name in zip(axes, learned, strict=True):
-        ax.plot(bridge.T["TP"][: bridge.n_train], fem.parameters_[name], ".", ms=2, color=BLUE, label="$M_1$")
-        ax.plot(bridge.T["TP"], learned[name], ".", ms=2, color=ORANGE, label="$M_2$")
+    display = FrequencyTemperatureDisplay.from_predictions(
+        bridge.T["TP"],
+        fem.parameters_.reindex(bridge.T.index),
+        learned,
+        labels=("$M_1$, from frequencies", "$M_2$, from temperatures"),
+        quantity="multiplier of the nominal stiffness",
+        unit="",
+    )
+    return with_freezing_point(display)
+
+
+def with_freezing_point(display):
+    """The figure of a display over the temperature of the pavement, with a line at 0 °C."""
+    for ax in display.axes_:
         ax.axvline(0, color="black", lw=0.7)
-        ax.set(title=name.replace("_", " "), xlabel="pavement (°C)")
-    axes[0].set_ylabel("multiplier of the nominal stiffness")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, markerscale=5)
-    return fig
+        ax.set_xlabel("pavement (°C)")
+    return display.figure_
 
 
 def read_arguments(description):

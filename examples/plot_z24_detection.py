@@ -34,6 +34,7 @@ from skthermo.detection import (
     WindowedAlarm,
 )
 from skthermo.metrics import time_to_detection
+from skthermo.plotting import DamageIndexDisplay
 from skthermo.surrogate import TemperatureMapper
 
 FREQUENCIES = ["f1", "f2", "f3", "f4"]
@@ -206,18 +207,17 @@ def plot_spread(records, inputs):
     return fig
 
 
-def plot_indices(panels, onset):
+def plot_indices(panels, onset, **options):
     """Damage index over time, a panel for each detector and the records that it sees."""
-    fig, axes = plt.subplots(len(panels), 1, figsize=(10, 2.6 * len(panels)), sharex=True, layout="constrained")
-    for ax, (title, (detector, records)) in zip(axes, panels.items(), strict=True):
+    indices, thresholds = {}, {}
+    for title, (detector, records) in panels.items():
         index = records.each(detector.fit(records.baseline).damage_index)
-        plot_kinds(ax, index.each(lambda series: series.index), index, ms=2.5)
-        ax.axhline(detector.threshold_, color="black", ls="--", lw=1, label="threshold")
-        ax.axvline(onset, color="black", lw=1, label="first damaged record")
-        ax.set(ylim=0, title=title, ylabel="damage index")
-    axes[-1].set_xlabel("time, by the hour counter of the records")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, markerscale=4)
-    return fig
+        indices[title] = {label: getattr(index, kind) for kind, (label, _) in KINDS.items()}
+        thresholds[title] = detector.threshold_
+    colours = dict(KINDS.values())
+    display = DamageIndexDisplay.from_scenarios(indices, thresholds, onset=onset, colours=colours, **options)
+    display.axes_[-1].set_xlabel("time, by the hour counter of the records")
+    return display.figure_
 
 
 def show(title, table, digits=1):
@@ -257,7 +257,7 @@ def main():
         "z24_detection": plot_indices(
             {title: (MahalanobisDetector(), seen) for title, seen in mahalanobis.items()}, records.onset
         ),
-        "z24_days": plot_indices(windows, records.onset),
+        "z24_days": plot_indices(windows, records.onset, label="damage index of a day"),
         "z24_spread": plot_spread(records, inputs),
     }
     save(figures, folder)

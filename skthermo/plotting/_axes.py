@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo.plotting._style import GREY, drawing, pyplot
+from skthermo.plotting._style import GREY, drawing, label_of, pyplot
 
 Axes: TypeAlias = Any
 """Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
@@ -52,6 +52,25 @@ def panels(
     if len(given) != len(names):
         raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
     return given
+
+
+def panel_names(titles: Sequence[str] | None, columns: Sequence[Any]) -> list[str]:
+    """Names of the panels: those that are given, or those of the columns.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many titles as columns.
+    """
+    if titles is not None and len(titles) != len(columns):
+        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
+    return [label_of(name) for name in (columns if titles is None else titles)]
+
+
+def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
+    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
+    n_rows = -(-n_panels // n_columns)
+    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
 
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:

@@ -252,7 +252,7 @@ class DamageIndexDisplay:
             else:
                 one.set_ylim(bottom=0)
             if ax is not None or number % n_columns == 0:
-                one.set_ylabel(self.label if height > 3 else self.label.replace(", ", ",\n"))
+                one.set_ylabel(self.label if height > 3 else self.label.replace(" (", "\n("))
         for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
             date_axis(one, next(iter(self.scenarios[title].values())).index)
         figure_legend(self.axes_, ax is None, n_columns=5)

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows, column_names
-from skthermo.plotting._axes import Axes, figure_legend, panels
+from skthermo.plotting._axes import Axes, figure_legend, panel_names, panels
 from skthermo.plotting._style import label_of, marker_style, with_unit
 from skthermo.plotting._tables import as_table, check_like
 
@@ -179,7 +179,7 @@ class FrequencyTemperatureDisplay:
         FrequencyTemperatureDisplay
             Itself.
         """
-        names = [label_of(name) for name in (titles or self.measured.columns)]
+        names = panel_names(titles, list(self.measured.columns))
         n_columns = n_columns if len(names) != 6 else min(n_columns, 3)
         self.axes_ = panels(ax, names, (3.3, 3.2), n_columns)
         self.figure_ = self.axes_[0].figure

@@ -6,8 +6,8 @@ from typing import Any, Literal
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panels
-from skthermo.plotting._style import label_of, line_style, marker_style, with_unit
+from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
+from skthermo.plotting._style import line_style, marker_style, with_unit
 from skthermo.plotting._tables import as_tables, in_time, with_breaks
 
 
@@ -173,8 +173,8 @@ class HistoryDisplay:
         if kind not in ("auto", "points", "lines"):
             raise ValueError(f"kind is {kind!r}; expected 'auto', 'points' or 'lines'")
         first = next(iter(self.histories.values()))
-        names = [label_of(name) for name in (titles or first.columns)]
-        self.axes_ = panels(ax, names, (9.0 if n_columns == 1 else 5.5, 1.9), n_columns, share_x=True)
+        names = panel_names(titles, list(first.columns))
+        self.axes_ = panels(ax, names, size_in_time(len(names), n_columns), n_columns, share_x=True)
         self.figure_ = self.axes_[0].figure
         self.lines_ = {}
         for number, (label, table) in enumerate(self.histories.items()):

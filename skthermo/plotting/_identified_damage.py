@@ -26,7 +26,8 @@ class IdentifiedDamageDisplay:
     ----------
     identified : IdentifiedDamage
         With the frames ``table`` (groups in rows; severity, standard_error, significant), ``shifts`` (modes in rows;
-        measured, explained, standard_error; relative) and ``similarity`` (cosine between groups).
+        measured, explained, standard_error; relative) and ``similarity`` (cosine between groups), and perhaps the names
+        ``unseen`` of groups that are left out.
 
     Attributes
     ----------
@@ -140,6 +141,10 @@ class IdentifiedDamageDisplay:
         ax.set_yticks(places, names)
         ax.set(title=f"severity ± {N_ERRORS} standard errors", xlabel="severity (%)", ylim=(len(table) - 0.5, -0.5))
         ax.legend(frameon=False, fontsize="small")
+        unseen = list(getattr(self.identified, "unseen", ()))
+        if unseen:
+            text = f"left out, as these modes do not show them: {', '.join(map(str, unseen))}"
+            ax.text(0.5, -0.2, text, transform=ax.transAxes, ha="center", va="top", fontsize="small", wrap=True)
         return drawn
 
     def _draw_shifts(self, ax: Axes) -> None:

@@ -210,9 +210,10 @@ class ModeShapesDisplay:
             self.lines_.append(drawn)
             draw_supports(ax_, self.structure, size=7)
             set_view(ax_, points, cell)
-            ax_.set_title(f"$f_{{{mode + 1}}}$ = {frequency:.{3 if frequency < 10 else 2}f} Hz", fontsize="medium")
+            title = f"$f_{{{mode + 1}}}$ = {frequency:.{3 if frequency < 10 else 2}f} Hz"
+            ax_.set_title(title, fontsize="medium", y=None if cell is None else 1.0)
             if cell is not None:
-                ax_.title.set_y(title_height(ax_, cell))
+                ax_.title.set_y(title_height(ax_, cell))  # axes in space would scale it, were it given above
         return self
 
     def _parts(self, colour: str | Mapping[str, str]) -> list[tuple[list[Hashable], str]]:

@@ -37,8 +37,9 @@ class PODCurveDisplay:
         Its bounds.
     errorbar_ : ErrorbarContainer
         Observed shares with Wilson's intervals of 95 %, which hold for independent records.
-    marks_ : dict of str to Line2D
-        Lines at ``"a90"`` and ``"a90_95"``, where they are finite.
+    marks_ : dict of str to artist
+        Lines at ``"a90"`` and ``"a90_95"`` where they are finite; or, where the records determine no curve, the
+        ``"bracket"`` of the curve, between whose severities a90 lies.
 
     Examples
     --------
@@ -149,6 +150,12 @@ class PODCurveDisplay:
                 style = {"color": colour, "linestyle": dashes, "linewidth": 1}
                 label = f"{text} = {100 * value:.1f} %"
                 drawn[name] = self.ax_.plot([100 * value] * 2, [-3, 90], **style, label=label)[0]
+        ends = np.array(getattr(self.curve, "bracket", (np.nan, np.nan)), dtype=float)
+        if not drawn and np.isnan(self.curve.a90) and np.isfinite(ends).all():
+            low, high = np.sort(100 * ends * np.sign(np.asarray(self.curve.severities)[-1]))
+            style = {"facecolor": colour, "alpha": 0.15, "hatch": "//"}
+            label = f"$a_{{90}}$ between {low:.1f} and {high:.1f} %"
+            drawn["bracket"] = self.ax_.axvspan(low, high, **style, label=label)
         if drawn and not any(line.get_gid() == "90" for line in self.ax_.lines):
             self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":", gid="90")
         return drawn

@@ -8,8 +8,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows
-from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panels
-from skthermo.plotting._style import BLACK, BLUE, ORANGE, label_of, line_style, marker_style, with_unit
+from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
+from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
 
@@ -206,10 +206,9 @@ class PredictionDisplay:
         """
         if kind not in ("time", "scatter"):
             raise ValueError(f"kind is {kind!r}; expected 'time' or 'scatter'")
-        names = [label_of(name) for name in (titles or self.measured.columns)]
+        names = panel_names(titles, list(self.measured.columns))
         n_columns = n_columns or (1 if kind == "time" else 3)
-        width = 3.4 if kind == "scatter" else 9.0 if n_columns == 1 else 5.5
-        size = (width, 3.3 if kind == "scatter" else 1.9)
+        size = (3.4, 3.3) if kind == "scatter" else size_in_time(len(names), n_columns)
         self.axes_ = panels(ax, names, size, n_columns, share_x=kind == "time")
         self.figure_ = self.axes_[0].figure
         self.measured_: list[Any] = []

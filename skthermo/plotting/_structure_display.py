@@ -1,7 +1,7 @@
 """Structures with a value for each member."""
 
 import itertools
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -189,7 +189,7 @@ class StructureDisplay:
         width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
         coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
         rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
-        parts = {"other members": (rest, GREY if not coloured else LIGHT)}
+        parts: dict[str, tuple[Iterable[Hashable], str]] = {"other members": (rest, GREY if not coloured else LIGHT)}
         parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
         for name, (members, colour) in parts.items():
             _, lines, surfaces = sort_members(self.structure, members)
@@ -224,12 +224,12 @@ def values_by_member(structure: Structure, values: Any) -> Array:
             raise ValueError(f"values has shape {array.shape}; expected ({len(members)},), one for each member")
         return array
     found: dict[Hashable, float] = {}
+    own = [key for key in values if key not in groups]
     for key in [key for key in values if key in groups]:
-        for member in groups[key]:
-            value = float(values[key])
-            if found.setdefault(member, value) != value and member not in values:
+        for member in groups[key].difference(own):
+            if found.setdefault(member, float(values[key])) != float(values[key]):
                 raise ValueError(f"member {member!r} is in several groups with different values; expected one value")
-    for key in [key for key in values if key not in groups]:
+    for key in own:
         if key not in structure.members:
             raise ValueError(f"values names {key!r}; expected members, or groups among {sorted(groups)}")
         found[key] = float(values[key])

@@ -1,5 +1,7 @@
 """Studies of what a monitoring system would detect."""
 
+from skthermo.studies._identified import IdentifiedDamage
+from skthermo.studies._identify import identify_damage
 from skthermo.studies._pod_curve import PODCurve, pod_curve
 from skthermo.studies._progressive import ProgressiveDamage
 from skthermo.studies._scenario import Scenario
@@ -10,10 +12,12 @@ from skthermo.studies._what_to_add import what_to_add
 
 __all__ = [
     "DetectabilityStudy",
+    "IdentifiedDamage",
     "PODCurve",
     "ProgressiveDamage",
     "Scenario",
     "UncertainDamage",
+    "identify_damage",
     "pod_curve",
     "sweep",
     "what_to_add",

@@ -167,6 +167,8 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             - ``measure``: "PFA", the probability of false alarm, of a healthy structure, else "POD", the probability of
               detection, from the onset of the damage on;
             - ``rate``, ``lowest``, ``highest``: share of records in alarm, and its bounds;
+            - ``band_lowest``, ``band_highest``: range of the rates of single repeats, which a measured campaign of this
+              length and state should lie in with the probability ``confidence``;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can judge;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on

@@ -41,12 +41,13 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     start = times.min() if scenario.onset is None else time_of(rows, scenario.onset, "onset")
     order = np.argsort(times, kind="stable")
     order = order[times[order] >= start]
-    rate = rate_of(decisions[:, order], **options)
+    rate = rate_of(decisions[:, order], whole_repeats=scenario.n_draws > 1, **options)
     if not rate.n_records:
         raise ValueError(
             f"none of {decisions.shape[1]} records of scenario {scenario.name!r}, source {source!r}, can be judged: "
             "they lack what the detector needs, or are before the onset; expected some that it can judge"
         )
+    band = band_of(decisions[:, order], options["confidence"])
     return {
         "scenario": scenario.name,
         "family": scenario.family,
@@ -56,12 +57,22 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
         "rate": rate.rate,
         "lowest": rate.lowest,
         "highest": rate.highest,
+        "band_lowest": band[0],
+        "band_highest": band[1],
         "n_alarms": rate.n_alarms,
         "n_records": rate.n_records,
         "n_effective": rate.n_effective,
         "n_repeats": len(decisions),
         "time_to_detection": _mean_wait(decisions[:, order] < 0, times[order] - start, rows),
     }
+
+
+def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
+    """Central range of the rates of single repeats, with this share of them."""
+    judged = (~np.isnan(decisions)).sum(axis=1)
+    rates = (decisions < 0).sum(axis=1)[judged > 0] / judged[judged > 0]
+    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2])
+    return float(lowest), float(highest)
 
 
 def damage_index(detector: Any, table: Any, rows: Any) -> pd.Series:

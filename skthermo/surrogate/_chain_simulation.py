@@ -45,9 +45,10 @@ class ChainSimulation:
             Mass added to the model's in kg; a vector holds lumped masses.
         noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
             Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals, out of fold, of a whole training record of similar weather, so that modes scatter together,
-            scatter more in frost, and are missing as in the training records. Runs of consecutive records are drawn if
-            residuals are serially correlated; rows of X should then be in order of time.
+            residuals of a whole training record of similar weather: their scatter out of fold, around the mean that
+            the fit leaves in such weather. So modes scatter together, scatter more in frost, and are missing as in the
+            training records. Runs of consecutive records are drawn if residuals are serially correlated; rows of X
+            should then be in order of time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 

@@ -106,8 +106,8 @@ class ChainUncertainty:
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
-            Measured frequency over the out-of-fold prediction, minus 1: what the chain leaves unexplained in such
-            weather. NaN where an input of M2 is missing.
+            Measured frequency over the prediction, minus 1: what the chain leaves unexplained in such weather. NaN
+            where an input of M2 is missing.
         """
         inputs, known = self._weather(X)
         expected = np.full((len(inputs), len(self.mode_names_)), np.nan)
@@ -117,7 +117,7 @@ class ChainUncertainty:
 
     @property
     def training_records_(self) -> tuple[Any, Any]:
-        """Temperatures and frequencies that `fit` has seen."""
+        """Temperatures and frequencies that `fit` was given."""
         check_is_fitted(self)
         return self._records[:2]
 
@@ -146,10 +146,15 @@ class ChainUncertainty:
             options = {} if weights is None else weights_for(last_step(self.mapper_), weights[order][rows][train])
             mapper = clone(last_step(self.mapper_)).fit(inputs[rows][train], theta[rows][train], **options)
             predicted[test], folds[test] = as_columns(mapper.predict(inputs[rows][test])), fold
-        frequencies = self.simulator_.frequencies(self._possible(predicted)[0], self.n_jobs, warn=False)
-        values = measured[rows] / as_floats(self.aligner_.inverse_transform(frequencies)) - 1
+        own = as_columns(self.mapper_.predict(T))[order][rows]
+        values, own = (measured[rows] / self._of_parameters(theta) - 1 for theta in (predicted, own))
         known = ~np.isnan(values).all(axis=1)
-        return WeatherResiduals(inputs[rows][known], values[known], folds[known])
+        return WeatherResiduals(inputs[rows][known], values[known], own[known], folds[known])
+
+    def _of_parameters(self, theta: Array) -> Array:
+        """Frequencies in the measured domain, without warnings."""
+        frequencies = self.simulator_.frequencies(self._possible(theta)[0], self.n_jobs, warn=False)
+        return as_floats(self.aligner_.inverse_transform(frequencies))
 
     def _weather(self, X: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Inputs of the mapper, and which rows are complete."""

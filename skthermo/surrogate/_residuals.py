@@ -17,10 +17,11 @@ SPREAD_OF = 100
 """Number of records with the most similar weather whose residuals give the spread."""
 
 COMPARED_WITH = 50
-"""Number of records with the most similar weather that a record's residual is compared with."""
+"""Least number of records with the most similar weather whose mean a residual is compared with."""
 
 SIMILAR = 0.1
-"""Share of the records whose weather counts as similar: a drawn run of records goes on while it lasts."""
+"""Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
+records goes on while it lasts."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,15 @@ class WeatherResiduals:
         Inputs of the temperature mapper, lags included.
     values : ndarray of shape (n_records, n_modes)
         Measured frequencies over out-of-fold predictions, minus 1; NaN where a mode is missing.
+    own : ndarray of shape (n_records, n_modes)
+        The same residuals from predictions of the mapper that learned from all records.
     folds : ndarray of shape (n_records,)
         The period of time of each record.
     """
 
     weather: Array
     values: Array
+    own: Array
     folds: NDArray[np.intp]
 
     @cached_property
@@ -55,24 +59,17 @@ class WeatherResiduals:
         """Root mean square of the residuals in similar weather, (n_samples, n_modes)."""
         return self._spread(weather, np.ones(len(self.values), dtype=bool))
 
-    def expected(self, weather: Array, rows: NDArray[np.bool_] | None = None) -> Array:
-        """Mean residual of the records, or of some of them, in similar weather, (n_samples, n_modes)."""
-        wanted, expected = self.coordinates.transform(weather), np.full((len(weather), self.values.shape[1]), np.nan)
-        chosen = np.ones(len(self.values), dtype=bool) if rows is None else rows
-        for mode, values in enumerate(self.values.T):
-            known = np.flatnonzero(chosen & ~np.isnan(values))
-            if known.size:
-                near = known[nearest(self.places[known], wanted, COMPARED_WITH)[1]]
-                expected[:, mode] = values[near].mean(axis=1)
-        return expected
+    def expected(self, weather: Array) -> Array:
+        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes)."""
+        return self._similar_mean(self.own, weather, np.ones(len(self.own), dtype=bool))
 
     def by_period(self, n_periods: int) -> list[Array]:
-        """Residuals of each of some periods less those expected from the other periods, (n_records, n_modes) each."""
+        """Residuals of each of some periods less those that the other periods have in similar weather."""
         parts = []
         for period in np.array_split(np.arange(len(self.values)), n_periods):
             others = np.ones(len(self.values), dtype=bool)
             others[period] = False
-            parts.append(self.values[period] - self.expected(self.weather[period], others))
+            parts.append(self.values[period] - self._similar_mean(self.values, self.weather[period], others))
         return parts
 
     def quantiles(self, confidence: float) -> Array:
@@ -98,7 +95,27 @@ class WeatherResiduals:
             if is_over or np.linalg.norm(self.places[record] - places[row]) > farthest[row]:
                 record = fresh[row]
             taken[row] = record
-        return self.values[taken]
+        return self.noise[taken]
+
+    @cached_property
+    def noise(self) -> Array:
+        """Scatter of the records around what similar weather shows out of fold, and what the mapper leaves there.
+
+        A fold that must extrapolate has an error that the mapper of all records has not.
+        """
+        similar = self._similar_mean(self.values, self.weather, np.ones(len(self.values), dtype=bool))
+        return self.values - similar + self.expected(self.weather)
+
+    def _similar_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """Mean of some records' values in weather most like that of each row, mode by mode."""
+        wanted, means = self.coordinates.transform(weather), np.full((len(weather), values.shape[1]), np.nan)
+        number = max(COMPARED_WITH, int(SIMILAR * len(values)))
+        for mode, column in enumerate(values.T):
+            known = np.flatnonzero(rows & ~np.isnan(column))
+            if known.size:
+                near = known[nearest(self.places[known], wanted, number)[1]]
+                means[:, mode] = column[near].mean(axis=1)
+        return means
 
     def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """The spread that some of the records give, the wider the farther weather is beyond their range."""

@@ -1,6 +1,7 @@
 """Laws of what the chain says about its own errors: spread, intervals, realistic noise."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -36,7 +37,8 @@ FITTED = chain().fit(T, F)
 
 def residuals(weather, values, n_folds=5):
     folds = np.arange(len(values)) * n_folds // len(values)
-    return WeatherResiduals(np.reshape(weather, (len(values), -1)), np.reshape(values, (len(values), -1)), folds)
+    values = np.reshape(values, (len(values), -1))
+    return WeatherResiduals(np.reshape(weather, (len(values), -1)), values, values, folds)
 
 
 def autoregressive(n_records, rho, seed=0):
@@ -122,8 +124,8 @@ def test_quantiles_measure_each_period_by_the_others():
 def drawn_records(found, weather, seed=0):
     """Which record each drawn row is, by the first mode, which has no gaps."""
     values = found.draw(weather, np.random.RandomState(seed))
-    taken = np.array([np.flatnonzero(found.values[:, 0] == value)[0] for value in values[:, 0]])
-    np.testing.assert_array_equal(values, found.values[taken])
+    taken = np.array([np.flatnonzero(found.noise[:, 0] == value)[0] for value in values[:, 0]])
+    np.testing.assert_array_equal(values, found.noise[taken])
     return taken
 
 
@@ -137,6 +139,20 @@ def test_noise_is_whole_records_gaps_included():
     np.testing.assert_array_equal(taken, drawn_records(found, weather))
     assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
     assert len(set(taken)) > 150
+
+
+def test_noise_is_around_what_the_mapper_of_all_records_leaves():
+    """Out of fold, a warm period is predicted too high; the mapper that learned from it does not do so."""
+    rng = np.random.default_rng(0)
+    weather = np.linspace(-10, 30, 500)
+    values = rng.normal(size=500) - 5.0 * (weather > 20)
+    found = residuals(weather, values)
+    found = replace(found, own=values[:, np.newaxis] + 5.0 * (weather > 20)[:, np.newaxis] + 0.3)
+    for place in (0.0, 27.0):
+        drawn = found.draw(np.full((4000, 1), place), np.random.RandomState(0))
+        near = np.abs(weather - place) < 2
+        assert drawn.mean() == pytest.approx(0.3, abs=0.25)
+        assert drawn.std() == pytest.approx(values[near].std(), rel=0.25)
 
 
 def test_noise_comes_from_similar_weather():
@@ -163,7 +179,7 @@ def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.residuals_.values
+    records = fem.residuals_.noise
     for row in (noisy / clean - 1).to_numpy():
         assert np.isclose(records, row, rtol=0, atol=1e-12, equal_nan=True).all(axis=1).any()
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))

@@ -1,0 +1,112 @@
+"""Bounded least squares for severities: fits, their errors, and tests."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+from scipy.optimize import nnls
+
+from skthermo._arrays import Array
+
+HIGHEST = 0.95
+"""Highest severity that is fitted."""
+
+MOST_STEPS = 12
+TOLERANCE = 1e-5
+
+Effects = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class BoundedFit:
+    """Severities between 0 and 0.95 that fit a shift best.
+
+    Attributes
+    ----------
+    severities : ndarray of shape (n_groups,)
+    misfit : float
+        Sum of squares of the whitened differences.
+    slopes : ndarray of shape (n_observed, n_groups)
+        Whitened derivatives at the fit.
+    target : ndarray of shape (n_observed,)
+        Whitened shift that slopes times severities should give, so that the fit is linear.
+    explained : ndarray of shape (n_observed,)
+        Shift by the fitted severities, not whitened.
+    converged : bool
+    """
+
+    severities: Array
+    misfit: float
+    slopes: Array
+    target: Array
+    explained: Array
+    converged: bool
+
+    def without(self, column: int) -> float:
+        """Misfit of the linear fit without one group."""
+        return _misfit(np.delete(self.slopes, column, axis=1), self.target)
+
+
+def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: int) -> BoundedFit:
+    """Gauss-Newton steps, each a non-negative least-squares fit."""
+    severities, converged = np.zeros(n_groups), False
+    for _ in range(MOST_STEPS):
+        change, slopes = effects(severities)
+        target = whitening @ (shift - change + slopes @ severities)
+        found = solve(whitening @ slopes, target)
+        converged = bool(np.abs(found - severities).max(initial=0.0) < TOLERANCE)
+        severities = found
+        if converged:
+            break
+    change, slopes = effects(severities)
+    residual = whitening @ (shift - change)
+    whitened = whitening @ slopes
+    return BoundedFit(
+        severities, float(residual @ residual), whitened, residual + whitened @ severities, change, converged
+    )
+
+
+def solve(slopes: Array, target: Array) -> Array:
+    """Non-negative severities with the least sum of squares.
+
+    Each severity also counts as known to be 0 within 1, which decides only where the shifts leave it open.
+    """
+    n_groups = slopes.shape[1]
+    found = nnls(np.vstack([slopes, np.eye(n_groups)]), np.concatenate([target, np.zeros(n_groups)]))[0]
+    return np.minimum(found, HIGHEST)
+
+
+def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.RandomState) -> Array:
+    """Severities fitted to whitened shifts with new errors, (n_draws, n_groups)."""
+    errors = random.standard_normal((n_draws, len(around)))
+    return np.array([solve(slopes, around + error) for error in errors]).reshape(n_draws, slopes.shape[1])
+
+
+def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:
+    """Probability that a healthy structure's shift is explained by damage as much as this one's."""
+    gained = fit.target @ fit.target - _misfit(fit.slopes, fit.target)
+    scale = np.sqrt(n_periods / random.chisquare(n_periods, size=n_draws))
+    targets = random.standard_normal((n_draws, len(fit.target))) * scale[:, np.newaxis]
+    healthy = np.array([target @ target - _misfit(fit.slopes, target) for target in targets])
+    return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
+
+
+def p_of_group(fit: BoundedFit, column: int, n_periods: int) -> float:
+    """Probability of the group's part in the fit where it is undamaged: one-sided Student's t."""
+    gained = max(fit.without(column) - _misfit(fit.slopes, fit.target), 0.0)
+    return float(stats.t.sf(np.sqrt(gained), n_periods))
+
+
+def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:
+    """Probability of a misfit as large, if the groups are all that changed: Hotelling's test; NaN without freedom."""
+    freedom = len(fit.target) - np.count_nonzero(fit.severities)
+    rest = n_periods - freedom + 1
+    if freedom < 1 or rest < 1:
+        return float("nan")
+    return float(stats.f.sf(fit.misfit * rest / (n_periods * freedom), freedom, rest))
+
+
+def _misfit(slopes: Array, target: Array) -> float:
+    residual = target - slopes @ solve(slopes, target)
+    return float(residual @ residual)

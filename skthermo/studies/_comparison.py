@@ -1,0 +1,79 @@
+"""Measured shifts beside the effects of damage, in standard errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from skthermo._arrays import Array
+from skthermo.studies._bounded_fit import BoundedFit, Effects, fit_severities
+
+
+@dataclass(frozen=True)
+class Part:
+    """Shifts of one kind: of frequencies or of mode shapes.
+
+    Attributes
+    ----------
+    effects : callable
+        Severities of the model's groups -> change and its derivatives.
+    measured : ndarray of shape (n_observed,)
+        NaN where nothing was measured.
+    covariance : ndarray of shape (n_observed, n_observed)
+    """
+
+    effects: Effects
+    measured: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that was measured, beside the effects of some groups.
+
+    Attributes
+    ----------
+    parts : list of Part
+    incidence : ndarray of shape (n_model_groups, n_groups)
+        1 where a group contains a group of the model.
+    """
+
+    parts: list[Part]
+    incidence: Array
+
+    def of(self, columns: list[list[int]]) -> "Comparison":
+        """The comparison for some groups, each of one or several joined."""
+        return Comparison(self.parts, np.column_stack([self.incidence[:, joined].max(axis=1) for joined in columns]))
+
+    def slopes(self) -> Array:
+        """Effects of small severities in standard errors, (n_observed, n_groups)."""
+        return self.whitening @ self.effects(np.zeros(self.incidence.shape[1]))[1]
+
+    def fit(self) -> BoundedFit:
+        """Severities that explain the shifts best."""
+        measured = np.concatenate([part.measured[~np.isnan(part.measured)] for part in self.parts])
+        return fit_severities(self.effects, measured, self.whitening, self.incidence.shape[1])
+
+    def members(self, severities: Array) -> Array:
+        """Severities of the model's groups, (..., n_model_groups), by those of the groups, (..., n_groups)."""
+        return 1 - np.prod(np.where(self.incidence > 0, 1 - severities[..., np.newaxis, :], 1.0), axis=-1)
+
+    def effects(self, severities: Array) -> tuple[Array, Array]:
+        """Changes, (n_observed,), and their derivatives by the severities, (n_observed, n_groups)."""
+        members = self.members(severities)
+        inner = self.incidence * np.outer(1 - members, 1 / (1 - severities))
+        solved = [part.effects(members) for part in self.parts]
+        kept = [~np.isnan(part.measured) for part in self.parts]
+        changes = [change[rows] for (change, _), rows in zip(solved, kept, strict=True)]
+        slopes = [slope[rows] @ inner for (_, slope), rows in zip(solved, kept, strict=True)]
+        return np.concatenate(changes), np.vstack(slopes)
+
+    @property
+    def whitening(self) -> Array:
+        """What turns measured shifts into independent standard errors."""
+        roots = []
+        for part in self.parts:
+            rows = ~np.isnan(part.measured)
+            lower = np.linalg.cholesky(part.covariance[np.ix_(rows, rows)])
+            roots.append(scipy.linalg.solve_triangular(lower, np.eye(len(lower)), lower=True))
+        return scipy.linalg.block_diag(*roots)

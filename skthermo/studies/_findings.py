@@ -1,0 +1,124 @@
+"""The result of an identification: tables, tests and warnings from fits."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo.studies._bounded_fit import (
+    HIGHEST,
+    BoundedFit,
+    p_of_damage,
+    p_of_group,
+    p_of_misfit,
+    redrawn,
+)
+from skthermo.studies._comparison import Comparison
+from skthermo.studies._identified import IdentifiedDamage
+from skthermo.studies._separability import confused_groups, cosines, errors_alone
+from skthermo.studies._shift import Shift
+
+N_DRAWS = 500
+
+
+def findings(
+    comparison: Comparison,
+    names: Sequence[str],
+    shift: Shift,
+    modes: Sequence[Any],
+    of_model: Sequence[str],
+    unseen: list[str],
+    significance: float,
+    random: np.random.RandomState,
+) -> IdentifiedDamage:
+    """Fit the groups together and one by one, and test what is found."""
+    fit = comparison.fit()
+    draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
+    errors = redrawn(fit.slopes, fit.slopes @ fit.severities, N_DRAWS, random) - fit.severities
+    covariance = errors.T @ errors / N_DRAWS
+    p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
+    table = pd.DataFrame(
+        {
+            "severity": fit.severities,
+            "standard_error": np.sqrt(np.diag(covariance)),
+            "error_alone": errors_alone(fit.slopes),
+            "p_value": p_values,
+            "significant": np.array(p_values) < significance / len(names),
+        },
+        index=list(names),
+    )
+    members = {
+        name: [group for group, inside in zip(of_model, column, strict=True) if inside]
+        for name, column in zip(names, comparison.incidence.T, strict=True)
+    }
+    return IdentifiedDamage(
+        table=table,
+        shifts=_shift_table(shift, fit, modes),
+        single=_single_fits(comparison, names, shift),
+        similarity=pd.DataFrame(cosines(fit.slopes), names, names),
+        covariance=pd.DataFrame(covariance, names, names),
+        draws=pd.DataFrame(comparison.members(draws), columns=list(of_model)),
+        confused=[tuple(names[column] for column in group) for group in confused_groups(fit.slopes)],
+        unseen=unseen,
+        members=members,
+        p_value=p_of_damage(fit, shift.n_periods, N_DRAWS, random),
+        misfit=fit.misfit,
+        misfit_p_value=p_of_misfit(fit, shift.n_periods),
+        significance=significance,
+        converged=fit.converged,
+    )
+
+
+def doubts(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
+    """Warnings, each with its kind."""
+    if found.confused:
+        sets = "; ".join(" and ".join(group) for group in found.confused)
+        yield (
+            "confused groups",
+            f"groups that these modes cannot tell apart: {sets}. Only their common effect is known; merge=True gives "
+            "them one severity",
+        )
+    if found.unseen:
+        names = ", ".join(found.unseen)
+        yield "unseen groups", f"{len(found.unseen)} groups cannot be seen by these modes and are left out: {names}"
+    highest = ", ".join(str(group) for group, severity in found.severities.items() if severity >= HIGHEST)
+    if highest:
+        yield "severity at its bound", f"severity is at its upper bound of {HIGHEST:.0%}: {highest}"
+    if not found.converged:
+        yield "unsettled severities", "severities still change from step to step; expected them to settle"
+    if found.misfit_p_value < found.significance:
+        yield (
+            "unexplained shifts",
+            f"damage of these groups does not explain the shifts (probability {found.misfit_p_value:.2g}): something "
+            "else changed too, or the frequencies scatter more than in the training records",
+        )
+
+
+def _shift_table(shift: Shift, fit: BoundedFit, modes: Sequence[Any]) -> pd.DataFrame:
+    known = np.flatnonzero(~np.isnan(shift.mean))
+    explained = np.full(len(shift.mean), np.nan)
+    explained[known] = fit.explained[: len(known)]
+    return pd.DataFrame(
+        {
+            "measured": np.expm1(shift.mean),
+            "explained": np.expm1(explained),
+            "standard_error": np.where(np.isnan(shift.mean), np.nan, np.sqrt(np.diag(shift.covariance))),
+            "n_records": shift.n_records,
+        },
+        index=list(modes),
+    )
+
+
+def _single_fits(comparison: Comparison, names: Sequence[str], shift: Shift) -> pd.DataFrame:
+    """Each group's own best fit, the best first."""
+    fits = [comparison.of([[column]]).fit() for column in range(len(names))]
+    return pd.DataFrame(
+        {
+            "severity": [fit.severities[0] for fit in fits],
+            "standard_error": [errors_alone(fit.slopes)[0] for fit in fits],
+            "misfit": [fit.misfit for fit in fits],
+            "misfit_p_value": [p_of_misfit(fit, shift.n_periods) for fit in fits],
+        },
+        index=list(names),
+    ).sort_values("misfit", kind="stable")

@@ -1,0 +1,160 @@
+"""Identified damage, as `identify_damage` returns it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from skthermo.studies._uncertain import UncertainDamage
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedDamage:
+    """Damage that explains a shift of frequencies, with its uncertainty.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a damage group: ``severity``; ``standard_error`` of that estimate; ``error_alone``, the standard error
+        if no other group could be damaged and strengthening counted too; ``p_value`` and ``significant``, whether the
+        group is damaged.
+    shifts : DataFrame
+        One row a mode: mean relative shift ``measured`` and ``explained`` by the severities, ``standard_error`` of the
+        measured one, and ``n_records``.
+    single : DataFrame
+        One row a group, the best first: ``severity`` if it alone were damaged, its ``standard_error``, the ``misfit``
+        that remains, and ``misfit_p_value``.
+    similarity : DataFrame
+        Cosines between the effects of the groups that can be seen, in standard errors of the shifts.
+    covariance : DataFrame
+        Covariance of the severities.
+    draws : DataFrame
+        Severities of the model's groups that would also explain the shift, within its error; one draw a row.
+    confused : list of tuple of str
+        Sets of groups of which damage in one looks like damage in the others: beside these, the standard error of its
+        severity would be above 10 %, so that only their common effect is known.
+    unseen : list of str
+        Groups whose severity would have a standard error above 10 %: they are left out.
+    members : mapping of str to list of str
+        The model's groups behind each group; several if groups are merged.
+    p_value : float
+        Probability that a healthy structure shows a shift that damage explains as well.
+    misfit, misfit_p_value : float
+        Sum of squared differences between measured and explained shifts, in standard errors, and the probability of a
+        larger one if these groups are all that changed. A low one says that something else changed too.
+    significance : float
+        Error rate of ``significant`` over all groups together.
+    converged : bool
+        Whether the severities settled.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.studies import identify_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
+    >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["bottom", "top"], random_state=0)
+    >>> print(found.summary())
+    Damage is certain: a healthy structure shows such a shift with probability 0.002.
+    bottom: 1.1% of its stiffness lost (not significant, standard error 0.8%).
+    top: 19.0% of its stiffness lost (standard error 0.7%).
+    >>> found.scenario().name
+    'identified damage'
+    """
+
+    table: pd.DataFrame
+    shifts: pd.DataFrame
+    single: pd.DataFrame
+    similarity: pd.DataFrame
+    covariance: pd.DataFrame
+    draws: pd.DataFrame = field(repr=False)
+    confused: list[tuple[str, ...]]
+    unseen: list[str]
+    members: Mapping[str, list[str]]
+    p_value: float
+    misfit: float
+    misfit_p_value: float
+    significance: float
+    converged: bool
+
+    @property
+    def severities(self) -> pd.Series:
+        """Severity of each group."""
+        return self.table["severity"]
+
+    @property
+    def standard_errors(self) -> pd.Series:
+        """Standard error of each severity."""
+        return self.table["standard_error"]
+
+    @property
+    def damage(self) -> dict[str, float]:
+        """Severities of the model's groups that are not 0, as `DataInformedFEM.simulate` takes them."""
+        found: dict[str, float] = {}
+        for group, severity in self.severities.dropna().items():
+            for member in self.members[str(group)]:
+                if severity > 0:
+                    found[member] = 1 - (1 - found.get(member, 0.0)) * (1 - float(severity))
+        return found
+
+    def scenario(self, name: str = "identified damage") -> UncertainDamage:
+        """This damage as a scenario of a `DetectabilityStudy`, each repeat with other severities within their error.
+
+        Parameters
+        ----------
+        name : str, default="identified damage"
+            Name of the scenario.
+
+        Returns
+        -------
+        UncertainDamage
+        """
+        return UncertainDamage(name, self.draws)
+
+    def summary(self) -> str:
+        """What was found, in sentences.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        certain = "Damage is certain" if self.p_value <= self.significance else "No damage is certain"
+        lines = [f"{certain}: a healthy structure shows such a shift with probability {self.p_value:.2g}."]
+        for group, row in self.table.dropna().iterrows():
+            if row["severity"] > 0:
+                mark = "" if row["significant"] else "not significant, "
+                lines.append(
+                    f"{group}: {row['severity']:.1%} of its stiffness lost ({mark}standard error "
+                    f"{row['standard_error']:.1%})."
+                )
+        lines += [f"{_named(group)} cannot be told apart by these modes." for group in self.confused]
+        if self.unseen:
+            lines.append(f"{_named(self.unseen)} cannot be seen: the standard error would be above 10 %.")
+        unexplained = (self.shifts["measured"] - self.shifts["explained"]) / self.shifts["standard_error"]
+        if self.misfit_p_value < self.significance and unexplained.notna().any():
+            worst = unexplained.abs().idxmax()
+            lines.append(
+                "Damage of these groups does not explain all shifts: mode "
+                f"{worst} moved by {self.shifts.loc[worst, 'measured']:.2%}, explained "
+                f"{self.shifts.loc[worst, 'explained']:.2%}."
+            )
+        elif np.isnan(self.misfit_p_value):
+            lines.append("There are no more modes than damaged groups, so that any shift can be explained.")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{group}={row['severity']:.3g} ± {row['standard_error']:.2g}"
+            for group, row in self.table.dropna().iterrows()
+            if row["severity"] > 0
+        )
+        return f"IdentifiedDamage({found or 'none'})"
+
+
+def _named(groups) -> str:
+    *first, last = [str(group) for group in groups]
+    return f"{', '.join(first)} and {last}" if first else last

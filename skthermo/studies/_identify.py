@@ -1,0 +1,169 @@
+"""Which damage explains a shift of frequencies."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, as_floats, as_random_state
+from skthermo._frames import check_same_rows
+from skthermo._validation import check_array, check_is_fitted
+from skthermo._warnings import warn_each
+from skthermo.studies._comparison import Comparison, Part
+from skthermo.studies._effects import FrequencyEffects
+from skthermo.studies._findings import doubts, findings
+from skthermo.studies._groups import read_groups
+from skthermo.studies._identified import IdentifiedDamage
+from skthermo.studies._separability import VISIBLE, errors_alone, merge_confused
+from skthermo.studies._shape_effects import ShapeEffects
+from skthermo.studies._shift import measured_shift
+
+
+def identify_damage(
+    fem: Any,
+    T: ArrayLike,
+    F: ArrayLike,
+    groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+    *,
+    noise: ArrayLike | Literal["fitted"] = "fitted",
+    merge: bool = False,
+    shapes: tuple[ArrayLike, ArrayLike] | None = None,
+    dofs: ArrayLike | None = None,
+    shape_noise: ArrayLike = 0.01,
+    significance: float = 0.05,
+    random_state: int | np.random.RandomState | None = None,
+) -> IdentifiedDamage:
+    """Severities of damage groups that explain how measured frequencies have shifted.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted to healthy records; its model can be damaged.
+    T : array-like or DataFrame of shape (n_samples, n_sensors)
+        Temperatures of the records to explain, in degrees Celsius.
+    F : array-like or DataFrame of shape (n_samples, n_modes)
+        Their frequencies in Hz; NaN is allowed. Records should be of one state, so that their mean says what changed.
+    groups : sequence of str, or mapping of str to sequence of str, optional
+        Damage groups of the model; a mapping joins several under a new name, with one severity. By default all groups
+        of the model, without those that other groups make up.
+    noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
+        Where the error of the mean shift comes from: contiguous periods of the training records, each judged by the
+        others, so that serial correlation counts; or independent records with a relative standard deviation.
+    merge : bool, default=False
+        Whether groups that cannot be told apart get one severity together.
+    shapes : (array-like, array-like), optional
+        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
+        complex ones are turned to be real.
+    dofs : array-like of shape (n_dofs,), optional
+        Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
+    shape_noise : float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of a component of a measured shape, relative to the shape's largest component.
+    significance : float, default=0.05
+        Probability with which any group of a healthy structure is called damaged.
+    random_state : int, RandomState or None, default=None
+        Seed of the draws behind standard errors and p-values.
+
+    Returns
+    -------
+    IdentifiedDamage
+        Severities and errors, explained shifts, groups that cannot be told apart, and the draws that
+        ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
+
+    Raises
+    ------
+    ValueError
+        If T and F differ in rows, a group is unknown, no record can be compared, no group can be seen, or the model
+        cannot be damaged.
+
+    Warns
+    -----
+    UserWarning
+        If groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
+        shifts.
+
+    Notes
+    -----
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
+    weather. Its covariance comes from periods of the training records, each of the new records' length if there are
+    enough of them, judged by the other periods. Severities follow from non-negative least squares in standard errors
+    of the shifts, repeated with exact derivatives on the damaged model until they no longer change. Their standard
+    errors are those of the bounded estimate, from fits to redrawn shifts; at a severity of 0 they say how far errors
+    alone would move it. A group is significant if leaving it out worsens the fit by more than errors would
+    (one-sided, Bonferroni over the groups).
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.studies import identify_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"diagonal": 0.1}, random_state=1)
+    >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["top", "diagonal"], random_state=0)
+    >>> found.severities.round(2).to_dict()
+    {'top': 0.0, 'diagonal': 0.1}
+    """
+    check_is_fitted(fem)
+    if not 0 < significance < 1:
+        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    frequencies, members = _read(fem, T, F), read_groups(fem.model, groups)
+    labels = list(members)
+    of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
+    shift = measured_shift(fem, T, frequencies, noise)
+    if not shift.n_records.any():
+        raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
+    parts = [Part(FrequencyEffects.of(fem, T, frequencies, of_model), shift.mean, shift.covariance)]
+    if shapes is not None:
+        parts.append(_of_shapes(fem, parts[0].effects.theta, of_model, shapes, dofs, shape_noise))
+    every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
+    slopes = every.slopes()
+    alone = errors_alone(slopes)
+    seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
+    if not seen:
+        errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
+        raise ValueError(
+            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
+            f"{errors}. More records or other modes would lower them"
+        )
+    joined = [list(group) for group in (merge_confused(slopes, seen) if merge else seen)]
+    found = findings(
+        every.of(joined),
+        [" + ".join(labels[column] for column in group) for group in joined],
+        shift,
+        fem.mode_names_,
+        of_model,
+        [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE],
+        significance,
+        as_random_state(random_state),
+    )
+    warn_each(doubts(found))
+    return found
+
+
+def _read(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
+    """Frequencies, checked."""
+    check_same_rows(T, F, ("temperatures", "frequencies"))
+    names = getattr(F, "columns", None)
+    if names is not None and list(names) != fem.mode_names_:
+        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
+    frequencies = as_floats(check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+    if frequencies.shape[1] != len(fem.mode_names_):
+        raise ValueError(
+            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
+        )
+    if (frequencies <= 0).any():
+        row = np.flatnonzero((frequencies <= 0).any(axis=1))[0]
+        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
+    return frequencies
+
+
+def _of_shapes(
+    fem: Any, theta: Array, groups: Sequence[str], shapes: Any, dofs: ArrayLike | None, noise: ArrayLike
+) -> Part:
+    """Measured changes of mode shapes, and the effects of the groups on them."""
+    if dofs is None:
+        raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
+    effects = ShapeEffects.of(fem, theta, groups, dofs)
+    change, deviations = effects.measured(shapes, noise)
+    return Part(effects, change, np.diag(deviations**2))

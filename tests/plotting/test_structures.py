@@ -1,0 +1,184 @@
+"""Structures and mode shapes: colours by value, places of nodes, supports."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+from skthermo.datasets import kw51_structure, make_kw51
+from skthermo.fem import Bar, CallableModel, PointMass, Spring, Structure
+from skthermo.plotting import ModeShapesDisplay, StructureDisplay
+
+STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
+
+
+def king_post():
+    ends = {"tie 1": "lf", "tie 2": "fr", "rafter 1": "la", "rafter 2": "ar", "post": "fa"}
+    return Structure(
+        nodes={"l": (0, 0), "f": (3, 0), "r": (6, 0), "a": (3, 2)},
+        members={name: Bar(*pair, **STEEL) for name, pair in ends.items()},
+        supports={"l": "xy", "r": ("y",)},
+        groups={"rafters": ["rafter 1", "rafter 2"], "ties": ["tie 1", "tie 2"], "post": ["post"]},
+    )
+
+
+def tripod():
+    nodes = {"a": (0, 0, 0), "b": (4, 0, 0), "c": (2, 3, 0), "top": (2, 1, 3)}
+    members = {foot: Bar(foot, "top", **STEEL) for foot in "abc"}
+    return Structure(nodes, members, dict.fromkeys("abc", "xyz"), {"legs": list("abc")})
+
+
+def colours(display):
+    """Value of each line by its middle."""
+    lines = display.members_["lines"]
+    middles = [tuple(np.mean(segment, axis=0).round(6)) for segment in lines.get_segments()]
+    return dict(zip(middles, np.ma.filled(lines.get_array(), np.nan).tolist(), strict=True))
+
+
+def test_a_group_colours_its_members_and_a_member_its_own_line():
+    display = StructureDisplay.from_structure(
+        king_post(), {"rafters": 2.0, "rafter 2": 5.0, "post": 1.0}, label="E (Pa)"
+    )
+    found = colours(display)
+    assert found[1.5, 1.0] == 2.0
+    assert found[4.5, 1.0] == 5.0
+    assert found[3.0, 1.0] == 1.0
+    assert np.isnan(found[1.5, 0.0])
+    assert display.members_["lines"].get_clim() == (1.0, 5.0)
+    assert display.colorbar_.ax.get_ylabel() == "E (Pa)"
+
+
+def test_values_by_order_by_series_and_by_group_are_the_same():
+    structure = king_post()
+    by_group = {"ties": 1.0, "rafters": 2.0, "post": 3.0}
+    displays = [StructureDisplay.from_structure(structure, v) for v in (by_group, pd.Series(by_group), [1, 1, 2, 2, 3])]
+    for display in displays:
+        np.testing.assert_array_equal(display.values, [1, 1, 2, 2, 3])
+
+
+def test_supports_are_drawn_where_they_are_and_filled_where_nothing_can_move():
+    display = StructureDisplay.from_structure(king_post())
+    assert king_post().supports == {"l": ("x", "y"), "r": ("y",)}
+    pinned, roller = (line for line in display.ax_.lines if line.get_linestyle() == "None")
+    assert (pinned.get_xydata().tolist(), pinned.get_markerfacecolor()) == ([[0.0, 0.0]], "#000000")
+    assert (roller.get_xydata().tolist(), roller.get_markerfacecolor()) == ([[6.0, 0.0]], "white")
+
+
+def test_groups_get_a_colour_and_a_line_of_the_legend_each():
+    display = StructureDisplay.from_structure(king_post(), groups=["ties", "post"], linewidth={"post": 4.0})
+    assert len(display.members_["ties"].get_segments()) == 2
+    assert display.members_["post"].get_linewidth() == [4.0]
+    texts = [text.get_text() for text in display.figure_.legends[0].get_texts()]
+    assert texts[:3] == ["other members", "ties", "post"]
+    assert len({tuple(display.members_[name].get_color()[0]) for name in display.members_}) == 3
+
+
+def test_springs_and_masses_draw_no_line():
+    bar = Bar("a", "b", **STEEL)
+    members = {"bar": bar, "spring": Spring("b", "x", 1e6), "mass": PointMass("b", 10.0)}
+    structure = Structure({"a": (0, 0), "b": (1, 0)}, members, {"a": "xy", "b": "y"})
+    display = StructureDisplay.from_structure(structure, [1.0, 2.0, 3.0])
+    assert len(display.members_["lines"].get_segments()) == 1
+
+
+def test_a_structure_in_space_fills_its_figure():
+    structure = kw51_structure()
+    display = StructureDisplay.from_structure(structure, {"arch": 1.0, "plate": 2.0})
+    assert set(display.members_) == {"lines", "surfaces"}
+    ax = display.ax_
+    display.figure_.canvas.draw()
+    x, y, _ = proj_transform(*np.array(list(structure.nodes.values())).T, ax.get_proj())
+    shares = display.figure_.transFigure.inverted().transform(ax.transData.transform(np.column_stack([x, y])))
+    assert shares.min() > 0
+    assert shares[:, 0].max() < 0.9  # beside it is the colour bar
+    assert np.ptp(shares[:, 0]) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"roof": 1.0}, r"values names 'roof'; expected members, or groups among \['post'"),
+        ([1.0, 2.0], r"values has shape \(2,\); expected \(5,\)"),
+        (["a"] * 5, "values is .*expected numbers"),
+    ],
+)
+def test_wrong_values_are_named(values, message):
+    with pytest.raises(ValueError, match=message):
+        StructureDisplay.from_structure(king_post(), values)
+
+
+def test_a_member_in_two_groups_of_different_values_is_an_error():
+    structure = king_post()
+    groups = {**structure.groups, "all": list(structure.members)}
+    both = Structure(structure.nodes, structure.members, structure.supports, groups)
+    with pytest.raises(ValueError, match="several groups with different values"):
+        StructureDisplay.from_structure(both, {"all": 1.0, "post": 2.0})
+    assert StructureDisplay.from_structure(both, {"all": 1.0, "post": 1.0}).values.tolist() == [1.0] * 5
+
+
+def test_flat_axes_for_a_structure_in_space_are_refused():
+    ax = plt.figure().add_subplot()
+    for draw in (StructureDisplay.from_structure, ModeShapesDisplay.from_structure):
+        options = {"modes": [0]} if draw.__self__ is ModeShapesDisplay else {}
+        with pytest.raises(ValueError, match="projection='3d'"):
+            draw(tripod(), ax=ax, **options)
+    given = plt.figure().add_subplot(projection="3d")
+    assert StructureDisplay.from_structure(tripod(), ax=given).ax_ is given
+
+
+def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplitude():
+    structure = king_post()
+    model = structure.assemble(["ties", "rafters", "post"], n_modes=3)
+    theta = [1.2, 0.8, 1.0]
+    display = ModeShapesDisplay.from_structure(structure, model, [2, 0], theta, amplitude=0.1)
+    frequencies, shapes = model.modes([theta])
+    titles = [ax.get_title() for ax in display.axes_]
+    assert titles == [f"$f_{{{m + 1}}}$ = {frequencies[0, m]:.2f} Hz" for m in (2, 0)]
+    extent = np.hypot(6, 2)
+    for number, mode in enumerate((2, 0)):
+        segments = np.array(display.lines_[number][0].get_segments())
+        places = dict(zip([tuple(m.nodes) for m in structure.members.values()], segments, strict=True))
+        moves = {
+            "f": places["l", "f"][1] - [3, 0],
+            "a": places["l", "a"][1] - [3, 2],
+            "r": places["f", "r"][1] - [6, 0],
+        }
+        drawn = np.array([moves[node]["xy".index(direction)] for node, direction in structure.dofs])
+        cosine = drawn @ shapes[0, :, mode] / np.linalg.norm(drawn) / np.linalg.norm(shapes[0, :, mode])
+        assert cosine == pytest.approx(1)
+        assert max(np.linalg.norm(move) for move in moves.values()) == pytest.approx(0.1 * extent)
+        np.testing.assert_allclose(places["l", "f"][0], [0, 0], atol=1e-12)
+
+
+def test_modes_in_space_by_groups():
+    structure = kw51_structure()
+    display = ModeShapesDisplay.from_structure(structure, make_kw51(), modes=[0, 1, 2], groups=["girders", "arch"])
+    assert len(display.axes_) == 3
+    display.figure_.canvas.draw()  # which projects the lines
+    assert [len(lines.get_segments()) for lines in display.lines_[0]] == [
+        len(structure.groups[group]) for group in ("girders", "arch")
+    ]
+    assert display.axes_[0].get_title() == "$f_{1}$ = 0.477 Hz"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"modes": [7]}, "modes is .7.; expected numbers from 0 to 1"),
+        ({"groups": ["roof"]}, "unknown group 'roof'"),
+        ({"model": CallableModel(lambda theta: theta, ["E"], 1)}, "has no method 'modes'"),
+    ],
+)
+def test_wrong_modes_are_named(options, message):
+    structure = king_post()
+    given = {"model": structure.assemble(["ties"], n_modes=2), **options}
+    with pytest.raises(ValueError, match=message):
+        ModeShapesDisplay.from_structure(structure, **given)
+
+
+def test_a_model_of_another_structure_is_refused():
+    bars = {1: Bar("a", "b", **STEEL), 2: Bar("b", "c", **STEEL)}
+    other = Structure({"a": (0, 0), "b": (1, 0), "c": (0, 1)}, bars, {"a": "xy", "c": "xy"}, {"all": [1, 2]})
+    with pytest.raises(ValueError, match="2 degrees of freedom; expected the structure's 5"):
+        ModeShapesDisplay.from_structure(king_post(), other.assemble(["all"], n_modes=1))
