@@ -102,13 +102,13 @@ def refining_step(inverse: Any) -> InverseSurrogate | None:
 
 
 def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: int) -> Array | None:
-    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies; their damped inverse.
+    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies.
 
-    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, (n_modes,
-    n_parameters). A prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does
-    the damping. The inverse, (n_parameters, n_modes), turns such changes of frequencies into those of ln theta, damped
-    as the mean of all records. None if there is no such mapper, if it is fitted to one parameter at a time, if its
-    coordinates are given, or if the nominal state has no solution.
+    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies. A
+    prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does the damping.
+    Returns the inverse of the coordinates, (n_parameters, n_modes), damped as for the mean of all records; None if
+    there is no such mapper, if it is fitted to one parameter at a time, if its coordinates are given, or if the nominal
+    state has no solution.
     """
     if isinstance(last_step(mapper), MultiOutputRegressor):
         return None

@@ -93,7 +93,7 @@ def mirror_image():
     members = {i: Beam(i, i + 1, **section) for i in range(12)}
     members |= {"left": Spring(4, "z", k=4e8), "right": Spring(8, "z", k=4e8)}
     members |= {"start": Spring(0, "z", k=6e8), "end": Spring(12, "z", k=6e8)}
-    supports = {i: "y rx rz" for i in nodes} | {0: "x y rx rz"}
+    supports = dict.fromkeys(nodes, "y rx rz") | {0: "x y rx rz"}
     structure = Structure(nodes, members, supports, {"deck": range(12), "left": ["left"], "right": ["right"]})
     return structure.assemble(["deck", "left", "right"], n_modes=4, track=True)
 
