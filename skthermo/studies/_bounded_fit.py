@@ -56,9 +56,9 @@ def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: i
         target = whitening @ (shift - change + slopes @ severities)
         found = solve(whitening @ slopes, target)
         converged = bool(np.abs(found - severities).max(initial=0.0) < TOLERANCE)
-        severities = found
         if converged:
             break
+        severities = found
     change, slopes = effects(severities)
     residual = whitening @ (shift - change)
     whitened = whitening @ slopes

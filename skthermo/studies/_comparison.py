@@ -27,6 +27,19 @@ class Part:
     covariance: Array
 
 
+def remembered(effects: Effects) -> Effects:
+    """The same effects, each solved once: all fits begin at the same severities."""
+    solved: dict[bytes, tuple[Array, Array]] = {}
+
+    def at(severities: Array) -> tuple[Array, Array]:
+        key = severities.tobytes()
+        if key not in solved:
+            solved[key] = effects(severities)
+        return solved[key]
+
+    return at
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Everything that was measured, beside the effects of some groups.

@@ -10,7 +10,7 @@ from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
 from skthermo._validation import check_array, check_is_fitted
 from skthermo._warnings import warn_each
-from skthermo.studies._comparison import Comparison, Part
+from skthermo.studies._comparison import Comparison, Part, remembered
 from skthermo.studies._effects import FrequencyEffects
 from skthermo.studies._findings import doubts, findings
 from skthermo.studies._groups import read_groups
@@ -113,9 +113,10 @@ def identify_damage(
     shift = measured_shift(fem, T, frequencies, noise)
     if not shift.n_records.any():
         raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
-    parts = [Part(FrequencyEffects.of(fem, T, frequencies, of_model), shift.mean, shift.covariance)]
+    effects = FrequencyEffects.of(fem, T, frequencies, of_model)
+    parts = [Part(remembered(effects), shift.mean, shift.covariance)]
     if shapes is not None:
-        parts.append(_of_shapes(fem, parts[0].effects.theta, of_model, shapes, dofs, shape_noise))
+        parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
     every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
     slopes = every.slopes()
     alone = errors_alone(slopes)
@@ -166,4 +167,4 @@ def _of_shapes(
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
     effects = ShapeEffects.of(fem, theta, groups, dofs)
     change, deviations = effects.measured(shapes, noise)
-    return Part(effects, change, np.diag(deviations**2))
+    return Part(remembered(effects), change, np.diag(deviations**2))
