@@ -13,7 +13,7 @@ HIGHEST = 0.95
 """Highest severity that is fitted."""
 
 MOST_STEPS = 12
-TOLERANCE = 1e-5
+TOLERANCE = 1e-6
 
 Effects = Callable[[Array], tuple[Array, Array]]
 
@@ -73,6 +73,8 @@ def solve(slopes: Array, target: Array) -> Array:
     Each severity also counts as known to be 0 within 1, which decides only where the shifts leave it open.
     """
     n_groups = slopes.shape[1]
+    if n_groups == 0:
+        return np.zeros(0)  # SciPy's nnls crashes without columns
     found = nnls(np.vstack([slopes, np.eye(n_groups)]), np.concatenate([target, np.zeros(n_groups)]))[0]
     return np.minimum(found, HIGHEST)
 

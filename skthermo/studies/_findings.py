@@ -81,7 +81,7 @@ def doubts(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
         )
     if found.unseen:
         names = ", ".join(found.unseen)
-        yield "unseen groups", f"{len(found.unseen)} groups cannot be seen by these modes and are left out: {names}"
+        yield "unseen groups", f"groups that these modes do not show, which are left out: {names}"
     highest = ", ".join(str(group) for group, severity in found.severities.items() if severity >= HIGHEST)
     if highest:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST:.0%}: {highest}"
