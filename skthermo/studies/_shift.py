@@ -68,11 +68,11 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
 
 
 def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:
-    """Covariance of one of as many independent records as would give the scatter of the periods' means.
+    """Covariance of a record, (n_modes, n_modes), with which independent records would scatter as the periods' means do.
 
-    Serial correlation makes it larger than that of single records, (n_modes, n_modes); NaN for modes that no two periods
-    have. A dozen means say little about correlations of several modes. They are drawn to the correlations of single
-    records, with the variance that the means show.
+    Serial correlation makes it larger than that of single records. It is NaN for modes that no two periods have. A dozen
+    means say little about correlations of several modes. They are drawn to the correlations of single records, with the
+    variance that the means show.
 
     Parameters
     ----------

@@ -3,10 +3,14 @@
     OMP_NUM_THREADS=1 SKTHERMO_DATA=folder python tests/benchmarks/damage_identification.py
 
 Damage of known severity is put into the truss, the bridge KW51 and the building frame (which needs
-``building_frame/ConcreteBuildingFrame.mat`` in the folder), and `identify_damage` is asked for it. In the design "one
-chain", all repeats share a fitted chain, which simulates the records with ``noise="fitted"``; the number of chains, each
-with its own training records, is an option. In the design "own chain", every repeat has its own healthy campaign, chain
-and damaged campaign, by the thermo-mechanical law of the truss.
+``building_frame/ConcreteBuildingFrame.mat`` in the folder), and `identify_damage` is asked for it. Designs:
+
+- "one chain": a fitted chain simulates the records with ``noise="fitted"`` and identifies their damage itself. What it
+  has learned from its own training records is then the truth, so that standard errors, which allow for errors of
+  training, are too large where the new records are not much fewer than those.
+- "own chain": a chain simulates healthy records too, to which other chains are fitted that identify the damage.
+- "campaign" (truss): every repeat has its own healthy campaign, chain and damaged campaign, by the thermo-mechanical
+  law.
 """
 
 import argparse
@@ -30,7 +34,8 @@ NOISE, CORRELATION, TRAINING_DAYS = 0.003, 0.3, 1095
 class Case(NamedTuple):
     """A chain to be damaged."""
 
-    fit: object  # seed -> fitted chain
+    chain: object  # seed -> chain to be fitted
+    records: object  # seed -> healthy temperatures and frequencies
     weather: object  # number of records, seed -> temperatures
     groups: list | None
     truths: list
@@ -51,41 +56,49 @@ def smooth_law(T, n_parameters):
     return 1 - rates * x + bends * x**2
 
 
-def fit_smooth(model, seed):
-    """A chain of a large model, fitted to three years that the smooth law gives."""
-    T = days(TRAINING_DAYS, 100 + seed)
-    shocks = np.random.RandomState(seed).standard_normal((TRAINING_DAYS + 50, model.n_modes))
-    noise = np.sqrt(1 - CORRELATION**2) * lfilter([1.0], [1.0, -CORRELATION], shocks, axis=0)[50:]
+def smooth_case(model, groups, truths):
+    """A large model, with three years of records by the smooth law."""
     small = model.reduced(0.3, random_state=0)
-    F = small.frequencies(smooth_law(T, len(model.parameter_names))) * (1 + NOISE * noise)
-    inverse = InverseSurrogate(small, n_samples=300, noise=NOISE)
-    return DataInformedFEM(model, inverse=inverse, reduce=True, random_state=seed).fit(T, F)
 
+    def chain(seed):
+        inverse = InverseSurrogate(small, n_samples=300, noise=NOISE)
+        return DataInformedFEM(model, inverse=inverse, reduce=True, random_state=seed)
 
-def fit_truss(seed):
-    year = make_truss_campaign(random_state=1000 + seed)
-    return DataInformedFEM(make_truss(), random_state=seed).fit(year.temperatures, year.frequencies)
+    def records(seed):
+        T = days(TRAINING_DAYS, 100 + seed)
+        shocks = np.random.RandomState(seed).standard_normal((TRAINING_DAYS + 50, model.n_modes))
+        noise = np.sqrt(1 - CORRELATION**2) * lfilter([1.0], [1.0, -CORRELATION], shocks, axis=0)[50:]
+        return T, small.frequencies(smooth_law(T, len(model.parameter_names))) * (1 + NOISE * noise)
+
+    return Case(chain, records, days, groups, truths)
 
 
 def truss(_):
+    def year(seed):
+        campaign = make_truss_campaign(random_state=1000 + seed)
+        return campaign.temperatures, campaign.frequencies
+
+    def weather(n_records, seed):
+        return make_truss_campaign(random_state=seed).temperatures[:n_records]
+
     truths = [{"top": 0.05}, {"bottom": 0.1}, {"diagonal": 0.2}, {"top": 0.3}, {"bottom": 0.1, "diagonal": 0.05}]
-    return Case(fit_truss, lambda n, seed: make_truss_campaign(random_state=seed).temperatures[:n], None, truths)
+    return Case(lambda seed: DataInformedFEM(make_truss(), random_state=seed), year, weather, None, truths)
 
 
 def kw51(_):
-    model = make_kw51(["E_bot", "E_arc", "E_br"])
     groups = ["girders", "transverse_beams", "plate", "braces", "pipes"]
     truths = [{"girders": 0.1}, {"pipes": 0.05}, {"braces": 0.3}, {"transverse_beams": 0.2, "pipes": 0.1}]
-    return Case(lambda seed: fit_smooth(model, seed), days, groups, truths)
+    return smooth_case(make_kw51(["E_bot", "E_arc", "E_br"]), groups, truths)
 
 
 def frame(folder):
     model = load_affine(Path(folder) / "building_frame" / "ConcreteBuildingFrame.mat")
     groups = ["E_2", "E_4", "E_7", "E_9", "E_11"]
     truths = [{"E_9": 0.1}, {"E_11": 0.05}, {"E_2": 0.3}, {"E_4": 0.2, "E_7": 0.1}]
-    return Case(lambda seed: fit_smooth(model.with_parameters(["E_5", "E_11", "E_12"]), seed), days, groups, truths)
+    return smooth_case(model.with_parameters(["E_5", "E_11", "E_12"]), groups, truths)
 
 
+DESIGNS = ["one chain", "own chain", "campaign"]
 CASES = {"truss": truss, "kw51": kw51, "frame": frame}
 
 
@@ -110,14 +123,15 @@ def identified(found, truth):
 def row(repeats):
     """One line of the table."""
     error, errors, held, everything = (
-        np.concatenate([each[name] for each in repeats])
-        for name in ("error", "standard_error", "held", "held_all")
+        np.concatenate([each[name] for each in repeats]) for name in ("error", "standard_error", "held", "held_all")
     )
     quiet, false, misfit, settled = (
         100 * np.mean([each[name] for each in repeats]) for name in ("quiet", "false", "misfit", "settled")
     )
     sets = pd.Series([each["confused"] for each in repeats]).value_counts(normalize=True)
-    percent = {"bias": error.mean(), "rms": np.sqrt((error**2).mean()), "error": np.median(errors)} if error.size else {}
+    percent = (
+        {"bias": error.mean(), "rms": np.sqrt((error**2).mean()), "error": np.median(errors)} if error.size else {}
+    )
     return {
         **{name: 100 * value for name, value in percent.items()},
         "held": 100 * held.mean() if held.size else np.nan,
@@ -130,29 +144,38 @@ def row(repeats):
     }
 
 
-def one_chain(case, truth, n_records, chains, repeats):
-    """Records that a fitted chain simulates."""
+def pairs(case, design, n_chains):
+    """Chains that simulate damage (None for true campaigns), each with the chain that identifies it."""
+    worlds = [case.chain(seed).fit(*case.records(seed)) for seed in range(n_chains)]
+    if design != "own chain":
+        return [(world if design == "one chain" else None, world) for world in worlds]
+    found = []
+    for seed, world in enumerate(worlds):
+        T = case.records(2000 + seed)[0]
+        F = world.simulate(T, noise="fitted", random_state=2000 + seed)
+        found.append((world, case.chain(seed).fit(T, F)))
+    return found
+
+
+def repeated(case, truth, n_records, chains, repeats):
+    """Identifications of new records."""
     for repeat in range(repeats):
-        fem = chains[repeat % len(chains)]
-        T = case.weather(n_records, 5000 + repeat)
-        F = fem.simulate(T, damage=truth, noise="fitted", random_state=repeat)
+        world, fem = chains[repeat % len(chains)]
+        if world is None:
+            later = make_truss_campaign(damage=truth, random_state=5000 + repeat)
+            T, F = later.temperatures[:n_records], later.frequencies[:n_records]
+        else:
+            T = case.weather(n_records, 5000 + repeat)
+            F = world.simulate(T, damage=truth, noise="fitted", random_state=repeat)
         yield identified(identify_damage(fem, T, F, case.groups, random_state=repeat), truth)
-
-
-def own_chain(case, truth, n_records, chains, repeats):
-    """Independent campaigns of the true truss; a chain for each healthy one."""
-    for repeat in range(repeats):
-        later = make_truss_campaign(damage=truth, random_state=5000 + repeat)
-        T, F = later.temperatures[:n_records], later.frequencies[:n_records]
-        yield identified(identify_damage(chains[repeat], T, F, case.groups, random_state=repeat), truth)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=200)
-    parser.add_argument("--chains", type=int, default=5, help="chains that the repeats of the design 'one chain' share")
+    parser.add_argument("--chains", type=int, default=10, help="chains that the repeats share, except in 'campaign'")
     parser.add_argument("--models", nargs="+", default=list(CASES), choices=list(CASES))
-    parser.add_argument("--designs", nargs="+", default=["one chain", "own chain"])
+    parser.add_argument("--designs", nargs="+", default=DESIGNS, choices=DESIGNS)
     parser.add_argument("--records", type=int, nargs="+", default=[365, 60])
     parser.add_argument("--truths", type=int, nargs="+", help="which of the truths; 0 is the healthy structure")
     parser.add_argument("--data", default=os.environ.get("SKTHERMO_DATA"))
@@ -165,18 +188,15 @@ def main():
             continue
         case = CASES[name](options.data)
         truths = [{}, *case.truths]
-        designs = {"one chain": (one_chain, options.chains), "own chain": (own_chain, options.repeats)}
-        for design in [each for each in options.designs if name == "truss" or each == "one chain"]:
-            run, n_chains = designs[design]
-            chains = [case.fit(seed) for seed in range(n_chains)]
-            if name != "truss":
-                T = case.weather(365, 1)
-                F = chains[0].simulate(T, noise="fitted", random_state=1)
-                print(f"{name}, healthy, all groups:\n{identify_damage(chains[0], T, F, random_state=0).summary()}\n")
+        for design in [each for each in options.designs if name == "truss" or each != "campaign"]:
+            chains = pairs(case, design, options.repeats if design == "campaign" else options.chains)
+            T = case.weather(365, 1)
+            F = chains[0][1].simulate(T, noise="fitted", random_state=1)
+            print(f"{name}, healthy, all groups:\n{identify_damage(chains[0][1], T, F, random_state=0).summary()}\n")
             for truth in truths if options.truths is None else [truths[place] for place in options.truths]:
                 for n_records in options.records:
                     label = ", ".join(f"{group} {100 * severity:g} %" for group, severity in truth.items()) or "healthy"
-                    found = list(run(case, truth, n_records, chains, options.repeats))
+                    found = list(repeated(case, truth, n_records, chains, options.repeats))
                     rows[name, design, label, n_records] = row(found)
                     print(name, design, label, n_records, rows[name, design, label, n_records], flush=True)
     table = pd.DataFrame(rows).T
