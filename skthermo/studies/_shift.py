@@ -68,10 +68,10 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
 
 
 def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:
-    """Covariance of a record, (n_modes, n_modes), with which independent records would scatter as the periods' means do.
+    """Covariance, (n_modes, n_modes), of independent records whose means would scatter as those of the periods do.
 
-    Serial correlation makes it larger than that of single records. It is NaN for modes that no two periods have. A dozen
-    means say little about correlations of several modes. They are drawn to the correlations of single records, with the
+    Serial correlation makes it larger than that of single records. It is NaN for modes without a record. A dozen means
+    say little about correlations of several modes. They are drawn to the correlations of single records, with the
     variance that the means show.
 
     Parameters
