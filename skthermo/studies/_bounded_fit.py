@@ -43,10 +43,6 @@ class BoundedFit:
     explained: Array
     converged: bool
 
-    def without(self, column: int) -> float:
-        """Misfit of the linear fit without one group."""
-        return _misfit(np.delete(self.slopes, column, axis=1), self.target)
-
 
 def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: int) -> BoundedFit:
     """Gauss-Newton steps, each a non-negative least-squares fit."""
@@ -94,10 +90,9 @@ def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random
     return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
 
 
-def p_of_group(fit: BoundedFit, column: int, n_periods: int) -> float:
-    """Probability of the group's part in the fit where it is undamaged: one-sided Student's t."""
-    gained = max(fit.without(column) - _misfit(fit.slopes, fit.target), 0.0)
-    return float(stats.t.sf(np.sqrt(gained), n_periods))
+def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int) -> float:
+    """Probability of the part that a group has in a fit where it is undamaged: one-sided Student's t."""
+    return float(stats.t.sf(np.sqrt(max(without.misfit - fit.misfit, 0.0)), n_periods))
 
 
 def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:

@@ -56,7 +56,8 @@ class Comparison:
 
     def of(self, columns: list[list[int]]) -> "Comparison":
         """The comparison for some groups, each of one or several joined."""
-        return Comparison(self.parts, np.column_stack([self.incidence[:, joined].max(axis=1) for joined in columns]))
+        incidence = [self.incidence[:, joined].max(axis=1) for joined in columns]
+        return Comparison(self.parts, np.array(incidence).reshape(len(columns), len(self.incidence)).T)
 
     def slopes(self) -> Array:
         """Effects of small severities in standard errors, (n_observed, n_groups)."""

@@ -54,7 +54,7 @@ def identify_damage(
         Whether groups that cannot be told apart get one severity together.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
-        complex ones are turned to be real.
+        complex ones are turned to be real, and NaN stands for what was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
@@ -89,7 +89,7 @@ def identify_damage(
     enough of them, judged by the other periods. Severities follow from non-negative least squares in standard errors
     of the shifts, repeated with exact derivatives on the damaged model until they no longer change. Their standard
     errors are those of the bounded estimate, from fits to redrawn shifts; at a severity of 0 they say how far errors
-    alone would move it. A group is significant if leaving it out worsens the fit by more than errors would
+    alone would move it. A group is significant if the best fit without it is worse by more than errors would make it
     (one-sided, Bonferroni over the groups).
 
     Examples
@@ -107,6 +107,8 @@ def identify_damage(
     check_is_fitted(fem)
     if not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    if shapes is None and dofs is not None:
+        raise ValueError("dofs came without shapes; expected both or neither")
     frequencies, members = _read(fem, T, F), read_groups(fem.model, groups)
     labels = list(members)
     of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
