@@ -71,14 +71,15 @@ class WeatherResiduals:
     def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
         """Residuals of each of some periods less those that the other periods have in similar weather.
 
-        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average.
+        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One mapper
+        gives both, as for new records, so that its own error in such weather cancels.
         """
         parts = []
         for period in np.array_split(np.arange(len(self.values)), n_periods):
             others = np.ones(len(self.values), dtype=bool)
             others[period] = False
             weather = self.weather[period]
-            residuals = self.values[period] - self._similar_mean(self.values, weather, others)
+            residuals = self.own[period] - self._similar_mean(self.own, weather, others)
             parts.append((residuals, self._n_similar(weather, others)))
         return parts
 
