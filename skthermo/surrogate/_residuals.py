@@ -71,8 +71,8 @@ class WeatherResiduals:
     def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
         """Residuals of each of some periods less those that the other periods have in similar weather.
 
-        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One mapper
-        gives both, as for new records, so that its own error in such weather cancels.
+        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One
+        mapper gives both, as for new records, so that its own error in such weather cancels.
         """
         parts = []
         for period in np.array_split(np.arange(len(self.values)), n_periods):
