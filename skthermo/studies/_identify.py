@@ -88,10 +88,10 @@ def identify_damage(
     weather. Its covariance comes from periods of the training records, each of the new records' length if there are
     enough of them, judged by the other periods, and counts how many training records have weather like that of the new
     ones. Severities follow from non-negative least squares in standard errors of the shifts, repeated with exact
-    derivatives on the damaged model until they no longer change. Their standard
-    errors are those of the bounded estimate, from fits to redrawn shifts; at a severity of 0 they say how far errors
-    alone would move it. A group is significant if the best fit without it is worse by more than errors would make it
-    (one-sided, Bonferroni over the groups).
+    derivatives on the damaged model until they no longer change. Their standard errors are those of the bounded
+    estimate, from fits to redrawn shifts; at a severity of 0 they say how far errors alone would move it. A group is
+    significant if the best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the
+    groups).
 
     Examples
     --------
