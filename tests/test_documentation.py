@@ -35,7 +35,7 @@ def test_the_guide_shows_code():
 
 
 @pytest.mark.parametrize(
-    "room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "plotting"]
+    "room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "studies", "plotting"]
 )
 def test_the_reference_lists_every_public_name(room):
     index = (ROOT / "docs" / "api" / "index.rst").read_text()

@@ -13,6 +13,7 @@ from skthermo.studies._bounded_fit import (
     p_of_group,
     p_of_misfit,
     redrawn,
+    standard_errors,
 )
 from skthermo.studies._comparison import Comparison
 from skthermo.studies._identified import IdentifiedDamage
@@ -35,13 +36,12 @@ def findings(
     """Fit the groups together and one by one, and test what is found."""
     fit = comparison.fit()
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
-    errors = redrawn(fit.slopes, fit.slopes @ fit.severities, N_DRAWS, random) - fit.severities
-    covariance = errors.T @ errors / N_DRAWS
+    errors, covariance = standard_errors(fit, N_DRAWS, random)
     p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
     table = pd.DataFrame(
         {
             "severity": fit.severities,
-            "standard_error": np.sqrt(np.diag(covariance)),
+            "standard_error": errors,
             "error_alone": errors_alone(fit.slopes),
             "p_value": p_values,
             "significant": np.array(p_values) < significance / len(names),

@@ -97,3 +97,13 @@ def test_repeats_that_are_all_alike_count_once():
     single, repeated = rate_of(once), rate_of(np.repeat(once, 20, axis=0))
     assert repeated.n_effective == pytest.approx(single.n_effective)
     assert (repeated.lowest, repeated.highest) == pytest.approx((single.lowest, single.highest))
+
+
+def test_repeats_with_other_damage_count_as_one_record_each():
+    """Half of the repeats have alarms throughout, half have none: 20 coins, whatever the number of records."""
+    decisions = np.repeat(np.where(np.arange(20) % 2, 1.0, -1.0)[:, np.newaxis], 400, axis=1)
+    whole = rate_of(decisions, whole_repeats=True)
+    assert whole.rate == 0.5
+    assert 10 < whole.n_effective <= 20
+    assert whole.lowest < 0.3
+    assert whole.highest > 0.7
