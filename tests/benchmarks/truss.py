@@ -21,13 +21,14 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
 
-from plot_truss_study import GROUPS, HALVED, NOISE, PAPER_MAPE, PAPER_RATES, SEVERITIES
+import plot_truss_study as example
 
+GROUPS, NOISE, SEVERITIES, HALVED = example.GROUPS, example.NOISE, example.SEVERITIES, example.HALVED
 SCENARIOS = sweep(make_truss(), SEVERITIES, GROUPS)
 NAMES = [scenario.name for scenario in SCENARIOS]
 HALVED_NAMES = [scenario.name for scenario in HALVED]
-PAPER_ERRORS = pd.DataFrame(PAPER_MAPE, HALVED_NAMES)
-PAPER_ALARMS = pd.DataFrame(PAPER_RATES, NAMES)
+PAPER_ERRORS = pd.DataFrame(example.PAPER_MAPE, HALVED_NAMES)
+PAPER_ALARMS = pd.DataFrame(example.PAPER_RATES, NAMES)
 SEEDS_40 = pd.DataFrame(
     {
         "mean": [2.7, 23.9, 93.6, 100, 10.6, 57.2, 97.5, 65.5, 100],
