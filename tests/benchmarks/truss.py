@@ -158,13 +158,11 @@ def run(seeds, n_draws=20, **options):
     return pd.concat(mapes, names=names), pd.concat(rates, names=["seed", "scenario"]), pd.DataFrame(alarms).T
 
 
-def detectable(rates, source):
-    """Minimum detectable damage of each group at a mean POD of 90 %, in percent."""
+def detectable(rates, source, level=0.9):
+    """Minimum detectable damage of each group at this mean POD, in percent."""
     mean = rates.groupby("scenario")[source].mean() / 100
-    return {
-        group: 100 * minimum_detectable_damage(SEVERITIES, [mean[f"{group} {100 * s:g} %"] for s in SEVERITIES])
-        for group in GROUPS
-    }
+    pods = {group: [mean[f"{group} {100 * s:g} %"] for s in SEVERITIES] for group in GROUPS}
+    return {group: 100 * minimum_detectable_damage(SEVERITIES, pod, level) for group, pod in pods.items()}
 
 
 def summary(mapes, rates):
