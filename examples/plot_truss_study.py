@@ -91,7 +91,7 @@ def table_3(studies):
     results = pd.concat([study.results_ for study in studies]).set_index(["scenario", "source"])
     columns = {"here": ("rate", "mean"), "lowest": ("band_lowest", "min"), "highest": ("band_highest", "max")}
     table = 100 * results.groupby(level=[0, 1], sort=False).agg(**columns)
-    table.insert(0, "paper", pd.DataFrame(PAPER_RATES, results.index.unique(0)).stack())
+    table.insert(0, "paper", pd.DataFrame(PAPER_RATES, results.index.unique(0)).T.unstack())
     table = table.unstack("source").swaplevel(axis=1)[list(PAPER_RATES)].loc[results.index.unique(0)]
     gaps = [study.results_.pivot(index="scenario", columns="source", values="rate") for study in studies]
     table["difference", "paper"] = (table["data-informed", "paper"] - table["reference", "paper"]).abs()
