@@ -111,7 +111,7 @@ def smallest(studies):
 
 
 def figures(one, study):
-    """All figures of one realisation by name."""
+    """Figures by name; in fig06, the vertical members are far from the truth because they hardly move the modes."""
     temperatures, frequencies = one.year.temperatures.add_suffix(" (°C)"), one.year.frequencies.add_suffix(" (Hz)")
     moduli = (210 * one.year.theta).set_axis([f"E of zone {zone} (GPa)" for zone in (1, 2, 3)], axis=1)
     baseline = pd.concat([temperatures, moduli, frequencies], axis=1)
