@@ -18,6 +18,7 @@ from skthermo.fem import check_noise
 from skthermo.studies._candidate import Arrangement, longer
 from skthermo.studies._scenario import Scenario
 from skthermo.studies._study import DetectabilityStudy
+from skthermo.studies._unknown_modes import warn_of_unknown_modes
 from skthermo.studies._warnings_once import warnings_once, without_warnings
 from skthermo.studies._world import LARGEST_SEED, Ladder, World, mode_name
 
@@ -101,14 +102,17 @@ def what_to_add(
     Warns
     -----
     UserWarning
-        Once for each kind of doubt about the simulations, such as foreign weather.
+        Once for each kind of doubt about the simulations, such as foreign weather; if a mode depends on parameters that
+        the measured modes hardly determine, so that the chain does not know how it moves.
 
     Notes
     -----
     Every repeat simulates a baseline in the weather that the chain was fitted on, and new records in the weather T, at
     13 severities around the present a90 of each family, as far as a family is the damage of one group. The detector is
     fitted anew without and with each candidate, to the same noise (common random numbers). The bounds hold the scatter
-    of the repeats, but no error of the model: a gain in a mode that the model gets wrong is wrong, too.
+    of the noise in the repeats, but no error of the model: a gain in a mode that the model gets wrong is wrong, too. On
+    the truss they hold 85 to 88 % of the gains in true records, without the mode of which a warning says that it is
+    doubtful, and 94 % of the one that is recommended (``noise="fitted"``).
 
     A sensor is compared in the training weather, in which alone its values are known, and the chain that was fitted
     with it is taken for the truth. It matters to detectors that see temperatures.
@@ -124,7 +128,7 @@ def what_to_add(
     >>> scenarios = sweep(fem, (0.1, 0.2, 0.3), groups=["top"])
     >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
     >>> results = study.run(weather)
-    >>> table = what_to_add(study, weather)
+    >>> table = what_to_add(study, weather, modes=[6, 8])
     >>> table["candidate"][0]
     'mode 9'
     >>> bool(table["lowest"][0] < table["gain"][0] < table["mdd_now"][0])
@@ -152,6 +156,8 @@ def what_to_add(
     )
     rows: list[dict[str, Any]] = []
     with warnings_once():
+        if ranks:
+            warn_of_unknown_modes(fem, ranks)
         trials = [Trials(world, present, candidates)] if candidates else []
         trials += _with_sensors(study, present, families, sensors)
         for trial in trials:

@@ -13,7 +13,7 @@ from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import DetectabilityStudy, Scenario, pod_curve, sweep, what_to_add
 from skthermo.studies._candidate import Arrangement
 from skthermo.studies._world import World
-from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures
@@ -35,7 +35,8 @@ def study(fem):
 
 @pytest.fixture(scope="module")
 def table(study):
-    return what_to_add(study, WEATHER, baseline_factors=(2.0, 2.5))
+    with pytest.warns(UserWarning, match="mode 8 depends on parameters that the measured modes hardly determine"):
+        return what_to_add(study, WEATHER, baseline_factors=(2.0, 2.5))
 
 
 def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(table):
@@ -71,20 +72,23 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
 
 
 def test_the_noisier_the_mode_the_less_it_gains(study):
+    few = clone(study).set_params(n_repeats=2)
+    few.run(WEATHER)
     gains = [
-        what_to_add(study, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
+        what_to_add(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
         for noise in (0.001, 0.01, 0.2)
     ]
-    assert gains[0] > 2 * gains[1] > 0
+    assert gains[0] > 1.5 * gains[1] > 0
     assert gains[1] > gains[2]
-    each = what_to_add(study, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
+    each = what_to_add(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
     assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
 
 
-def test_same_bits_whatever_the_jobs(study, table):
-    twin = clone(study).set_params(n_jobs=2)
-    twin.run(WEATHER)
-    pd.testing.assert_frame_equal(what_to_add(twin, WEATHER, baseline_factors=(2.0, 2.5)), table)
+def test_same_bits_whatever_the_jobs(study):
+    few = clone(study).set_params(n_repeats=2)
+    few.run(WEATHER)
+    expected = what_to_add(few, WEATHER, modes=[8])
+    pd.testing.assert_frame_equal(what_to_add(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
 
 
 def test_arrays_and_compensated_detectors_by_name_or_position(fem):
@@ -106,9 +110,10 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem):
 
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
-    fem = DataInformedFEM(make_truss(), random_state=0).fit(known, YEAR.frequencies)
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01, refine=0)
+    fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=4, random_state=0)
+    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=2, random_state=0)
     study.run(known)
     unrelated = np.random.RandomState(0).standard_normal(365)
     sensors = pd.DataFrame({"unrelated": unrelated, "T3": YEAR.temperatures["T3"]})
@@ -121,7 +126,7 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
 
 def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
-        Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (50.0, 150.0, 300.0)
+        Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)
     ]
     study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0)
     study.run(WEATHER)
