@@ -3,8 +3,9 @@ Z24: where the damage is, and what a simulation would have told
 ===============================================================
 
 ``plot_z24_detection.py`` finds the damage that was done to the Z24 bridge. Here the detector looks at parameters of an
-FE model in place of frequencies, and the parameter that changes says where. Then damage is put into the FE model, to
-see whether a detector's alarms on simulated records are like those on measured ones.
+FE model in place of frequencies, and the parameter that changes says where. Then the damage that explains the shift of
+all four modes is identified, with its uncertainty, and put into the FE model: the rates of alarms that a simulation
+promises stand beside the measured ones.
 
 The data belong to KU Leuven and are not part of this package. Run the example with the folder or the file
 that holds them: ``python examples/plot_z24_damage.py path/to/z24_monitoring.csv``, or set
@@ -14,30 +15,19 @@ that holds them: ``python examples/plot_z24_damage.py path/to/z24_monitoring.csv
 import warnings
 
 import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
-from plot_z24_bridge import BLUE, GREY, MODES, ORANGE, boosting, bridge_model, chain, read_arguments, save
-from plot_z24_detection import (
-    FREQUENCIES,
-    PAVEMENT,
-    SCALES,
-    Records,
-    alarm_table,
-    alarms,
-    compensate,
-    plot_kinds,
-    show,
-)
-from scipy.optimize import brentq
+from plot_z24_bridge import GREY, boosting, bridge_model, chain, read_arguments, save
+from plot_z24_detection import FREQUENCIES, PAVEMENT, SCALES, Records, alarm_table, compensate, plot_kinds, show
 from sklearn.compose import ColumnTransformer
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 
-from skthermo.detection import MahalanobisDetector
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.preprocessing import BiasAligner
+from skthermo.studies import DetectabilityStudy, Scenario, identify_damage
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 
 FROST = 2.0  # pavement below this, in degrees Celsius, may hold ice
-GROUP = "piers_soil"
 
 
 def in_parameters(records):
@@ -75,51 +65,46 @@ def change_table(measured, names):
     return pd.concat([pd.DataFrame(scatter).T, damaged]), days, scatter["scatter, other days"]
 
 
-class Damage:
-    """The bridge's last month, simulated: the severity is fitted to the mean drop of f2 and to nothing else.
-
-    The chain learns from all healthy records, as it stands for the bridge here.
-    """
-
-    def __init__(self, bridge):
-        self.bridge = bridge
-        self.fem = chain(bridge_model()).fit(bridge.T, bridge.F)
-        self.expected = self.fem.predict(bridge.T_damaged)
-        self.measured_drop = self.mean_drop(bridge.F_damaged)
-        self.severity = brentq(lambda s: (self.mean_drop(self.simulate(s)) - self.measured_drop)["f2"], 0.0, 0.9)
-        self.simulated_drop = self.mean_drop(self.simulate(self.severity))
-
-    def simulate(self, severity, **noise):
-        """Frequencies of the damaged bridge, in the weather of its last month."""
-        return self.fem.simulate(self.bridge.T_damaged, damage={GROUP: severity}, **noise)
-
-    def mean_drop(self, frequencies):
-        """Mean change of every mode, in percent of the healthy prediction at the same temperatures."""
-        return 100 * (frequencies / self.expected - 1).mean()
-
-    def records(self, records, seed):
-        """The records that are judged, simulated with noise like that of the measured ones."""
-        T = self.bridge.split()[2]
-        healthy = self.fem.simulate(T, noise="fitted", random_state=seed)
-        damaged = self.simulate(self.severity, noise="fitted", random_state=seed + 1000)
-        return Records(records.baseline, T.join(healthy), self.bridge.T_damaged.join(damaged))
+def identify(bridge):
+    """Chain of all healthy records, as it stands for the bridge here, and the damage that explains its last month."""
+    fem = chain(bridge_model()).fit(bridge.T, bridge.F)
+    return fem, identify_damage(fem, bridge.T_damaged, bridge.F_damaged, random_state=0)
 
 
-def simulation_table(records, damage, n_draws=10):
-    """Alarms on measured records and on simulated ones, in percent; the baseline is measured in both."""
-    draws = [damage.records(records, seed) for seed in range(n_draws)]
-    rows = {}
+def detectors():
+    """Detectors by what they see: raw frequencies, as in the paper, or residuals of two compensators."""
+    found = {"raw frequencies": MahalanobisDetector()}
     for name, estimator in (("broken lines", TemperatureMapper()), ("boosted trees", boosting())):
         for label, scale in SCALES.items():
-            residuals, compensator = compensate(records, estimator, scale)
-            detector = MahalanobisDetector().fit(residuals.baseline)
-            simulated = [draw.each(compensator.transform, residuals.baseline) for draw in draws]
-            rows[name, label] = {
-                (state, source): np.mean([alarms(detector, getattr(draw, kind)) for draw in among])
-                for state, kind in (("false alarms", "later"), ("damage found", "damaged"))
-                for source, among in (("measured", [residuals]), ("simulated", simulated))
+            compensator = TemperatureCompensator(estimator, targets=FREQUENCIES, scale=scale)
+            found[f"{name}, {label}"] = make_pipeline(compensator, MahalanobisDetector())
+    return found
+
+
+def simulation_table(bridge, records, fem, found, names=None, n_repeats=40):
+    """Alarms on measured records, and the band of simulated ones, in percent; the baseline is measured in both."""
+    later = bridge.split()[2]
+    states = {
+        "false alarms": (later, Scenario("healthy"), records.later),
+        "damage found": (bridge.T_damaged, found.scenario("damaged"), records.damaged),
+    }
+    rows = {}
+    for name in names or detectors():
+        detector = detectors()[name]
+        for state, (weather, scenario, measured) in states.items():
+            study = DetectabilityStudy(fem, detector, [scenario], n_repeats=n_repeats, random_state=0)
+            sees = list(records.baseline) if isinstance(detector, Pipeline) else FREQUENCIES
+            results = study.run(weather, records.baseline[sees], reference={scenario.name: measured[sees]})
+            simulated, true = (
+                row for _, row in results.set_index("source").loc[["data-informed", "reference"]].iterrows()
+            )
+            rows[state, name] = {
+                "measured": true["rate"],
+                "simulated": simulated["rate"],
+                "lowest": simulated["band_lowest"],
+                "highest": simulated["band_highest"],
             }
-    return pd.DataFrame(rows).T
+    return 100 * pd.DataFrame(rows).T
 
 
 def plot_changes(days, scatter):
@@ -137,19 +122,6 @@ def plot_changes(days, scatter):
     return fig
 
 
-def plot_drops(damage):
-    """Effect of damage on each mode; only f2 was fitted."""
-    fig, ax = plt.subplots(figsize=(6.5, 3.8), layout="constrained")
-    places = np.arange(4)
-    ax.bar(places - 0.2, damage.measured_drop, width=0.4, color=BLUE, label="measured")
-    ax.bar(places + 0.2, damage.simulated_drop, width=0.4, color=ORANGE, label="simulated, fitted to $f_2$")
-    ax.axhline(0, color="black", lw=0.7)
-    ax.set_xticks(places, MODES)
-    ax.set_ylabel("mean change of frequency (%)")
-    ax.legend()
-    return fig
-
-
 def main():
     bridge, folder = read_arguments("The Z24 bridge: where the damage is, measured and simulated.")
     warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
@@ -163,13 +135,18 @@ def main():
     table, days, scatter = change_table(measured, names)
     show("Change of every parameter in percent of its prediction, means of days:", table)
 
-    damage = Damage(bridge)
-    drops = pd.DataFrame({"measured": damage.measured_drop, "simulated": damage.simulated_drop}).T
+    fem, found = identify(bridge)
+    print(found.summary(), end="\n\n")
+    show("Severities of the groups:", found.table, 3)
     show(
-        f"Damage of {damage.severity:.1%} in {GROUP}, fitted to the mean drop of f2; mean change in percent:", drops, 2
+        "Mean shift of every mode in percent, measured and explained:", 100 * found.shifts.drop(columns="n_records"), 2
     )
-    show("Alarms in percent on measured and on simulated records (10 draws):", simulation_table(records, damage))
-    save({"z24_changes": plot_changes(days, scatter), "z24_damage": plot_drops(damage)}, folder)
+    show(
+        "Alarms in percent, measured and simulated (mean and band of 40 draws of damage and noise):",
+        simulation_table(bridge, records, fem, found),
+    )
+    damage = IdentifiedDamageDisplay.from_predictions(found)
+    save({"z24_changes": plot_changes(days, scatter), "z24_damage": damage.figure_}, folder)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
-from scipy.optimize import nnls
+from scipy.optimize import brentq, nnls
 
 from skthermo._arrays import Array
 
@@ -79,6 +79,30 @@ def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.Random
     """Severities fitted to whitened shifts with new errors, (n_draws, n_groups)."""
     errors = random.standard_normal((n_draws, len(around)))
     return np.array([solve(slopes, around + error) for error in errors]).reshape(n_draws, slopes.shape[1])
+
+
+def standard_errors(fit: BoundedFit, n_draws: int, random: np.random.RandomState) -> tuple[Array, Array]:
+    """Standard errors of the bounded estimates, and their covariance, from fits to redrawn shifts.
+
+    Where an estimate is 0, it may be 0 because another group takes its part. Its standard error is half of the severity
+    that worsens the fit by as much as two standard errors would, however the others adapt.
+    """
+    errors = redrawn(fit.slopes, fit.slopes @ fit.severities, n_draws, random) - fit.severities
+    covariance = errors.T @ errors / n_draws
+    found = np.sqrt(np.diag(covariance))
+    for column in np.flatnonzero(fit.severities == 0):
+        found[column] = max(found[column], highest_likely(fit, column) / 2)
+    return found, covariance
+
+
+def highest_likely(fit: BoundedFit, column: int) -> float:
+    """Severity of a group that worsens the linear fit by two standard errors, the others being fitted anew."""
+    others, least = np.delete(fit.slopes, column, axis=1), _misfit(fit.slopes, fit.target)
+
+    def excess(severity: float) -> float:
+        return _misfit(others, fit.target - severity * fit.slopes[:, column]) - least - 4.0
+
+    return float(brentq(excess, 0.0, HIGHEST, xtol=1e-5)) if excess(HIGHEST) > 0 else HIGHEST
 
 
 def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:

@@ -13,6 +13,7 @@ from skthermo.studies._bounded_fit import (
     p_of_group,
     p_of_misfit,
     redrawn,
+    standard_errors,
 )
 from skthermo.studies._comparison import Comparison
 from skthermo.studies._identified import IdentifiedDamage
@@ -36,13 +37,18 @@ def findings(
     fit, healthy = comparison.fit(), comparison.slopes()
     confused = list(dict.fromkeys(confused_groups(healthy) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
+<<<<<<< HEAD
     errors = redrawn(fit.slopes, fit.slopes @ fit.severities, N_DRAWS, random) - fit.severities
     covariance = errors.T @ errors / N_DRAWS
     p_values = [p_of_group(fit, without, shift.n_periods) for without in _fits_without(comparison, fit)]
+=======
+    errors, covariance = standard_errors(fit, N_DRAWS, random)
+    p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
+>>>>>>> main
     table = pd.DataFrame(
         {
             "severity": fit.severities,
-            "standard_error": np.sqrt(np.diag(covariance)),
+            "standard_error": errors,
             "error_alone": errors_alone(fit.slopes),
             "p_value": p_values,
             "significant": np.array(p_values) < significance / len(names),

@@ -58,9 +58,15 @@ class IdentifiedDamage:
     >>> later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
     >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["bottom", "top"], random_state=0)
     >>> print(found.summary())
+<<<<<<< HEAD
     Damage is certain: a healthy structure shows such a shift with probability 0.002.
     bottom: 1.0% of its stiffness lost (not significant, standard error 0.5%).
     top: 19.1% of its stiffness lost (standard error 0.5%).
+=======
+    Damage is evident: a healthy structure shows such a shift with probability 0.002.
+    bottom: 1.1% of its stiffness lost (not significant, standard error 0.8%).
+    top: 19.0% of its stiffness lost (standard error 0.7%).
+>>>>>>> main
     >>> found.scenario().name
     'identified damage'
     """
@@ -122,8 +128,8 @@ class IdentifiedDamage:
         str
             One sentence a line.
         """
-        certain = "Damage is certain" if self.p_value <= self.significance else "No damage is certain"
-        lines = [f"{certain}: a healthy structure shows such a shift with probability {self.p_value:.2g}."]
+        evident = "Damage is evident" if self.p_value <= self.significance else "No damage is evident"
+        lines = [f"{evident}: a healthy structure shows such a shift with probability {self.p_value:.2g}."]
         for group, row in self.table.dropna().iterrows():
             if row["severity"] > 0:
                 mark = "" if row["significant"] else "not significant, "

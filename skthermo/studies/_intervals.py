@@ -55,6 +55,7 @@ def rate_of(
     interval: Literal["clopper-pearson", "block-bootstrap"] = "clopper-pearson",
     confidence: float = 0.95,
     seed: int = 0,
+    whole_repeats: bool = False,
 ) -> Rate:
     """Rate of negative decisions, and its interval.
 
@@ -69,6 +70,8 @@ def rate_of(
         Two-sided.
     seed : int, default=0
         Of the bootstrap.
+    whole_repeats : bool, default=False
+        Whether all records of a repeat depend on each other, as where each repeat has other damage.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def rate_of(
         return Rate(0, 0, 0.0, 0.0, 1.0)
     if all(np.array_equal(repeat, decisions[0], equal_nan=True) for repeat in decisions[1:]):
         decisions = decisions[:1]  # repeats without noise count once
-    blocks = Blocks.of(decisions)
+    blocks = Blocks.of(decisions, whole_repeats and len(decisions) > 1)
     n_effective = _n_effective(blocks, decisions, confidence)
     if interval == "clopper-pearson":
         lowest, highest = clopper_pearson(n_alarms / n_records * n_effective, n_effective, confidence)
@@ -113,9 +116,11 @@ class Blocks:
     judged: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, decisions: Array) -> "Blocks":
-        """Blocks of several correlation times."""
+    def of(cls, decisions: Array, whole_repeats: bool = False) -> "Blocks":
+        """Blocks of several correlation times, or of all records of a repeat."""
         n_repeats, n_records = decisions.shape
+        if whole_repeats:
+            return cls(np.zeros(1, dtype=int), ~np.isnan(decisions))
         time = np.mean([correlation_time(row) for row in _scatter(decisions)])
         strata = max(n_repeats - 1, 1)
         number = max(n_records / (BLOCK * time), LEAST_FREEDOM / strata + (n_repeats == 1))

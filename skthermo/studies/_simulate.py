@@ -80,12 +80,25 @@ class Trial:
 
 def clean_frequencies(fem: Any, scenarios: Sequence[State], T: Any, n_repeats: int) -> dict[str, list[Array]]:
     """Frequencies without noise by scenario, for each of the draws that the repeats take."""
-    return {
-        scenario.name: [
-            as_floats(fem.simulate(T, **scenario.changes(T, draw))) for draw in range(min(scenario.n_draws, n_repeats))
-        ]
-        for scenario in scenarios
-    }
+    clean = {}
+    for scenario in scenarios:
+        changes = [scenario.changes(T, draw) for draw in range(min(scenario.n_draws, n_repeats))]
+        if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
+            clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
+        else:
+            clean[scenario.name] = [as_floats(fem.simulate(T, **change)) for change in changes]
+    return clean
+
+
+def _of_draws(fem: Any, draws: Sequence[Mapping[str, float]], T: Any) -> list[Array]:
+    """Frequencies of the structure with one damage after the other, solved together by one model."""
+    groups = list(draws[0])
+    severities = np.array([[draw[group] for group in groups] for draw in draws])
+    simulator = fem.simulator_.with_damage_parameters(groups, severities.min(), severities.max())
+    theta = as_floats(fem.predict_parameters(T))
+    factors = np.repeat(1 - severities, len(theta), axis=0)
+    frequencies = simulator.frequencies(np.hstack([np.tile(theta, (len(draws), 1)), factors]), fem.n_jobs)
+    return np.split(as_floats(fem.aligner_.inverse_transform(frequencies)), len(draws))
 
 
 def judge(detector: Any, table: Any) -> Array:

@@ -12,6 +12,7 @@ from sklearn.pipeline import Pipeline
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
+from skthermo.studies._candidate import Arrangement
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
 from skthermo.studies._pod_fit import check_probability
@@ -56,8 +57,12 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         The fitted clone.
     indices_ : dict of (str, str) to Series
         Damage index of the records of the first repeat, by scenario and source.
+    arrangement_ : object
+        Columns that the detector sees, and the number of healthy records that it has learned.
     threshold_ : float or None
         Damage index above which there is an alarm, where the detector has one.
+    warnings_ : list of str
+        Texts of the warnings that the simulations gave.
 
     See Also
     --------
@@ -196,7 +201,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         if lacking:
             raise ValueError(f"the detector is {self.detector!r:.200}, without {lacking}; expected an outlier detector")
         measured = {} if reference is None or callable(reference) else reference
-        with warnings_once(), single_blas_thread():
+        with warnings_once() as self.warnings_, single_blas_thread():
             clean = clean_frequencies(self.fem, list(scenarios.values()), T, n_repeats)
             truth = reference if callable(reference) else None
             trial = Trial(self.fem, self.detector_, view, list(scenarios.values()), T, clean, self.noise, truth)
@@ -219,6 +224,8 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             [summary(scenarios[key[0]], key[1], np.array(decisions[key]), rows[key], **options) for key in ordered]
         )
         self._confidence = confidence
+        columns = [view.names[i] for i in view.positions]
+        self.arrangement_ = Arrangement(clone(self.detector_), columns, _num_samples(healthy), view.is_frame)
         return self.results_
 
     def _checked_scenarios(self, reference: Any) -> list[State]:

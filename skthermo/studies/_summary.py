@@ -41,13 +41,13 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
     start = times.min() if scenario.onset is None else time_of(rows, scenario.onset, "onset")
     order = np.argsort(times, kind="stable")
     order = order[times[order] >= start]
-    rate = rate_of(decisions[:, order], **options)
-    band = band_of(decisions[:, order], options["confidence"])
+    rate = rate_of(decisions[:, order], whole_repeats=scenario.n_draws > 1, **options)
     if not rate.n_records:
         raise ValueError(
             f"none of {decisions.shape[1]} records of scenario {scenario.name!r}, source {source!r}, can be judged: "
             "they lack what the detector needs, or are before the onset; expected some that it can judge"
         )
+    band = band_of(decisions[:, order], options["confidence"])
     return {
         "scenario": scenario.name,
         "family": scenario.family,

@@ -10,16 +10,24 @@ from skthermo._warnings import warn_user
 
 
 @contextmanager
-def warnings_once() -> Iterator[None]:
-    """Give warnings that differ only in their numbers once, with their count, when the context ends."""
+def warnings_once() -> Iterator[list[str]]:
+    """Give warnings that differ only in their numbers once, with their count, when the context ends.
+
+    Yields
+    ------
+    list of str
+        Their texts, which it holds from then on.
+    """
+    texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield
+        yield texts
     alike: dict[str, list[warnings.WarningMessage]] = {}
     for warning in caught:
         alike.setdefault(re.sub(r"[\d.]+", "0", str(warning.message)), []).append(warning)
     for first, *others in alike.values():
         again = f" (and {len(others)} times more in the simulations of this study)" if others else ""
+        texts.append(f"{first.message}{again}")
         if first.category is UserWarning:
             warn_user(f"{first.message}{again}", f"study: {first.message}")
         else:

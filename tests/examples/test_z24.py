@@ -4,7 +4,6 @@ import os
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
@@ -12,8 +11,11 @@ from tests.examples.z24 import BRIDGE, DAMAGE, DETECTION
 
 pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside"),
+    pytest.mark.filterwarnings("ignore:groups that these modes cannot tell apart"),
     pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
 ]
+
+LINES = [f"broken lines, {label}" for label in DETECTION.SCALES]
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +26,17 @@ def frozen(tmp_path_factory):
     return BRIDGE.Bridge(BRIDGE.find(folder))
 
 
-def test_the_severity_is_found_from_f2_alone_and_the_other_modes_follow(frozen):
-    damage = DAMAGE.Damage(frozen)
-    assert damage.severity == pytest.approx(SEVERITY, abs=0.02)
-    np.testing.assert_allclose(damage.simulated_drop, damage.measured_drop, atol=0.4)
+def test_the_damage_is_identified_and_its_alarms_are_foretold(frozen):
+    fem, found = DAMAGE.identify(frozen)
+    assert found.p_value < 0.01
+    for group in ("piers", "soil"):
+        assert found.severities[group] == pytest.approx(SEVERITY, abs=2 * found.standard_errors[group])
+    assert found.severities.drop(["piers", "soil"]).max() < 0.02
+    unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
+    assert unexplained.abs().max() < 2
+    table = DAMAGE.simulation_table(frozen, DETECTION.Records.of(frozen), fem, found, LINES, n_repeats=10)
+    found = table.loc["damage found"]
+    assert (found["measured"].between(found["lowest"] - 5, found["highest"] + 5)).all()
 
 
 def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
@@ -97,3 +106,13 @@ def test_the_real_bridges_damage_is_found(real):
     assert (table["damage found"] >= 80).all()
     days = DETECTION.found_by_day({("broken lines", DETECTION.WHITENED): found["broken lines"]}).loc["found"]
     assert (days.iloc[2:] == 100).all()
+
+
+def test_the_real_bridges_rates_are_within_the_simulated_band(real):
+    fem, found = DAMAGE.identify(real)
+    unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
+    assert unexplained.abs().max() < 2
+    assert found.table.loc["soil", "significant"]
+    table = DAMAGE.simulation_table(real, DETECTION.Records.of(real), fem, found, LINES, n_repeats=10)
+    found = table.loc["damage found"]
+    assert found["measured"].between(found["lowest"], found["highest"]).all()

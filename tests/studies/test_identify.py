@@ -169,7 +169,7 @@ def test_standard_errors_are_those_of_repeats(fem):
     random = np.random.RandomState(0)
     scatter = noise * np.sqrt(1 + len(clean) / len(YEAR.frequencies))  # of training and new records
     found = []
-    for _ in range(60):
+    for _ in range(40):
         F = clean * (1 + scatter * random.standard_normal(clean.shape))
         found.append(identify_damage(fem, WEATHER, F, GROUPS, noise=noise, random_state=0))
     estimates = np.array([each.severities for each in found])

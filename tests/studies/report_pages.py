@@ -1,0 +1,83 @@
+"""A small structure whose names try to break a page, and a reader that checks pages."""
+
+import base64
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+
+from skthermo.detection import MahalanobisDetector
+from skthermo.fem import AffineModel
+from skthermo.studies import DetectabilityStudy
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+HOSTILE = "<script>alert(1)</script>"
+QUOTED = "\"onerror='x' & $\\frac{"
+SENSOR, MODES = "<b>air</b>", ["</table><img src=x>", "$x^{", "f3"]
+VOID = {"meta", "img", "br", "link", "hr", "input"}
+
+
+def fitted_chain(n_records=120, index=True, random_state=0):
+    """Three masses on springs of two groups, whose stiffness falls with temperature."""
+    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    first, second = np.zeros((3, 3)), np.zeros((3, 3))
+    first[0, 0] = 400.0
+    first[:2, :2] += 900.0 * spring
+    second[1:, 1:] += 800.0 * spring
+    model = AffineModel({(HOSTILE,): first, (QUOTED,): second}, np.eye(3), n_modes=3)
+    random = np.random.RandomState(random_state)
+    weather = 10 + 12 * np.sin(np.arange(n_records) / 12) + random.standard_normal(n_records)
+    theta = 1 - np.column_stack([0.004 * weather, 0.003 * weather])
+    F = model.frequencies(theta) * (1 + 0.005 * random.standard_normal((n_records, 3)))
+    F[5:9, 1] = np.nan
+    T = weather[:, np.newaxis]
+    if index:
+        days = pd.date_range("2024-01-01", periods=n_records, freq="D")
+        T, F = pd.DataFrame(T, days, [SENSOR]), pd.DataFrame(F, days, MODES)
+    mapper = TemperatureMapper(random_state=0)
+    inverse = InverseSurrogate(n_samples=200, noise=0.005, random_state=0)
+    return DataInformedFEM(model, inverse=inverse, mapper=mapper, random_state=0).fit(T, F), T, F
+
+
+def run_study(fem, T, scenarios, **options):
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0)
+    study.run(T, **options)
+    return study
+
+
+class Page(HTMLParser):
+    """A page that was read: an error if tags are not balanced."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.text = [], [], ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        assert len(dict(attributes)) == len(attributes), f"{tag} has an attribute twice"
+        self.tags.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("style", "title"):
+            self.text += data
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    def values(self, attribute):
+        return [attributes[attribute] for _, attributes in self.tags if attribute in attributes]
+
+    def drawings(self):
+        """Drawings as trees; an error if they are no XML."""
+        kind = "data:image/svg+xml;base64,"
+        sources = [image["src"] for image in self.all("img")]
+        assert all(source.startswith(kind) for source in sources)
+        return [ElementTree.fromstring(base64.b64decode(source[len(kind) :])) for source in sources]

@@ -1,0 +1,198 @@
+"""What would make smaller damage detectable."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.fem import CallableModel, add_noise
+from skthermo.studies import DetectabilityStudy, Scenario, pod_curve, sweep, what_to_add
+from skthermo.studies._candidate import Arrangement
+from skthermo.studies._world import World
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures
+MODES = list(YEAR.frequencies)
+
+
+@pytest.fixture(scope="module")
+def fem():
+    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
+
+
+@pytest.fixture(scope="module")
+def study(fem):
+    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01, random_state=0)
+    study.run(WEATHER)
+    return study
+
+
+@pytest.fixture(scope="module")
+def table(study):
+    with pytest.warns(UserWarning, match="mode 8 depends on parameters that the measured modes hardly determine"):
+        return what_to_add(study, WEATHER, baseline_factors=(2.0, 2.5))
+
+
+def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(table):
+    assert set(table["candidate"]) == {"mode 7", "mode 8", "mode 9", "baseline x 2", "baseline x 2.5"}
+    assert table["mdd_now"].nunique() == 1
+    np.testing.assert_allclose(table["gain"], table["mdd_now"] - table["mdd_then"])
+    assert table["gain"].is_monotonic_decreasing
+    assert (table["lowest"] < table["gain"]).all()
+    assert (table["gain"] < table["highest"]).all()
+
+
+def test_the_recommended_mode_gains_as_much_in_true_records(table):
+    best = table.iloc[0]
+    assert (best["candidate"], best["family"]) == ("mode 9", "top")
+    assert best["lowest"] > 0
+    gains = []
+    for seed in (10, 20, 30):
+        healthy, later = (make_truss_campaign(random_state=seed + i) for i in range(2))
+        model = healthy.model.with_modes([*range(6), 8])
+        baseline = add_noise(model.frequencies(healthy.theta), 0.01, random_state=seed)
+        severities = np.linspace(0.1, 0.4, 10)
+        changed = [
+            add_noise(model.damaged({"top": s}).frequencies(later.theta), 0.01, random_state=seed + 1)
+            for s in severities
+        ]
+        smallest = []
+        for n_modes in (6, 7):
+            detector = MahalanobisDetector().fit(baseline[:, :n_modes])
+            alarms = [(detector.predict(records[:, :n_modes]) == -1).sum() for records in changed]
+            smallest.append(pod_curve(severities, alarms, np.full(10, 365)).a90)
+        gains.append(smallest[0] - smallest[1])
+    assert best["lowest"] < np.mean(gains) < best["highest"]
+
+
+def test_the_noisier_the_mode_the_less_it_gains(study):
+    few = clone(study).set_params(n_repeats=2)
+    few.run(WEATHER)
+    gains = [
+        what_to_add(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
+        for noise in (0.001, 0.01, 0.2)
+    ]
+    assert gains[0] > 1.5 * gains[1] > 0
+    assert gains[1] > gains[2]
+    each = what_to_add(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
+    assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
+
+
+def test_same_bits_whatever_the_jobs(study):
+    few = clone(study).set_params(n_repeats=2)
+    few.run(WEATHER)
+    expected = what_to_add(few, WEATHER, modes=[8])
+    pd.testing.assert_frame_equal(what_to_add(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
+
+
+def test_arrays_and_compensated_detectors_by_name_or_position(fem):
+    by_name, by_position = (
+        make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
+        for targets in (MODES, list(range(3, 9)))
+    )
+    T, F = YEAR.temperatures.to_numpy(), YEAR.frequencies.to_numpy()
+    arrays = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
+    tables = []
+    for chain, detector, weather in ((fem, by_name, WEATHER), (arrays, by_position, WEATHER.to_numpy())):
+        scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
+        study = DetectabilityStudy(chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0)
+        study.run(weather)
+        tables.append(what_to_add(study, weather, modes=[8]))
+    pd.testing.assert_frame_equal(*tables)
+    assert tables[0]["gain"][0] > 0
+
+
+def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
+    known = YEAR.temperatures[["T1", "T2"]]
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01, refine=0)
+    fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
+    detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
+    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=2, random_state=0)
+    study.run(known)
+    unrelated = np.random.RandomState(0).standard_normal(365)
+    sensors = pd.DataFrame({"unrelated": unrelated, "T3": YEAR.temperatures["T3"]})
+    table = what_to_add(study, known, modes=(), baseline_factors=(), sensors=sensors)
+    assert table["candidate"].tolist() == ["T3", "unrelated"]
+    assert table["kind"].tolist() == ["sensor", "sensor"]
+    assert table["gain"][0] > 0.01
+    assert abs(table["gain"][1]) < 0.01
+
+
+def test_a_family_of_other_changes_keeps_its_severities(fem):
+    scenarios = [
+        Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)
+    ]
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0)
+    study.run(WEATHER)
+    table = what_to_add(study, WEATHER, modes=[8], baseline_factors=())
+    assert table["family"].tolist() == ["mass"]
+    curve = study.pod_curve("mass")
+    assert table["mdd_now"][0] == pytest.approx(curve.a90, rel=0.15)
+
+
+def test_a_longer_baseline_begins_with_the_shorter_one_and_goes_on_in_time(fem):
+    worlds = [World(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, "fitted", n) for n in (365, 800)]
+    (short, tables), (long, others) = (world.draw(world.clean(), seed=3) for world in worlds)
+    pd.testing.assert_frame_equal(short, long.iloc[:365], check_freq=False)
+    assert len(long) == 800
+    assert (np.diff(long.index) == np.timedelta64(1, "D")).all()
+    np.testing.assert_array_equal(long[["T1", "T2", "T3"]][365:730], YEAR.temperatures)
+    assert not np.allclose(long["f1"][365:730], short["f1"], rtol=1e-4)
+    pd.testing.assert_frame_equal(tables["top", 0.1], others["top", 0.1])
+
+
+def test_damage_that_is_always_or_never_found_has_an_end():
+    random = np.random.RandomState(0)
+    healthy = pd.DataFrame(random.standard_normal((200, 2)), columns=["f1", "f2"])
+    arrangement = Arrangement(MahalanobisDetector(), ["f1", "f2"], 200, True)
+    far = {("far", 0.1): healthy, ("far", 0.2): healthy + 100, ("near", 0.1): healthy, ("near", 0.2): healthy}
+    found = arrangement.smallest(healthy, far)
+    assert 0.1 < found["far"] < 0.2
+    assert found["near"] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"modes": [5]}, r"modes \[5\] are measured already"),
+        ({"modes": [99]}, "is none of the model's"),
+        ({"baseline_factors": (1.0,)}, "expected numbers above 1"),
+        ({"modes": (), "baseline_factors": ()}, "there is no candidate"),
+        ({"noise": 2.0}, "noise is 2"),
+        ({"sensors": pd.DataFrame({"T4": YEAR.temperatures["T1"]})}, "the detector sees no temperatures"),
+        ({"sensors": YEAR.temperatures["T1"]}, "expected a frame with a column for each candidate"),
+    ],
+)
+def test_impossible_candidates_are_errors(study, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        what_to_add(study, WEATHER, **arguments)
+
+
+def test_sensors_must_have_the_training_rows_and_new_names(fem):
+    detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
+    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.3), ["top"]), n_repeats=2, random_state=0)
+    with pytest.raises(ValueError, match="expected a call of run before"):
+        what_to_add(study, WEATHER)
+    study.run(WEATHER)
+    with pytest.raises(ValueError, match="has the name of a measured temperature"):
+        what_to_add(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]])
+    with pytest.raises(ValueError, match="the temperatures of the training has 365 rows and sensors 99"):
+        what_to_add(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]][:99])
+
+
+def test_a_model_without_other_modes_has_only_longer_baselines(fem):
+    truss = make_truss()
+    model = CallableModel(truss.frequencies, truss.parameter_names, 6)
+    chain = DataInformedFEM(model, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
+    scenarios = [Scenario(f"soft {s}", parameters={"top": 1 - s}, family="top", severity=s) for s in (0.2, 0.3, 0.4)]
+    study = DetectabilityStudy(chain, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0)
+    study.run(WEATHER)
+    assert what_to_add(study, WEATHER)["kind"].tolist() == ["baseline"]
+    with pytest.raises(ValueError, match="has no method 'with_modes'"):
+        what_to_add(study, WEATHER, modes=[6])
