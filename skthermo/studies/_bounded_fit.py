@@ -84,15 +84,13 @@ def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.Random
 def standard_errors(fit: BoundedFit, n_draws: int, random: np.random.RandomState) -> tuple[Array, Array]:
     """Standard errors of the bounded estimates, and their covariance, from fits to redrawn shifts.
 
-    Where an estimate is 0, it may be 0 because another group takes its part. Its standard error is half of the severity
-    that worsens the fit by as much as two standard errors would, however the others adapt.
+    An estimate may be 0, or nearly so, because another group takes its part. No standard error is below half of what
+    the severity must grow by to worsen the fit as much as two standard errors would, however the others adapt.
     """
     errors = redrawn(fit.slopes, fit.slopes @ fit.severities, n_draws, random) - fit.severities
     covariance = errors.T @ errors / n_draws
-    found = np.sqrt(np.diag(covariance))
-    for column in np.flatnonzero(fit.severities == 0):
-        found[column] = max(found[column], highest_likely(fit, column) / 2)
-    return found, covariance
+    growth = [highest_likely(fit, column) - severity for column, severity in enumerate(fit.severities)]
+    return np.maximum(np.sqrt(np.diag(covariance)), np.array(growth) / 2), covariance
 
 
 def highest_likely(fit: BoundedFit, column: int) -> float:
@@ -102,7 +100,7 @@ def highest_likely(fit: BoundedFit, column: int) -> float:
     def excess(severity: float) -> float:
         return _misfit(others, fit.target - severity * fit.slopes[:, column]) - least - 4.0
 
-    return float(brentq(excess, 0.0, HIGHEST, xtol=1e-5)) if excess(HIGHEST) > 0 else HIGHEST
+    return float(brentq(excess, fit.severities[column], HIGHEST, xtol=1e-6)) if excess(HIGHEST) > 0 else HIGHEST
 
 
 def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:

@@ -37,14 +37,8 @@ def findings(
     fit, healthy = comparison.fit(), comparison.slopes()
     confused = list(dict.fromkeys(confused_groups(healthy) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
-<<<<<<< HEAD
-    errors = redrawn(fit.slopes, fit.slopes @ fit.severities, N_DRAWS, random) - fit.severities
-    covariance = errors.T @ errors / N_DRAWS
-    p_values = [p_of_group(fit, without, shift.n_periods) for without in _fits_without(comparison, fit)]
-=======
     errors, covariance = standard_errors(fit, N_DRAWS, random)
-    p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
->>>>>>> main
+    p_values = [p_of_group(fit, without, shift.n_periods) for without in _fits_without(comparison, fit)]
     table = pd.DataFrame(
         {
             "severity": fit.severities,

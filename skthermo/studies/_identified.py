@@ -58,15 +58,9 @@ class IdentifiedDamage:
     >>> later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
     >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["bottom", "top"], random_state=0)
     >>> print(found.summary())
-<<<<<<< HEAD
-    Damage is certain: a healthy structure shows such a shift with probability 0.002.
+    Damage is evident: a healthy structure shows such a shift with probability 0.002.
     bottom: 1.0% of its stiffness lost (not significant, standard error 0.5%).
     top: 19.1% of its stiffness lost (standard error 0.5%).
-=======
-    Damage is evident: a healthy structure shows such a shift with probability 0.002.
-    bottom: 1.1% of its stiffness lost (not significant, standard error 0.8%).
-    top: 19.0% of its stiffness lost (standard error 0.7%).
->>>>>>> main
     >>> found.scenario().name
     'identified damage'
     """

@@ -84,25 +84,14 @@ def identify_damage(
 
     Notes
     -----
-<<<<<<< HEAD
     The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
     weather. Its covariance comes from periods of the training records, each of the new records' length if there are
     enough of them, judged by the other periods, and counts how many training records have weather like that of the new
     ones. Severities follow from non-negative least squares in standard errors of the shifts, repeated with exact
     derivatives on the damaged model until they no longer change. Their standard errors are those of the bounded
-    estimate, from fits to redrawn shifts; at a severity of 0 they say how far errors alone would move it. A group is
-    significant if the best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the
-    groups).
-=======
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. Its covariance comes from periods of the training records, each of the new records' length if
-    there are enough of them, judged by the other periods. Severities follow from non-negative least squares in
-    standard errors of the shifts, repeated with exact derivatives on the damaged model until they no longer change.
-    Their standard errors are those of the bounded estimate, from fits to redrawn shifts; where a severity is 0,
-    half of the highest severity that the shifts allow, within two standard errors and however the other groups
-    adapt. A group is significant if leaving it out worsens the fit by more than errors would (one-sided, Bonferroni
-    over the groups).
->>>>>>> main
+    estimate, from fits to redrawn shifts, and not below half of what a severity can grow by until the fit is worse by
+    two standard errors, however the other groups adapt. A group is significant if the best fit without it is worse by
+    more than errors would make it (one-sided, Bonferroni over the groups).
 
     Examples
     --------
