@@ -20,6 +20,9 @@ SPREAD_OF = 100
 COMPARED_WITH = 50
 """Least number of records with the most similar weather whose mean a residual is compared with."""
 
+OVERFITTED = 0.9
+"""Ratio of a mapper's own median residual to that out of fold, below which it has learned noise."""
+
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
 records goes on while it lasts."""
@@ -72,16 +75,24 @@ class WeatherResiduals:
         """Residuals of each of some periods less those that the other periods have in similar weather.
 
         With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One
-        mapper gives both, as for new records, so that its own error in such weather cancels.
+        mapper gives both, as for new records, so that its own error in such weather cancels; but where a mapper follows
+        its own records more closely than others, the residuals are those out of fold.
         """
+        residuals = self.values if self._is_overfitted else self.own
         parts = []
         for period in np.array_split(np.arange(len(self.values)), n_periods):
             others = np.ones(len(self.values), dtype=bool)
             others[period] = False
             weather = self.weather[period]
-            residuals = self.own[period] - self._similar_mean(self.own, weather, others)
-            parts.append((residuals, self._n_similar(weather, others)))
+            similar = self._similar_mean(residuals, weather, others)
+            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
         return parts
+
+    @property
+    def _is_overfitted(self) -> bool:
+        """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
+        own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
+        return bool((own < OVERFITTED * out_of_fold).any())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
