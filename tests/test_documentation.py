@@ -1,5 +1,6 @@
 """Code in README and the user guide runs, and the figures that README shows are there."""
 
+import doctest
 import importlib
 import re
 import textwrap
@@ -26,8 +27,15 @@ def test_a_pages_code_runs_from_top_to_bottom(page, capsys):
     for block in python_blocks(page):
         exec(compile(block, page.name, "exec"), namespace)
     printed = capsys.readouterr().out
-    if "print(" in page.read_text():
+    if any("print(" in block for block in python_blocks(page)):
         assert float(printed) == pytest.approx(DETECTED, abs=2 * DEVIATION)
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if "\n>>> " in p.read_text()], ids=lambda p: p.name)
+def test_a_pages_examples_print_what_it_shows(page):
+    options = {"module_relative": False, "optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
+    failed, tried = doctest.testfile(str(page), **options)
+    assert tried > failed == 0
 
 
 def test_the_guide_shows_code():

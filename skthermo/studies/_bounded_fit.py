@@ -13,7 +13,7 @@ HIGHEST = 0.95
 """Highest severity that is fitted."""
 
 MOST_STEPS = 12
-TOLERANCE = 1e-5
+TOLERANCE = 1e-6
 
 Effects = Callable[[Array], tuple[Array, Array]]
 
@@ -43,10 +43,6 @@ class BoundedFit:
     explained: Array
     converged: bool
 
-    def without(self, column: int) -> float:
-        """Misfit of the linear fit without one group."""
-        return _misfit(np.delete(self.slopes, column, axis=1), self.target)
-
 
 def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: int) -> BoundedFit:
     """Gauss-Newton steps, each a non-negative least-squares fit."""
@@ -56,9 +52,9 @@ def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: i
         target = whitening @ (shift - change + slopes @ severities)
         found = solve(whitening @ slopes, target)
         converged = bool(np.abs(found - severities).max(initial=0.0) < TOLERANCE)
-        severities = found
         if converged:
             break
+        severities = found
     change, slopes = effects(severities)
     residual = whitening @ (shift - change)
     whitened = whitening @ slopes
@@ -73,6 +69,8 @@ def solve(slopes: Array, target: Array) -> Array:
     Each severity also counts as known to be 0 within 1, which decides only where the shifts leave it open.
     """
     n_groups = slopes.shape[1]
+    if n_groups == 0:
+        return np.zeros(0)  # SciPy's nnls crashes without columns
     found = nnls(np.vstack([slopes, np.eye(n_groups)]), np.concatenate([target, np.zeros(n_groups)]))[0]
     return np.minimum(found, HIGHEST)
 
@@ -86,15 +84,13 @@ def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.Random
 def standard_errors(fit: BoundedFit, n_draws: int, random: np.random.RandomState) -> tuple[Array, Array]:
     """Standard errors of the bounded estimates, and their covariance, from fits to redrawn shifts.
 
-    Where an estimate is 0, it may be 0 because another group takes its part. Its standard error is half of the severity
-    that worsens the fit by as much as two standard errors would, however the others adapt.
+    An estimate may be 0, or nearly so, because another group takes its part. No standard error is below half of what
+    the severity must grow by to worsen the fit as much as two standard errors would, however the others adapt.
     """
     errors = redrawn(fit.slopes, fit.slopes @ fit.severities, n_draws, random) - fit.severities
     covariance = errors.T @ errors / n_draws
-    found = np.sqrt(np.diag(covariance))
-    for column in np.flatnonzero(fit.severities == 0):
-        found[column] = max(found[column], highest_likely(fit, column) / 2)
-    return found, covariance
+    growth = [highest_likely(fit, column) - severity for column, severity in enumerate(fit.severities)]
+    return np.maximum(np.sqrt(np.diag(covariance)), np.array(growth) / 2), covariance
 
 
 def highest_likely(fit: BoundedFit, column: int) -> float:
@@ -104,7 +100,7 @@ def highest_likely(fit: BoundedFit, column: int) -> float:
     def excess(severity: float) -> float:
         return _misfit(others, fit.target - severity * fit.slopes[:, column]) - least - 4.0
 
-    return float(brentq(excess, 0.0, HIGHEST, xtol=1e-5)) if excess(HIGHEST) > 0 else HIGHEST
+    return float(brentq(excess, fit.severities[column], HIGHEST, xtol=1e-6)) if excess(HIGHEST) > 0 else HIGHEST
 
 
 def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:
@@ -116,10 +112,9 @@ def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random
     return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
 
 
-def p_of_group(fit: BoundedFit, column: int, n_periods: int) -> float:
-    """Probability of the group's part in the fit where it is undamaged: one-sided Student's t."""
-    gained = max(fit.without(column) - _misfit(fit.slopes, fit.target), 0.0)
-    return float(stats.t.sf(np.sqrt(gained), n_periods))
+def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int) -> float:
+    """Probability of the part that a group has in a fit where it is undamaged: one-sided Student's t."""
+    return float(stats.t.sf(np.sqrt(max(without.misfit - fit.misfit, 0.0)), n_periods))
 
 
 def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:

@@ -27,6 +27,19 @@ class Part:
     covariance: Array
 
 
+def remembered(effects: Effects) -> Effects:
+    """The same effects, each solved once: all fits begin at the same severities."""
+    solved: dict[bytes, tuple[Array, Array]] = {}
+
+    def at(severities: Array) -> tuple[Array, Array]:
+        key = severities.tobytes()
+        if key not in solved:
+            solved[key] = effects(severities)
+        return solved[key]
+
+    return at
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Everything that was measured, beside the effects of some groups.
@@ -43,7 +56,8 @@ class Comparison:
 
     def of(self, columns: list[list[int]]) -> "Comparison":
         """The comparison for some groups, each of one or several joined."""
-        return Comparison(self.parts, np.column_stack([self.incidence[:, joined].max(axis=1) for joined in columns]))
+        incidence = [self.incidence[:, joined].max(axis=1) for joined in columns]
+        return Comparison(self.parts, np.array(incidence).reshape(len(columns), len(self.incidence)).T)
 
     def slopes(self) -> Array:
         """Effects of small severities in standard errors, (n_observed, n_groups)."""

@@ -61,8 +61,8 @@ class StudyCurves:
         -------
         DataFrame
             Indexed by family and source, with ``mdd``, ``lowest`` and ``highest``: NaN or infinite where the level is
-            not reached. Where the curve has no finite slope, ``mdd`` is NaN and the bounds are the two tested
-            severities between which it lies.
+            not reached. Where a curve has no finite slope, or a family one severity only, ``mdd`` is NaN and the bounds
+            are the two tested severities between which it lies.
 
         Raises
         ------
@@ -94,6 +94,8 @@ class StudyCurves:
         return mdd, lowest, highest
 
     def _on_curve(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
+        if len(rows) < 2:
+            return float("nan"), *bracket_of(rows["severity"].abs().to_numpy(), rows["rate"].to_numpy(), level)
         curve = self.pod_curve(*key)
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)

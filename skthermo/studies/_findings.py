@@ -34,10 +34,11 @@ def findings(
     random: np.random.RandomState,
 ) -> IdentifiedDamage:
     """Fit the groups together and one by one, and test what is found."""
-    fit = comparison.fit()
+    fit, healthy = comparison.fit(), comparison.slopes()
+    confused = list(dict.fromkeys(confused_groups(healthy) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
     errors, covariance = standard_errors(fit, N_DRAWS, random)
-    p_values = [p_of_group(fit, column, shift.n_periods) for column in range(len(names))]
+    p_values = [p_of_group(fit, without, shift.n_periods) for without in _fits_without(comparison, fit)]
     table = pd.DataFrame(
         {
             "severity": fit.severities,
@@ -56,10 +57,10 @@ def findings(
         table=table,
         shifts=_shift_table(shift, fit, modes),
         single=_single_fits(comparison, names, shift),
-        similarity=pd.DataFrame(cosines(fit.slopes), names, names),
+        similarity=pd.DataFrame(cosines(healthy), names, names),
         covariance=pd.DataFrame(covariance, names, names),
         draws=pd.DataFrame(comparison.members(draws), columns=list(of_model)),
-        confused=[tuple(names[column] for column in group) for group in confused_groups(fit.slopes)],
+        confused=[tuple(names[column] for column in group) for group in confused],
         unseen=unseen,
         members=members,
         p_value=p_of_damage(fit, shift.n_periods, N_DRAWS, random),
@@ -81,7 +82,7 @@ def doubts(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
         )
     if found.unseen:
         names = ", ".join(found.unseen)
-        yield "unseen groups", f"{len(found.unseen)} groups cannot be seen by these modes and are left out: {names}"
+        yield "unseen groups", f"groups that these modes do not show, which are left out: {names}"
     highest = ", ".join(str(group) for group, severity in found.severities.items() if severity >= HIGHEST)
     if highest:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST:.0%}: {highest}"
@@ -108,6 +109,13 @@ def _shift_table(shift: Shift, fit: BoundedFit, modes: Sequence[Any]) -> pd.Data
         },
         index=list(modes),
     )
+
+
+def _fits_without(comparison: Comparison, fit: BoundedFit) -> Iterator[BoundedFit]:
+    """The best fit without each group: another one may replace it with quite another severity."""
+    for column, severity in enumerate(fit.severities):
+        others = [[other] for other in range(len(fit.severities)) if other != column]
+        yield comparison.of(others).fit() if severity > 0 else fit
 
 
 def _single_fits(comparison: Comparison, names: Sequence[str], shift: Shift) -> pd.DataFrame:

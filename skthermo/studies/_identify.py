@@ -10,7 +10,7 @@ from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
 from skthermo._validation import check_array, check_is_fitted
 from skthermo._warnings import warn_each
-from skthermo.studies._comparison import Comparison, Part
+from skthermo.studies._comparison import Comparison, Part, remembered
 from skthermo.studies._effects import FrequencyEffects
 from skthermo.studies._findings import doubts, findings
 from skthermo.studies._groups import read_groups
@@ -54,7 +54,7 @@ def identify_damage(
         Whether groups that cannot be told apart get one severity together.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
-        complex ones are turned to be real.
+        complex ones are turned to be real, and NaN stands for what was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
@@ -84,14 +84,14 @@ def identify_damage(
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. Its covariance comes from periods of the training records, each of the new records' length if
-    there are enough of them, judged by the other periods. Severities follow from non-negative least squares in
-    standard errors of the shifts, repeated with exact derivatives on the damaged model until they no longer change.
-    Their standard errors are those of the bounded estimate, from fits to redrawn shifts; where a severity is 0,
-    half of the highest severity that the shifts allow, within two standard errors and however the other groups
-    adapt. A group is significant if leaving it out worsens the fit by more than errors would (one-sided, Bonferroni
-    over the groups).
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
+    weather. Its covariance comes from periods of the training records, each of the new records' length if there are
+    enough of them, judged by the other periods, and counts how many training records have weather like that of the new
+    ones. Severities follow from non-negative least squares in standard errors of the shifts, repeated with exact
+    derivatives on the damaged model until they no longer change. Their standard errors are those of the bounded
+    estimate, from fits to redrawn shifts, and not below half of what a severity can grow by until the fit is worse by
+    two standard errors, however the other groups adapt. A group is significant if the best fit without it is worse by
+    more than errors would make it (one-sided, Bonferroni over the groups).
 
     Examples
     --------
@@ -108,15 +108,18 @@ def identify_damage(
     check_is_fitted(fem)
     if not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    if shapes is None and dofs is not None:
+        raise ValueError("dofs came without shapes; expected both or neither")
     frequencies, members = _read(fem, T, F), read_groups(fem.model, groups)
     labels = list(members)
     of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
     shift = measured_shift(fem, T, frequencies, noise)
     if not shift.n_records.any():
         raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
-    parts = [Part(FrequencyEffects.of(fem, T, frequencies, of_model), shift.mean, shift.covariance)]
+    effects = FrequencyEffects.of(fem, T, frequencies, of_model)
+    parts = [Part(remembered(effects), shift.mean, shift.covariance)]
     if shapes is not None:
-        parts.append(_of_shapes(fem, parts[0].effects.theta, of_model, shapes, dofs, shape_noise))
+        parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
     every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
     slopes = every.slopes()
     alone = errors_alone(slopes)
@@ -167,4 +170,4 @@ def _of_shapes(
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
     effects = ShapeEffects.of(fem, theta, groups, dofs)
     change, deviations = effects.measured(shapes, noise)
-    return Part(effects, change, np.diag(deviations**2))
+    return Part(remembered(effects), change, np.diag(deviations**2))

@@ -69,9 +69,11 @@ class ShapeEffects:
         return self.scaled(damaged.modes(self.theta)[1][0][self.dofs]).ravel()
 
     def scaled(self, shapes: Array) -> Array:
-        """Shapes turned and scaled to the reference by least squares, so that they are real."""
-        factors = (np.conj(shapes) * self.reference).sum(axis=0) / (np.abs(shapes) ** 2).sum(axis=0)
-        return np.real(factors * shapes)
+        """Shapes turned and scaled to the reference by least squares, so that they are real; NaN where they are."""
+        known = np.where(np.isnan(shapes), 0.0, shapes)
+        sizes = (np.abs(known) ** 2).sum(axis=0)
+        factors = (np.conj(known) * self.reference).sum(axis=0) / np.where(sizes > 0, sizes, 1.0)
+        return np.where(np.isnan(shapes), np.nan, np.real(factors * known))
 
     def measured(self, shapes: Any, noise: ArrayLike) -> tuple[Array, Array]:
         """Change of every component from a healthy to a damaged shape, and its standard deviation.
@@ -79,7 +81,7 @@ class ShapeEffects:
         Raises
         ------
         ValueError
-            If the shapes do not fit the sensors and modes.
+            If the shapes do not fit the sensors and modes, or the noise is 0.
         """
         if not isinstance(shapes, Sequence) or len(shapes) != 2:
             raise ValueError("shapes is no pair; expected measured shapes of the healthy and of the damaged structure")
@@ -92,7 +94,13 @@ class ShapeEffects:
                     f"the {which} shapes have shape {array.shape}; expected a row for each of {len(self.dofs)} sensors "
                     f"and a column for each of {self.reference.shape[1]} modes"
                 )
+            if (array == 0).all(axis=0).any():
+                mode = int((array == 0).all(axis=0).argmax())
+                raise ValueError(f"the {which} shape of mode {mode} is zero; expected NaN where it was not measured")
             pair.append(self.scaled(array))
+        relative = check_noise(noise, self.reference.shape[1])
+        if (relative == 0).any():
+            raise ValueError(f"shape_noise is {noise!r}; expected standard deviations above 0")
         largest = np.abs(self.reference).max(axis=0)
-        deviations = np.sqrt(2) * check_noise(noise, self.reference.shape[1]) * largest
+        deviations = np.sqrt(2) * relative * largest
         return (pair[1] - pair[0]).ravel(), np.tile(deviations, len(self.dofs))

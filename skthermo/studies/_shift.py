@@ -38,37 +38,59 @@ class Shift(NamedTuple):
 
 
 def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
-    """The shift, and its covariance by what healthy periods of the training records show, each judged by the others."""
-    expected = as_floats(fem.predict(T)) * (1 + as_floats(fem.expected_residuals(T)))
-    shifts = np.log(F / expected)
+    """The shift, and its covariance by what healthy periods of the training records show, each judged by the others.
+
+    Raises
+    ------
+    ValueError
+        If the noise is neither "fitted" nor relative standard deviations above 0.
+    """
+    residuals, number = fem.expected_residuals(T, return_number=True)
+    shifts = np.log(F / (as_floats(fem.predict(T)) * (1 + as_floats(residuals))))
     mean, n_records = _mean(shifts), (~np.isnan(shifts)).sum(axis=0)
+    scale = np.sqrt(1 / np.maximum(n_records, 1) + 1 / np.maximum(number, 1))
     trained = fem.residuals_.values
     if not isinstance(noise, str):
-        counts = 1 / np.maximum(n_records, 1) + 1 / np.maximum((~np.isnan(trained)).sum(axis=0), 1)
-        return Shift(mean, np.diag(check_noise(noise, len(mean)) ** 2 * counts), n_records, len(trained))
+        deviations = check_noise(noise, len(mean))
+        if (deviations == 0).any():
+            raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
+        return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained))
+    if noise != "fitted":
+        raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
     n_rows = max(int(n_records.max()), 1)
     n_periods = int(np.clip(len(trained) // n_rows, N_PERIODS, min(MOST_PERIODS, max(len(trained) // 2, 2))))
-    periods = [np.log1p(period) for period in fem.residuals_.by_period(n_periods)]
-    covariance = covariance_of_period(periods)
-    lengths = len(trained) / n_periods / np.maximum(n_records, 1)  # periods in the training records per new period
-    scale = np.sqrt(lengths + np.maximum(1 - lengths, 0.0) / n_periods)
+    periods = [(np.log1p(period), compared) for period, compared in fem.residuals_.by_period(n_periods)]
+    covariance = covariance_of_record(periods)
+    judged = ~np.isnan(np.diag(covariance))
+    covariance = np.where(np.outer(judged, judged), covariance, np.eye(len(mean)))
+    mean = np.where(judged, mean, np.nan)
     return Shift(mean, covariance * np.outer(scale, scale), n_records, n_periods + PSEUDO_PERIODS)
 
 
-def covariance_of_period(periods: list[Array]) -> Array:
-    """Covariance of a period's mean residual, (n_modes, n_modes).
+def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:
+    """Covariance, (n_modes, n_modes), of independent records whose means would scatter as those of the periods do.
 
-    A dozen means say little about correlations of several modes. They are drawn to the correlations of single records,
-    with the variance of the means: serial correlation makes it larger than that of independent records.
+    Serial correlation makes it larger than that of single records. It is NaN for modes without a record. A dozen means
+    say little about correlations of several modes. They are drawn to the correlations of single records, with the
+    variance that the means show.
+
+    Parameters
+    ----------
+    periods : list of (ndarray of shape (n_records, n_modes), ndarray of shape (n_modes,))
+        Residuals of each period less what others show in similar weather, and how many records that stands on.
     """
     n_periods = len(periods)
-    means = np.array([_mean(period) for period in periods])
-    rows = np.concatenate(periods)
-    single = _products(rows) * n_periods / len(rows)
-    of_means = _products(means)
-    inflation = max(1.0, float(np.nanmean(np.diag(of_means) / np.diag(single))))
+    means = []
+    for period, compared in periods:
+        counts = np.maximum((~np.isnan(period)).sum(axis=0), 1)
+        means.append(_mean(period) / np.sqrt(1 / counts + 1 / np.maximum(compared, 1)))
+    single, of_means = _products(np.concatenate([period for period, _ in periods])), _products(np.array(means))
+    known = np.flatnonzero(np.diag(single) > 0)
+    inflation = max(1.0, float((np.diag(of_means)[known] / np.diag(single)[known]).mean())) if known.size else 1.0
     shrunk = (n_periods * of_means + PSEUDO_PERIODS * inflation * single) / (n_periods + PSEUDO_PERIODS)
-    return _positive_definite(shrunk)
+    covariance, inside = np.full_like(shrunk, np.nan), np.ix_(known, known)
+    covariance[inside] = _positive_definite(shrunk[inside])
+    return covariance
 
 
 def _mean(values: Array) -> Array:

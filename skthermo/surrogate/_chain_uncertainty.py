@@ -95,25 +95,33 @@ class ChainUncertainty:
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
-    def expected_residuals(self, X: ArrayLike) -> Any:
+    def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
         """Mean relative residual of the training records in weather like that of each row.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
+        return_number : bool, default=False
+            Whether to return how many training records the mean over all rows stands on.
 
         Returns
         -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
+        expected : ndarray or DataFrame of shape (n_samples, n_modes)
             Measured frequency over the prediction, minus 1: what the chain leaves unexplained in such weather. NaN
             where an input of M2 is missing.
+        number : ndarray of shape (n_modes,)
+            Only with ``return_number``: how many independent records have a mean with the same variance as the mean of
+            ``expected`` over the rows. It is lower than the number of training records if the rows have little
+            variety of weather.
         """
         inputs, known = self._weather(X)
-        expected = np.full((len(inputs), len(self.mode_names_)), np.nan)
+        expected, number = np.full((len(inputs), len(self.mode_names_)), np.nan), np.zeros(len(self.mode_names_))
         if known.any():
             expected[known] = self.residuals_.expected(inputs[known])
-        return frame_like(X, expected, self.mode_names_)
+            number = self.residuals_.n_expected(inputs[known]) if return_number else number
+        frame = frame_like(X, expected, self.mode_names_)
+        return (frame, number) if return_number else frame
 
     @property
     def training_records_(self) -> tuple[Any, Any]:

@@ -1,5 +1,6 @@
 """Out-of-fold residuals of a chain, by weather: their spread, intervals, and realistic noise."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,9 @@ SPREAD_OF = 100
 
 COMPARED_WITH = 50
 """Least number of records with the most similar weather whose mean a residual is compared with."""
+
+OVERFITTED = 0.9
+"""Ratio of a mapper's own median residual to that out of fold, below which it has learned noise."""
 
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
@@ -63,14 +67,32 @@ class WeatherResiduals:
         """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes)."""
         return self._similar_mean(self.own, weather, np.ones(len(self.own), dtype=bool))
 
-    def by_period(self, n_periods: int) -> list[Array]:
-        """Residuals of each of some periods less those that the other periods have in similar weather."""
+    def n_expected(self, weather: Array) -> Array:
+        """Number of records whose mean errs as much as that of the expected residuals of all rows, (n_modes,)."""
+        return self._n_similar(weather, np.ones(len(self.own), dtype=bool))
+
+    def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
+        """Residuals of each of some periods less those that the other periods have in similar weather.
+
+        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One
+        mapper gives both, as for new records, so that its own error in such weather cancels; but where a mapper follows
+        its own records more closely than others, the residuals are those out of fold.
+        """
+        residuals = self.values if self._is_overfitted else self.own
         parts = []
         for period in np.array_split(np.arange(len(self.values)), n_periods):
             others = np.ones(len(self.values), dtype=bool)
             others[period] = False
-            parts.append(self.values[period] - self._similar_mean(self.values, self.weather[period], others))
+            weather = self.weather[period]
+            similar = self._similar_mean(residuals, weather, others)
+            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
         return parts
+
+    @property
+    def _is_overfitted(self) -> bool:
+        """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
+        own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
+        return bool((own < OVERFITTED * out_of_fold).any())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
@@ -108,14 +130,23 @@ class WeatherResiduals:
 
     def _similar_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """Mean of some records' values in weather most like that of each row, mode by mode."""
-        wanted, means = self.coordinates.transform(weather), np.full((len(weather), values.shape[1]), np.nan)
-        number = max(COMPARED_WITH, int(SIMILAR * len(values)))
-        for mode, column in enumerate(values.T):
-            known = np.flatnonzero(rows & ~np.isnan(column))
-            if known.size:
-                near = known[nearest(self.places[known], wanted, number)[1]]
-                means[:, mode] = column[near].mean(axis=1)
+        means = np.full((len(weather), values.shape[1]), np.nan)
+        for mode, near in enumerate(self._similar(values, weather, rows)):
+            if near.size:
+                means[:, mode] = values[near, mode].mean(axis=1)
         return means
+
+    def _n_similar(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """The reciprocal of the sum of squared weights that records have in the mean over all rows; 0 without any."""
+        shares = [np.bincount(near.ravel()) / max(near.size, 1) for near in self._similar(self.values, weather, rows)]
+        return np.array([1 / (share**2).sum() if share.size else 0.0 for share in shares])
+
+    def _similar(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
+        """For each mode, positions of the records with weather most like that of each row, (n_samples, n_similar)."""
+        wanted, number = self.coordinates.transform(weather), max(COMPARED_WITH, int(SIMILAR * len(values)))
+        for column in values.T:
+            known = np.flatnonzero(rows & ~np.isnan(column))
+            yield known[nearest(self.places[known], wanted, number)[1]] if known.size else known
 
     def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """The spread that some of the records give, the wider the farther weather is beyond their range."""

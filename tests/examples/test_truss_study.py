@@ -1,4 +1,4 @@
-"""The truss study with two seeds, to the targets of the benchmark with many."""
+"""The truss study with two seeds: the example's tables, and the benchmark's targets."""
 
 import importlib.util
 from pathlib import Path
@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.benchmarks.truss import NAMES, SingleRecords, best_theta, detectable, run, summary
+
 pytest.importorskip("matplotlib").use("Agg")
 
 ROOT = Path(__file__).parents[2]
+GROUPS = ["bottom", "top", "diagonal"]
 
 
 def load(path):
@@ -18,17 +21,75 @@ def load(path):
     return module
 
 
-BENCHMARK = load(ROOT / "tests" / "benchmarks" / "truss_tables.py")
-STUDY = BENCHMARK.load_study()
+EXAMPLE = load(ROOT / "examples" / "plot_truss_study.py")
+
+
+@pytest.fixture(scope="module")
+def realisations():
+    return [EXAMPLE.Realisation(seed) for seed in range(2)]
+
+
+@pytest.fixture(scope="module")
+def studies(realisations):
+    return [one.study(n_repeats=5) for one in realisations]
 
 
 @pytest.fixture(scope="module")
 def tables():
-    return STUDY.run(range(2))
+    return run(range(2), n_draws=1)
 
 
-def test_tables_2_and_3(tables):
-    table_2, table_3, pfa, distance = BENCHMARK.summary(STUDY, *tables).values()
+def test_simulated_years_err_little_more_than_noise(realisations):
+    table = EXAMPLE.table_2(realisations)
+    assert list(table.index) == [scenario.name for scenario in EXAMPLE.HALVED] + ["Average"]
+    assert 1.1 < table.loc["Average", ("here", "Average")] <= 1.25
+    assert table.loc["Average", ("paper", "Average")] == pytest.approx(1.325, abs=0.01)
+    noise = np.sqrt(2 / np.pi) * np.hypot(1, 1)  # of two records of one signal
+    assert (table["here"] > 0.9 * noise).all(axis=None)
+
+
+def test_table_3_is_the_studies_mean_beside_the_papers(studies):
+    table = EXAMPLE.table_3(studies)
+    assert list(table.index) == NAMES + ["Average"]
+    for source in EXAMPLE.SOURCES:
+        rates = [study.results_.set_index(["source", "scenario"])["rate"].loc[source] for study in studies]
+        np.testing.assert_allclose(table[source, "here"].loc[NAMES], 100 * sum(rates).loc[NAMES] / 2, atol=0.006)
+        assert (table[source, "lowest"] <= table[source, "here"] + 0.01)[:-1].all()
+        assert (table[source, "here"] <= table[source, "highest"] + 0.01)[:-1].all()
+    published = np.subtract(*EXAMPLE.PAPER_RATES.values())
+    assert table.loc["Average", ("difference", "paper")] == pytest.approx(np.abs(published).mean(), abs=0.006)
+    assert table.loc["Average", ("difference", "here")] < 1.8
+
+
+def test_minimum_detectable_damage_is_the_papers(studies):
+    table = EXAMPLE.smallest(studies)
+    assert list(table.index.unique(0)) == GROUPS
+    for level in ("POD 90%", "POD 95%"):
+        found = table[level, "here"].unstack("source")
+        assert (np.abs(found["data-informed"] - found["reference"]) <= 5).all()  # half a step of the severities
+        assert (table[level, "lowest"] <= table[level, "here"]).all()
+        assert (table[level, "here"] <= table[level, "highest"]).all()
+    assert table["POD 90%", "here"].unstack("source").loc[GROUPS, "reference"].tolist() == [20, 30, 20]
+    assert (table["", "paper"] <= table["POD 95%", "highest"]).all()
+
+
+def test_all_figures_show_the_study(realisations, studies):
+    figures = EXAMPLE.figures(realisations[0], studies[0])
+    n_panels = {name: len(figure.axes) for name, figure in figures.items()}
+    assert n_panels == {
+        "fig04_baseline": 12,
+        "fig06_parameters": 4,
+        "fig08_verification": 6,
+        "fig09_damage_index": 4,
+        "fig10_bottom_family": 6,
+        "pod_curves": 3,
+    }
+    for figure in figures.values():
+        EXAMPLE.plt.close(figure)
+
+
+def test_single_records_meet_the_targets_of_the_benchmark(tables):
+    table_2, table_3, pfa, distance = summary(*tables[:2]).values()
     assert table_2 <= 1.25
     assert table_3 <= 1.8
     assert pfa <= 5
@@ -37,8 +98,8 @@ def test_tables_2_and_3(tables):
 
 def test_oracle_bounds_what_is_learned(tables):
     """No parameters fit the truth better in each row; noise hides most of the difference."""
-    study = STUDY.Study(0)
-    truth, *fitted = (model.frequencies(theta) for model, theta in study.sources(study.unseen).values())
+    one = SingleRecords(0)
+    truth, *fitted = (model.frequencies(theta) for model, theta in one.sources(one.unseen).values())
     informed, oracle = (np.sqrt(np.mean((frequencies / truth - 1) ** 2)) for frequencies in fitted)
     assert 0.003 < oracle < informed < 1.3 * oracle
     mean = tables[0].groupby("source").mean().mean(axis=1)
@@ -46,14 +107,14 @@ def test_oracle_bounds_what_is_learned(tables):
 
 
 def test_minimum_detectable_damage_is_the_same_for_simulated_weather(tables):
-    assert STUDY.detectable(tables[1], "informed") == STUDY.detectable(tables[1], "thermo")
-    assert STUDY.detectable(tables[1], "thermo") == {"SB": 20, "ST": 30, "SD": 20}
+    assert detectable(tables[1], "informed") == detectable(tables[1], "thermo")
+    assert detectable(tables[1], "thermo") == {"bottom": 20, "top": 30, "diagonal": 20}
 
 
 def test_oracle_recovers_parameters_that_exist():
-    model = STUDY.make_truss()
+    model = EXAMPLE.make_truss()
     theta = np.array([[0.9, 1.1, 1.05, 1.0], [1.2, 0.9, 0.95, 1.0]])
-    fitted = STUDY.best_theta(model, model.frequencies(theta), steps=60)
+    fitted = best_theta(model, model.frequencies(theta), steps=60)
     np.testing.assert_allclose(fitted[:, :3], theta[:, :3], rtol=0.01)
 
 

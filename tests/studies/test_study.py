@@ -350,3 +350,11 @@ def test_a_clone_shares_the_fitted_chain(fem):
     assert twin.fem is fem
     assert twin.detector is not study.detector
     assert twin.get_params(deep=False)["n_repeats"] == 3
+
+
+def test_a_family_of_one_severity_has_no_curve_but_a_bracket(fem):
+    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.4,), ["bottom"]), n_repeats=2, random_state=0)
+    study.run(WEATHER)
+    mdd, lowest, highest = study.minimum_detectable_damage(method="curve").iloc[0]
+    assert np.isnan(mdd)
+    assert (lowest, highest) == (0.0, 0.4)

@@ -1,0 +1,209 @@
+"""Identified damage: what was put in is found again."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.preprocessing import BiasAligner
+from skthermo.studies import DetectabilityStudy, identify_damage
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures[::5]
+GROUPS = ["bottom", "top", "diagonal"]
+TINY = 1e-4
+
+
+class WithoutDerivatives:
+    """A model that gives frequencies and can be damaged, and no more."""
+
+    def __init__(self, model):
+        self.model = model
+        self.parameter_names, self.n_modes, self.groups = model.parameter_names, model.n_modes, model.groups
+
+    def frequencies(self, theta):
+        return self.model.frequencies(theta)
+
+    def damaged(self, damage):
+        return WithoutDerivatives(self.model.damaged(damage))
+
+    def __sklearn_clone__(self):
+        return self
+
+
+def fitted(aligner="passthrough", factor=1.0, **options):
+    model = make_truss()
+    options = {"model": model, "inverse": InverseSurrogate(model), "random_state": 0, **options}
+    return DataInformedFEM(aligner=aligner, **options).fit(YEAR.temperatures, YEAR.frequencies * factor)
+
+
+@pytest.fixture(scope="module")
+def fem():
+    return fitted()
+
+
+def simulated(fem, damage=None, T=WEATHER):
+    """Records without noise, with what the fit leaves in such weather."""
+    return fem.simulate(T, damage=damage) * (1 + fem.expected_residuals(T))
+
+
+def severities(found):
+    return found.severities.to_dict()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [{"top": 0.05}, {"diagonal": 0.5}, {"bottom": 0.8}, {"bottom": 0.3, "diagonal": 0.2}, dict.fromkeys(GROUPS, 0.1)],
+)
+def test_damage_without_noise_is_found_exactly(fem, damage):
+    found = identify_damage(fem, WEATHER, simulated(fem, damage), GROUPS, noise=TINY, random_state=0)
+    assert severities(found) == pytest.approx({**dict.fromkeys(GROUPS, 0.0), **damage}, abs=2e-5)
+    assert found.table["significant"].to_dict() == {group: group in damage for group in GROUPS}
+    assert {group: found.damage[group] for group in damage} == pytest.approx(damage, abs=2e-5)
+    assert found.converged
+    assert found.misfit < 0.01
+    assert found.p_value < 0.01
+    np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=1e-6)
+
+
+def test_a_healthy_structure_has_no_damage(fem):
+    found = identify_damage(fem, WEATHER, simulated(fem), GROUPS, noise=TINY, random_state=0)
+    assert severities(found) == pytest.approx(dict.fromkeys(GROUPS, 0.0), abs=1e-6)
+    assert not found.table["significant"].any()
+    assert found.p_value > 0.5
+    assert found.summary().startswith("No damage is evident")
+
+
+@pytest.mark.parametrize("method", ["shift", "scale"])
+def test_damage_behind_an_aligner(method):
+    fem = fitted(BiasAligner(make_truss(), method=method), factor=1.1)
+    found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2}), GROUPS, noise=TINY, random_state=0)
+    assert severities(found) == pytest.approx({"bottom": 0.0, "top": 0.2, "diagonal": 0.0}, abs=2e-5)
+
+
+def test_a_reduced_model_finds_the_same(fem):
+    reduced = fitted(reduce=True)
+    F = simulated(fem, {"top": 0.2, "bottom": 0.4})
+    found, expected = (
+        identify_damage(each, WEATHER, F, GROUPS, noise=0.001, random_state=0) for each in (reduced, fem)
+    )
+    pd.testing.assert_frame_equal(found.table, expected.table, rtol=1e-3, atol=1e-4)
+
+
+def test_differences_replace_exact_derivatives(fem):
+    plain = fitted(model=WithoutDerivatives(make_truss()))
+    F = simulated(fem, {"top": 0.2, "diagonal": 0.4})
+    found, expected = (identify_damage(each, WEATHER, F, GROUPS, noise=0.001, random_state=0) for each in (plain, fem))
+    pd.testing.assert_frame_equal(found.table, expected.table, rtol=0.05, atol=1e-5)
+    pd.testing.assert_series_equal(found.severities, expected.severities, rtol=1e-3, atol=1e-6)
+
+
+def test_frames_and_arrays_alike_and_rows_in_any_order(fem):
+    F = fem.simulate(WEATHER, damage={"top": 0.2}, noise="fitted", random_state=0)
+    F.iloc[::3, 1], F.iloc[5] = np.nan, np.nan
+    expected = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
+    other = DataInformedFEM(make_truss(), inverse=InverseSurrogate(make_truss()), random_state=0)
+    other.fit(YEAR.temperatures.to_numpy(), YEAR.frequencies.to_numpy())
+    arrays = identify_damage(other, WEATHER.to_numpy(), F.to_numpy(), GROUPS, random_state=0)
+    order = np.random.RandomState(0).permutation(len(F))
+    shuffled = identify_damage(fem, WEATHER.iloc[order], F.iloc[order], GROUPS, random_state=0)
+    for found in (arrays, shuffled):
+        np.testing.assert_allclose(found.table.astype(float), expected.table.astype(float), rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.shifts, expected.shifts, rtol=1e-8)
+
+
+def test_same_seed_same_bits(fem):
+    F = simulated(fem, {"top": 0.2})
+    one, same, other = (identify_damage(fem, WEATHER, F, GROUPS, random_state=seed) for seed in (0, 0, 1))
+    pd.testing.assert_frame_equal(one.draws, same.draws)
+    assert one.p_value == same.p_value
+    assert not one.draws.equals(other.draws)
+    pd.testing.assert_series_equal(one.severities, other.severities)
+
+
+def test_records_with_gaps_and_modes_that_were_not_measured(fem):
+    F = simulated(fem, {"top": 0.2})
+    F.iloc[:, 2], F.iloc[::2, 0], F.iloc[10:20] = np.nan, np.nan, np.nan
+    T = WEATHER.copy()
+    T.iloc[3] = np.nan
+    found = identify_damage(fem, T, F, GROUPS, noise=TINY, random_state=0)
+    assert severities(found) == pytest.approx({"bottom": 0.0, "top": 0.2, "diagonal": 0.0}, abs=2e-5)
+    counts = (F.notna() & T.notna().all(axis=1).to_numpy()[:, np.newaxis]).sum()
+    assert found.shifts["n_records"].tolist() == counts.tolist()
+    assert found.shifts.isna().any(axis=1).tolist() == [name == F.columns[2] for name in F]
+
+
+def test_one_record_is_enough(fem):
+    record = simulated(fem, {"diagonal": 0.4})[:1]
+    found = identify_damage(fem, WEATHER[:1], record, GROUPS, noise=TINY, random_state=0)
+    assert severities(found)["diagonal"] == pytest.approx(0.4, abs=2e-5)
+    wide = identify_damage(fem, WEATHER[:1], record, GROUPS, random_state=0)
+    many = identify_damage(fem, WEATHER, simulated(fem, {"diagonal": 0.4}), GROUPS, random_state=0)
+    assert (wide.standard_errors["diagonal"] > 3 * many.standard_errors["diagonal"]).all()
+
+
+def test_joined_groups_have_one_severity(fem):
+    F = simulated(fem, {"bottom": 0.2, "top": 0.2})
+    found = identify_damage(fem, WEATHER, F, {"chords": ["bottom", "top"], "web": "diagonal"}, noise=TINY)
+    assert severities(found) == pytest.approx({"chords": 0.2, "web": 0.0}, abs=2e-5)
+    assert found.members == {"chords": ["bottom", "top"], "web": ["diagonal"]}
+    assert {name: found.damage[name] for name in ("bottom", "top")} == pytest.approx(
+        {"bottom": 0.2, "top": 0.2}, abs=2e-5
+    )
+
+
+def test_overlapping_groups_multiply(fem):
+    F = simulated(fem, {"bottom": 1 - 0.8 * 0.9, "top": 0.2, "diagonal": 0.1})
+    groups = {"chords": ["bottom", "top"], "lower": ["bottom", "diagonal"]}
+    found = identify_damage(fem, WEATHER, F, groups, noise=TINY)
+    assert severities(found) == pytest.approx({"chords": 0.2, "lower": 0.1}, abs=2e-5)
+    assert found.damage == pytest.approx({"bottom": 0.28, "top": 0.2, "diagonal": 0.1}, abs=4e-5)
+    assert (found.draws["bottom"] >= found.draws[["top", "diagonal"]].max(axis=1) - 1e-12).all()
+
+
+@pytest.mark.filterwarnings("ignore:damage of these groups does not explain")
+def test_standard_errors_are_those_of_repeats(fem):
+    """Independent records with the noise stated: nine in ten estimates, and more, within two standard errors."""
+    clean, truth, noise = simulated(fem, {"top": 0.1}), np.array([0.0, 0.1, 0.0]), 0.01
+    random = np.random.RandomState(0)
+    number = fem.expected_residuals(WEATHER, return_number=True)[1][0]
+    scatter = noise * np.sqrt(1 + len(clean) / number)  # of training and new records
+    found = []
+    for _ in range(30):
+        F = clean * (1 + scatter * random.standard_normal(clean.shape))
+        found.append(identify_damage(fem, WEATHER, F, GROUPS, noise=noise, random_state=0))
+    estimates = np.array([each.severities for each in found])
+    errors = np.array([each.standard_errors for each in found])
+    held = (np.abs(estimates - truth) <= 2 * errors).mean(axis=0)
+    assert (held > 0.85).all()
+    assert np.median(errors[:, 1]) == pytest.approx(estimates[:, 1].std(), rel=0.25)
+    assert np.mean([each.misfit_p_value < 0.1 for each in found]) == pytest.approx(0.1, abs=0.1)
+
+
+def test_known_standard_error_of_a_single_group(fem):
+    """With one group, the standard error is that of weighted least squares."""
+    F, noise = simulated(fem, {"top": 0.2}), 0.01
+    found = identify_damage(fem, WEATHER, F, "top", noise=noise, random_state=0)
+    step = 1e-4
+    higher, lower = (np.log(fem.simulate(WEATHER, damage={"top": 0.2 + h})) for h in (step, -step))
+    slope = ((higher - lower) / (2 * step)).mean().to_numpy()
+    number = fem.expected_residuals(WEATHER, return_number=True)[1][0]
+    deviation = noise * np.sqrt(1 / len(F) + 1 / number)
+    expected = deviation / np.linalg.norm(slope)
+    assert found.table.loc["top", "error_alone"] == pytest.approx(expected, rel=1e-4)
+    assert found.table.loc["top", "standard_error"] == pytest.approx(expected, rel=0.1)
+    assert found.single.loc["top", "severity"] == pytest.approx(0.2, abs=1e-4)
+
+
+def test_draws_make_a_scenario(fem):
+    found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2, "bottom": 0.2}), GROUPS, random_state=0)
+    scenario = found.scenario("as found")
+    assert scenario.draws["top"].mean() == pytest.approx(found.severities["top"], abs=0.003)
+    assert scenario.draws["top"].std() == pytest.approx(found.standard_errors["top"], rel=0.2)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=3, random_state=0)
+    results = study.run(WEATHER)
+    assert results["scenario"].tolist() == ["as found"]
+    assert results["rate"].between(0.5, 1).all()
+    assert repr(found).startswith("IdentifiedDamage(bottom=0.2 ± ")
