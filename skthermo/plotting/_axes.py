@@ -135,7 +135,10 @@ def on_axis(place: Any, index: pd.Index) -> Any:
         if not 0 <= place < len(index):
             raise ValueError(f"there is no record number {place!r}; expected a time, or 0 to {len(index) - 1}")
         place = index[int(place)]
-    time = pd.Timestamp(place)
+    try:
+        time = pd.Timestamp(place)
+    except (TypeError, ValueError):
+        raise ValueError(f"{place!r} is no time; expected one, such as '2025-03-01', or a record's number") from None
     if time.tz is not None and index.tz is not None:
         time = time.tz_convert(index.tz)
     return time.tz_localize(None).to_datetime64()

@@ -156,6 +156,9 @@ class PODCurveDisplay:
             style = {"facecolor": colour, "alpha": 0.15, "hatch": "//"}
             label = f"$a_{{90}}$ between {low:.1f} and {high:.1f} %"
             drawn["bracket"] = self.ax_.axvspan(low, high, **style, label=label)
+        elif not drawn and np.isnan(self.curve.a90) and np.isfinite(ends[0]):
+            above = 100 * ends[0] * np.sign(np.asarray(self.curve.severities)[-1])
+            drawn["bracket"] = self.ax_.plot([], [], " ", label=f"$a_{{90}}$ beyond {above:.1f} %")[0]
         if drawn and not any(line.get_gid() == "90" for line in self.ax_.lines):
             self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":", gid="90")
         return drawn

@@ -107,11 +107,16 @@ class PredictionDisplay:
         Raises
         ------
         ValueError
-            If temperatures and frequencies have different rows.
+            If temperatures and frequencies have different rows, or intervals are asked of an estimator without any.
         """
         check_same_rows(X, y, ("temperatures", "frequencies"))
+        if confidence is not None and not hasattr(estimator, "predict_interval"):
+            raise ValueError(
+                f"confidence is {confidence!r}, and {estimator!r:.200} has no method 'predict_interval'; expected an "
+                "estimator with one, such as DataInformedFEM, or confidence=None"
+            )
         predicted = estimator.predict(X)
-        if confidence is None or not hasattr(estimator, "predict_interval") or options.get("kind") == "scatter":
+        if confidence is None or options.get("kind") == "scatter":
             return cls.from_predictions(y, predicted, **options)
         lowest, highest = estimator.predict_interval(X, confidence)
         label = f"interval, {100 * confidence:g} %"

@@ -62,7 +62,7 @@ def report(
     NotFittedError
         If the study has no results.
     ValueError
-        If the folder does not exist, or the path is a folder.
+        If the folder does not exist, the path is a folder, or ``study`` or ``identified`` is something else.
     ImportError
         If matplotlib is not installed.
 
@@ -86,6 +86,10 @@ def report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
+    if not hasattr(study, "scenarios"):
+        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
+    if identified is not None and not all(hasattr(identified, name) for name in ("table", "shifts", "similarity")):
+        raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
     file = Path(path)

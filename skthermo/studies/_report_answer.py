@@ -46,11 +46,22 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
             bullets(_sentence(found) for found in findings),
             table("Smallest damage found reliably: among the tested severities, and from a curve.", columns, cells),
         ]
-    else:
+    unclear = _unclear_families(rows, findings)
+    if unclear:
+        text = "of damage and strengthening together, or of one severity twice, no smallest damage can be given"
+        parts.append(paragraphs(f"{', '.join(unclear)}: {text}."))
+    elif not findings:
         text = "No damage group was tested on its own, so that there is no smallest damage to report."
         parts.append(paragraphs(text))
     parts += [element("h3", "What would not be found"), _missed(rows), element("h3", "What the words mean"), meaning]
     return section("answer", "The answer", *parts)
+
+
+def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[str]:
+    """Families with several scenarios that do not say which severity is the smallest that is found."""
+    tested_ones = rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
+    found = {finding.family for finding in findings}
+    return [name for family in tested_ones["family"].unique() if (name := str(family)) not in found]
 
 
 def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:

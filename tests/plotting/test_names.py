@@ -72,3 +72,9 @@ def test_the_onset_may_be_in_another_time_zone():
     display = DamageIndexDisplay.from_predictions(pd.Series(1.0, index), 2.0, onset=onset)
     line = next(line for line in display.ax_.lines if line.get_label() == "onset of damage")
     assert pd.Timestamp(line.get_xdata()[0]) == pd.Timestamp("2024-07-02")  # local time, as the records
+
+
+def test_an_onset_that_is_no_time_is_named():
+    index = pd.Series(1.0, pd.date_range("2024-07-01", periods=4))
+    with pytest.raises(ValueError, match="'soon' is no time; expected one"):
+        DamageIndexDisplay.from_predictions(index, 2.0, onset="soon")

@@ -5,6 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.linear_model import LinearRegression
 
 from skthermo.plotting import FitReportDisplay, FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
 
@@ -146,6 +147,8 @@ def test_predictions_with_intervals_in_time(fem, later):
     texts = [text.get_text() for text in display.figure_.legends[0].get_texts()]
     assert texts == ["measured", "predicted", "interval, 80 %"]
     assert PredictionDisplay.from_estimator(fem, T, F, confidence=None).bands_ == []
+    with pytest.raises(ValueError, match=r"LinearRegression\(\) has no method 'predict_interval'; expected"):
+        PredictionDisplay.from_estimator(LinearRegression().fit(T, F), T, F, confidence=0.8)
 
 
 def test_bands_break_where_an_end_is_unknown():

@@ -137,6 +137,9 @@ def test_curves_of_strengthenings_and_of_records_without_a_slope():
     display = PODCurveDisplay.from_predictions(steep)
     assert list(display.marks_) == ["bracket"]
     assert display.marks_["bracket"].get_label() == "$a_{90}$ between 10.0 and 20.0 %"
+    with pytest.warns(UserWarning, match="a90 lies above 0.2"):
+        missed = pod_curve([0.1, 0.2], [0, 0], [100] * 2)
+    assert PODCurveDisplay.from_predictions(missed).marks_["bracket"].get_label() == "$a_{90}$ beyond 20.0 %"
 
 
 def test_sensitivities_as_a_map_with_numbers():

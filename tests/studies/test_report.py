@@ -221,3 +221,17 @@ def luminance(colour):
     channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     return linear @ [0.2126, 0.7152, 0.0722]
+
+
+def test_families_of_damage_and_strengthening_are_named(chain, tmp_path):
+    study = run_study(*chain[:2], sweep(chain[0], (-0.1, 0.2), [HOSTILE]))
+    text = Page(report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
+    assert f"{HOSTILE}: of damage and strengthening together" in text
+    assert "No damage group was tested" not in text
+
+
+def test_what_is_no_study_and_no_identified_damage_is_named(study, chain, tmp_path):
+    with pytest.raises(ValueError, match="study is DataInformedFEM"):
+        report(chain[0], tmp_path / "a.html")
+    with pytest.raises(ValueError, match=r"identified is \{'top': 0.1\}; expected what identify_damage gives"):
+        report(study, tmp_path / "a.html", identified={"top": 0.1})
