@@ -115,6 +115,11 @@ def add_surfaces(ax: Axes, surfaces: list[Array], **style: Any) -> Any:
     return add_collection(ax, "PolyCollection", surfaces, edgecolors="none", **style)
 
 
+def add_points(ax: Axes, points: list[Array], **style: Any) -> Any:
+    """Add a diamond for every spring to the ground and every point mass, in two or three dimensions."""
+    return ax.scatter(*np.vstack(points).T, s=36, marker="D", edgecolors=BLACK, linewidths=0.5, clip_on=False, **style)
+
+
 def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> Any:
     """Add a collection of the kind that the axes' dimension needs."""
     is_space = hasattr(ax, "get_zlim")

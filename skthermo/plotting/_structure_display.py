@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike
 from skthermo._arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes
-from skthermo.plotting._members import add_lines, add_surfaces, corners, draw_supports, set_view, sort_members
+from skthermo.plotting._members import (
+    add_lines,
+    add_points,
+    add_surfaces,
+    corners,
+    draw_supports,
+    set_view,
+    sort_members,
+)
 from skthermo.plotting._members import structure_axes as new_axes
 from skthermo.plotting._style import COLOURS, GREY, LIGHT, pyplot
 
@@ -19,6 +27,8 @@ WIDTH, THIN = 2.5, 0.8
 
 class StructureDisplay:
     """Members of a structure in two or three dimensions, coloured by value or by group, and its supports.
+
+    Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
     It is best made by `from_structure`.
 
@@ -38,7 +48,7 @@ class StructureDisplay:
     ax_, figure_ : matplotlib's Axes and Figure
         Where it is drawn.
     members_ : dict
-        Collections of lines and surfaces, by ``"lines"`` and ``"surfaces"`` or by group.
+        Collections of lines, surfaces and points, by ``"lines"``, ``"surfaces"`` and ``"points"`` or by group.
     colorbar_ : Colorbar or None
         None without values.
 
@@ -162,7 +172,9 @@ class StructureDisplay:
         low, high = limits or ((known.min(), known.max()) if known.size else (0.0, 1.0))
         colours = pyplot().get_cmap(cmap).with_extremes(bad=LIGHT)
         of_member = dict(zip(self.structure.members, values, strict=True))
-        _, lines, surfaces = sort_members(self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m])))
+        points, lines, surfaces = sort_members(
+            self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m]))
+        )
         surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
         for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):
             if names:
@@ -174,10 +186,15 @@ class StructureDisplay:
                 )
                 self.members_[kind].set_array(shown)
                 self.members_[kind].set_clim(low, high)
+        points = [name for name in points if np.isfinite(of_member[name])]
+        if points:
+            style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high}
+            places = corners(self.structure, points, self.structure.nodes)
+            self.members_["points"] = add_points(self.ax_, places, zorder=4, **style)
 
     def _draw_colorbar(self, is_own_figure: bool) -> Any:
         """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
-        shown = self.members_.get("lines", self.members_.get("surfaces"))
+        shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
         if is_own_figure and self.structure.dimension == 3:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
@@ -192,7 +209,10 @@ class StructureDisplay:
         parts: dict[str, tuple[Iterable[Hashable], str]] = {"other members": (rest, GREY if not coloured else LIGHT)}
         parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
         for name, (members, colour) in parts.items():
-            _, lines, surfaces = sort_members(self.structure, members)
+            points, lines, surfaces = sort_members(self.structure, members)
+            if points and name in coloured:
+                style = {"c": colour, "label": name, "zorder": 4}
+                self.members_[name] = add_points(self.ax_, corners(self.structure, points, nodes), **style)
             if surfaces:
                 style = {"facecolors": colour, "alpha": 0.35, "label": name}
                 self.members_[name] = add_surfaces(self.ax_, corners(self.structure, surfaces, nodes), **style)

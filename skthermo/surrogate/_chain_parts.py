@@ -17,6 +17,7 @@ from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._mapper_inputs import last_step
+from skthermo.surrogate._standardiser import damped_inverse
 
 ROWS_PER_DEGREE = 10
 """Training records for each record whose mean a prediction is as sure as: mappers have tens of degrees of freedom."""
@@ -101,12 +102,13 @@ def refining_step(inverse: Any) -> InverseSurrogate | None:
 
 
 def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: int) -> Array | None:
-    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies; these coordinates.
+    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies.
 
-    They are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, (n_modes,
-    n_parameters). A prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does
-    the damping. None if there is no such mapper, if it is fitted to one parameter at a time, if its
-    coordinates are given, or if the nominal state has no solution.
+    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies. A
+    prediction is about as sure as the mean of a tenth of the records; the prior of the parameters does the damping.
+    Returns the inverse of the coordinates, (n_parameters, n_modes), damped as for the mean of all records; None if
+    there is no such mapper, if it is fitted to one parameter at a time, if its coordinates are given, or if the nominal
+    state has no solution.
     """
     if isinstance(last_step(mapper), MultiOutputRegressor):
         return None
@@ -121,7 +123,7 @@ def learn_frequencies(mapper: BaseEstimator, inverse: InverseSurrogate, n_rows: 
     damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_DEGREE / n_rows
     for part in mappers:
         part.set_params(sensitivities=sensitivities, damping=damping)
-    return sensitivities
+    return damped_inverse(sensitivities, damping / ROWS_PER_DEGREE)
 
 
 def box_of(inverse: BaseEstimator) -> Box | None:

@@ -113,14 +113,15 @@ class ChainSteps:
         """Fit M2; the parameters that it has learned.
 
         In coordinates of frequencies it learns what the prior of the inverse keeps from the parameters, too: one more
-        Gauss-Newton step, without the prior, with the derivatives that define these coordinates. Parameters that hardly
+        Gauss-Newton step, hardly damped, with the derivatives that define these coordinates. Parameters that hardly
         move the frequencies may then scatter widely, but not their effects, which are all that the mapper sees.
+        Combinations of parameters that do not move them at all stay where they are.
         """
         last = refining_step(self.inverse_)
         if self.coordinates == "frequencies" and last is not None:
-            sensitivities = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
-            if sensitivities is not None:
+            inverse = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
+            if inverse is not None:
                 weighted = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0) / last.scatter_
-                theta = theta * np.exp(np.clip(weighted @ np.linalg.pinv(sensitivities).T, -FARTHEST, FARTHEST))
+                theta = theta * np.exp(np.clip(weighted @ inverse.T, -FARTHEST, FARTHEST))
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta

@@ -19,6 +19,10 @@ from skthermo.updating import cramer_rao
 TINY = 1e-12
 
 ROWS_PER_PARAMETER = 10
+
+WORSE_THAN_MEAN = 1.2
+"""Ratio of the chain's error to that of the training mean from which a warning is given."""
+
 LARGE_OFFSET = 15.0
 """Difference in percent between a measured mode and the model's above which a warning is given."""
 
@@ -124,6 +128,15 @@ class FitReport:
                 "few rows",
                 f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
                 f"{ROWS_PER_PARAMETER} rows for each",
+            )
+        chain, mean = self.errors.mean()
+        if chain > WORSE_THAN_MEAN * mean:
+            worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
+            yield (
+                "worse than the mean",
+                f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
+                f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these "
+                "modes: see report_.offsets, update the model, or use aligner=BiasAligner(model)",
             )
 
 

@@ -74,10 +74,13 @@ class Standardiser:
 
     @property
     def _inverse(self) -> Array:
-        """(A'A + damping)^-1 A', the pseudo-inverse without damping."""
-        A = self.coordinates
-        damping = np.broadcast_to(self.damping, (A.shape[1],))
-        return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
+        return damped_inverse(self.coordinates, self.damping)
+
+
+def damped_inverse(A: Array, damping: Array | float) -> Array:
+    """(A'A + damping)^-1 A', the pseudo-inverse without damping."""
+    damping = np.broadcast_to(damping, (A.shape[1],))
+    return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
 
 
 def is_positive(values: Array) -> bool:

@@ -74,12 +74,24 @@ def test_groups_get_a_colour_and_a_line_of_the_legend_each():
     assert len({tuple(display.members_[name].get_color()[0]) for name in display.members_}) == 3
 
 
-def test_springs_and_masses_draw_no_line():
+def test_springs_and_masses_draw_points_and_no_line():
     bar = Bar("a", "b", **STEEL)
     members = {"bar": bar, "spring": Spring("b", "x", 1e6), "mass": PointMass("b", 10.0)}
     structure = Structure({"a": (0, 0), "b": (1, 0)}, members, {"a": "xy", "b": "y"})
     display = StructureDisplay.from_structure(structure, [1.0, 2.0, 3.0])
     assert len(display.members_["lines"].get_segments()) == 1
+    assert display.members_["points"].get_array().tolist() == [2.0, 3.0]
+
+
+def test_springs_of_a_group_are_points_in_its_colour_and_in_the_legend():
+    nodes = {"a": (0, 0, 0), "b": (1, 0, 0)}
+    members = {"bar": Bar("a", "b", **STEEL), "spring": Spring("b", "x", 1e6), "other": Spring("b", "z", 1e6)}
+    structure = Structure(nodes, members, {"a": "xyz", "b": "y"}, {"bearing": ["spring"]})
+    display = StructureDisplay.from_structure(structure, groups=["bearing"])
+    assert len(display.members_["bearing"].get_offsets()) == 1
+    assert "bearing" in [text.get_text() for text in display.figure_.legends[0].get_texts()]
+    values = StructureDisplay.from_structure(structure, {"bearing": 0.2}, limits=(0.0, 1.0)).members_["points"]
+    assert (values.get_array().tolist(), values.get_clim()) == ([0.2], (0.0, 1.0))
 
 
 def test_a_structure_in_space_fills_its_figure():

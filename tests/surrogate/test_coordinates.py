@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
 
+from skthermo.fem import Beam, Spring, Structure, add_noise
+from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.surrogate._standardiser import Standardiser
 from tests.surrogate.chains import TRUSS, F, T
@@ -80,3 +84,28 @@ def test_chain_gives_rows_the_weights_that_its_option_asks_for():
     np.testing.assert_allclose(given_weights, weighted.inverse_.invert(year).weight[some])
     np.testing.assert_array_equal(given_weights == 1, year.notna().all(axis=1)[some])
     assert alike.mapper_.regressor_.weights_ is None
+
+
+def mirror_image():
+    """A beam on two springs that are mirror images, each a parameter."""
+    section = {"E": 33e9, "G": 14e9, "A": 5.0, "I_yy": 1.6, "I_zz": 20.0, "J": 3.0, "density": 2500.0}
+    nodes = {i: (2.5 * i, 0.0, 0.0) for i in range(13)}
+    members = {i: Beam(i, i + 1, **section) for i in range(12)}
+    members |= {"left": Spring(4, "z", k=4e8), "right": Spring(8, "z", k=4e8)}
+    members |= {"start": Spring(0, "z", k=6e8), "end": Spring(12, "z", k=6e8)}
+    supports = dict.fromkeys(nodes, "y rx rz") | {0: "x y rx rz"}
+    structure = Structure(nodes, members, supports, {"deck": range(12), "left": ["left"], "right": ["right"]})
+    return structure.assemble(["deck", "left", "right"], n_modes=4, track=True)
+
+
+def test_parameters_that_no_mode_tells_apart_stay_near_each_other():
+    model = mirror_image()
+    temperatures = 10 + 10 * np.random.default_rng(0).uniform(-1, 1, (200, 1))
+    truth = np.exp((temperatures - 10) * [-0.004, -0.002, -0.002])
+    measured = add_noise(model.frequencies(truth), 0.004, random_state=0)
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    inverse = InverseSurrogate(model, quadratic, noise=0.004, n_samples=200, random_state=0)
+    chain = DataInformedFEM(model, inverse=inverse).fit(temperatures, measured)
+    assert mape(model.frequencies(truth), chain.predict(temperatures)).max() < 0.2
+    theta = chain.predict_parameters(temperatures)
+    np.testing.assert_allclose(theta[:, 1], theta[:, 2], rtol=0.05)

@@ -50,6 +50,16 @@ def test_wrong_modes_do_not_make_every_prediction_impossible():
     assert fem.predict(T).notna().all(axis=None)
 
 
+def test_a_chain_that_misses_its_own_records_by_more_than_their_mean_says_so():
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
+    fem = DataInformedFEM(TRUSS, inverse=inverse, mapper=PLAIN, random_state=0)
+    with (
+        pytest.warns(UserWarning, match="far outside the bounds"),
+        pytest.warns(UserWarning, match=r"on average, but their mean only by 2.6 % .*BiasAligner"),
+    ):
+        fem.fit(T, F * [1.08, 0.94, 1.07, 0.95, 1.06, 0.94])
+
+
 def test_healthy_campaigns_with_the_right_noise_give_no_warning():
     for seed in range(20):
         year = make_truss_campaign(random_state=seed)
