@@ -1,11 +1,14 @@
 """Curves of the probability of detection, and minimum detectable damage, from a study's table."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
+from skthermo._warnings import warn_user
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._pod_curve import PODCurve, pod_curve
 from skthermo.studies._pod_fit import bracket_of, check_probability
@@ -44,7 +47,8 @@ class StudyCurves:
             known = [f"{f!r} ({s})" for f, s in self._families()]
             raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
         detected = rows["rate"] * rows["n_effective"]
-        return pod_curve(rows["severity"], detected, rows["n_effective"], log=log, confidence=self._confidence)
+        with _naming(family):
+            return pod_curve(rows["severity"], detected, rows["n_effective"], log=log, confidence=self._confidence)
 
     def minimum_detectable_damage(self, level: float = 0.9, method: Literal["grid", "curve"] = "grid") -> pd.DataFrame:
         """Smallest severity that is detected reliably, for every family and source.
@@ -61,13 +65,18 @@ class StudyCurves:
         -------
         DataFrame
             Indexed by family and source, with ``mdd``, ``lowest`` and ``highest``: NaN or infinite where the level is
-            not reached. Where a curve has no finite slope, or a family one severity only, ``mdd`` is NaN and the bounds
-            are the two tested severities between which it lies.
+            not reached. Where a curve has no finite slope, the POD does not increase, or a family has one severity
+            only, ``mdd`` is NaN and the bounds are the two tested severities between which it lies.
 
         Raises
         ------
         ValueError
-            If there is no family, or the level is not between 0 and 1.
+            If there is no family, the level is not between 0 and 1, or a family has both damage and strengthening.
+
+        Warns
+        -----
+        UserWarning
+            If a curve has no finite slope, or there is none because the POD does not increase.
         """
         check_probability(level, "level")
         if method not in ("grid", "curve"):
@@ -88,16 +97,32 @@ class StudyCurves:
         return dict(iter(rows.groupby(["family", "source"], sort=False)))  # type: ignore[arg-type]
 
     def _on_grid(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
-        mdd, lowest, highest = (
-            minimum_detectable_damage(rows["severity"], rows[rate], level) for rate in ("rate", "highest", "lowest")
-        )
+        with _naming(key[0]):
+            mdd, lowest, highest = (
+                minimum_detectable_damage(rows["severity"], rows[rate], level) for rate in ("rate", "highest", "lowest")
+            )
         return mdd, lowest, highest
 
     def _on_curve(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
         if len(rows) < 2:
             return float("nan"), *bracket_of(rows["severity"].abs().to_numpy(), rows["rate"].to_numpy(), level)
-        curve = self.pod_curve(*key)
+        try:
+            curve = self.pod_curve(*key)
+        except ValueError as error:
+            if rows["severity"].min() < 0 < rows["severity"].max():
+                raise
+            warn_user(f"no curve of source {key[1]!r} for {error}", "family without a curve")
+            return float("nan"), *bracket_of(rows["severity"].abs().to_numpy(), rows["rate"].to_numpy(), level)
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)
         tail = (1 - self._confidence) / 2
         return curve.severity_at(level), curve.severity_at(level, tail), curve.severity_at(level, 1 - tail)
+
+
+@contextmanager
+def _naming(family: Any) -> Iterator[None]:
+    """Let errors say which family they are about."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"family {family!r}: {error}") from error

@@ -60,7 +60,7 @@ class IdentifiedDamage:
     >>> print(found.summary())
     Damage is evident: a healthy structure shows such a shift with probability 0.002.
     bottom: 1.0% of its stiffness lost (not significant, standard error 0.5%).
-    top: 19.1% of its stiffness lost (standard error 0.5%).
+    top: 19.0% of its stiffness lost (standard error 0.5%).
     >>> found.scenario().name
     'identified damage'
     """

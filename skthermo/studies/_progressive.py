@@ -74,7 +74,8 @@ class ProgressiveDamage(State):
         if end < onset or onset > times.max() or self._is_negative_position():
             raise ValueError(
                 f"scenario {self.name!r} has onset {self.onset!r} and end {self.end!r} for {len(times)} records; "
-                "expected an onset from the first to the last record, and an end that is not before it"
+                "expected an onset that is not after the last record, counted from 0 if it is a number, and an end "
+                "that is not before it"
             )
         grown = (times - onset) / (end - onset) if end > onset else (times >= onset).astype(float)
         return {"damage": {group: np.clip(grown, 0, 1) * severity for group, severity in self.damage.items()}}

@@ -111,7 +111,7 @@ def training_tables(fem: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _doubts(report: Any) -> list[str]:
     """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
-    doubts += [f"{message}." for _, message in report.warnings()]
+    doubts += [f"{message}." for kind, message in report.warnings() if kind != "worse than the mean"]
     for mode, error in report.errors.iterrows():
         if not error["MAPE"] < error["MAPE of the mean"]:
             doubts.append(f"The model predicts mode {mode} no better than its mean frequency does.")
@@ -167,7 +167,7 @@ def _agreement(results: pd.DataFrame) -> list[Html]:
     both = rates.dropna()
     gaps = 100 * (both[SIMULATED] - both[TRUE])
     cells = [
-        [name, percent(row[SIMULATED]), percent(row[TRUE]), f"{gap:+.1f}"]
+        [name, percent(row[SIMULATED]), percent(row[TRUE]), f"{round(gap, 1) + 0.0:+.1f}"]
         for (name, row), gap in zip(both.iterrows(), gaps, strict=True)
     ]
     mean, largest = shortened(gaps.abs().mean()), shortened(gaps.abs().max())

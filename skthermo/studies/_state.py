@@ -88,6 +88,11 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage of scenario {name!r} is {damage!r:.200}; expected {{group: severity}}")
     for group, severity in damage.items():
+        if np.ndim(severity):
+            raise ValueError(
+                f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}; expected one number, or "
+                "ProgressiveDamage for damage that grows"
+            )
         check_severities(severity, group, name)
     return {group: float(severity) for group, severity in damage.items()}
 

@@ -12,15 +12,19 @@ from sklearn.pipeline import Pipeline
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
+from skthermo._warnings import warn_user
 from skthermo.studies._candidate import Arrangement
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
 from skthermo.studies._pod_fit import check_probability
-from skthermo.studies._simulate import TRUE, Trial, clean_frequencies, judge
+from skthermo.studies._simulate import SIMULATED, TRUE, Trial, clean_frequencies, judge
 from skthermo.studies._state import State, check_groups
 from skthermo.studies._summary import damage_index, summary
 from skthermo.studies._view import read_baseline
 from skthermo.studies._warnings_once import warnings_once
+
+MANY_FALSE_ALARMS = 0.5
+"""Rate of false alarms from which a warning is given: the baseline and the simulation are not of one structure."""
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
@@ -170,7 +174,8 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
               detection, from the onset of the damage on;
             - ``rate``, ``lowest``, ``highest``: share of records in alarm, and its bounds;
             - ``band_lowest``, ``band_highest``: range of the rates of single repeats, which a measured campaign of this
-              length and state should lie in with the probability ``confidence``;
+              length and state should lie in with the probability ``confidence``. Fewer than 39 repeats are too few for
+              95 %: the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN);
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can judge;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
@@ -184,9 +189,13 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         Warns
         -----
         UserWarning
-            Once for each kind of doubt about the simulations, such as foreign weather.
+            Once for each kind of doubt about the simulations, such as foreign weather; if most records of the healthy
+            structure raise an alarm.
         """
+        if not hasattr(self.fem, "simulate"):
+            raise ValueError(f"fem is {self.fem!r:.200}; expected a fitted DataInformedFEM")
         check_is_fitted(self.fem)
+        check_detector(self.detector)
         n_repeats = positive_integer(self.n_repeats, "n_repeats")
         if interval not in INTERVALS:
             raise ValueError(f"interval is {interval!r}; expected one of {list(INTERVALS)}")
@@ -197,9 +206,6 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         self.detector_ = clone(self.detector)
         seed_parts(self.detector_, seeded(self.random_state))
         self.detector_.fit(healthy)
-        lacking = [name for name in ("decision_function", "score_samples") if not hasattr(self.detector_, name)]
-        if lacking:
-            raise ValueError(f"the detector is {self.detector!r:.200}, without {lacking}; expected an outlier detector")
         measured = {} if reference is None or callable(reference) else reference
         with warnings_once() as self.warnings_, single_blas_thread():
             clean = clean_frequencies(self.fem, list(scenarios.values()), T, n_repeats)
@@ -223,10 +229,24 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         self.results_ = pd.DataFrame(
             [summary(scenarios[key[0]], key[1], np.array(decisions[key]), rows[key], **options) for key in ordered]
         )
+        self._warn_of_many_false_alarms()
         self._confidence = confidence
         columns = [view.names[i] for i in view.positions]
         self.arrangement_ = Arrangement(clone(self.detector_), columns, _num_samples(healthy), view.is_frame)
         return self.results_
+
+    def _warn_of_many_false_alarms(self) -> None:
+        """Warn if the detector takes most simulated records of the healthy structure for damaged."""
+        rows = self.results_[(self.results_["measure"] == "PFA") & (self.results_["source"] == SIMULATED)]
+        many = rows[rows["lowest"] > MANY_FALSE_ALARMS]
+        if len(many):
+            text = (
+                f"{many['rate'].iloc[0]:.0%} of the simulated records of scenario {many['scenario'].iloc[0]!r}, where "
+                "nothing is changed, raise an alarm; expected a baseline in Hz of the structure that the chain has "
+                "learned, and weather in degrees Celsius as in the baseline"
+            )
+            self.warnings_.append(text)
+            warn_user(text, "many false alarms")
 
     def _checked_scenarios(self, reference: Any) -> list[State]:
         """The scenarios; an error if they or the names of the reference are wrong."""
@@ -250,6 +270,15 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
     def __sklearn_clone__(self) -> "DetectabilityStudy":
         parameters = self.get_params(deep=False) | {"detector": clone(self.detector)}
         return type(self)(**parameters)  # the chain is fitted, and shared
+
+
+def check_detector(detector: Any) -> None:
+    """Raise an error for what is no outlier detector."""
+    needed = ("get_params", "fit", "decision_function", "score_samples")
+    lacking = [name for name in needed if not hasattr(detector, name)]
+    if isinstance(detector, type) or lacking:
+        without = f", without {lacking}" if lacking else ", a class"
+        raise ValueError(f"the detector is {detector!r:.200}{without}; expected an outlier detector")
 
 
 def threshold_of(detector: Any) -> float | None:

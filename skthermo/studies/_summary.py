@@ -68,10 +68,15 @@ def summary(scenario: State, source: str, decisions: Array, rows: Any, **options
 
 
 def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
-    """Central range of the rates of single repeats, with this share of them."""
+    """Range that holds the rate of one more repeat with this probability, or that of all repeats if they are too few.
+
+    Of n rates, the k-th smallest exceeds that of one more repeat with probability k / (n + 1). One rate has no range.
+    """
     judged = (~np.isnan(decisions)).sum(axis=1)
     rates = (decisions < 0).sum(axis=1)[judged > 0] / judged[judged > 0]
-    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2])
+    if len(rates) < 2:
+        return float("nan"), float("nan")
+    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2], method="weibull")
     return float(lowest), float(highest)
 
 

@@ -38,7 +38,8 @@ def sweep(
     >>> [scenario.name for scenario in sweep(make_truss(), (0.1, 0.2), ["bottom", "top"])]
     ['healthy', 'bottom 10 %', 'bottom 20 %', 'top 10 %', 'top 20 %']
     """
-    known = getattr(getattr(model, "model", model), "groups", None)
+    model = getattr(model, "model", model)
+    known = getattr(model, "groups", None)
     if not known:
         raise ValueError(f"{model!r:.200} has no damage groups; expected a model with 'groups', such as AffineModel")
     chosen = list(known) if groups is None else list(groups)

@@ -14,6 +14,7 @@ from sklearn.base import clone
 from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._frames import check_same_rows, column_names
 from skthermo._threads import single_blas_thread
+from skthermo._warnings import warn_user
 from skthermo.fem import check_noise
 from skthermo.studies._candidate import Arrangement, longer
 from skthermo.studies._scenario import Scenario
@@ -88,8 +89,9 @@ def what_to_add(
 
         - ``candidate``, such as "mode 7" (counted from 1), "baseline x 2" or the sensor's name; ``kind``: "mode",
           "baseline" or "sensor"; ``family``;
-        - ``mdd_now``, ``mdd_then``: minimum detectable damage, the severity with a probability of detection of 0.9 on
-          the curve, without and with the candidate: means over the repeats;
+        - ``mdd_now``, ``mdd_then``: minimum detectable damage, the magnitude of the severity with a probability of
+          detection of 0.9 on the curve, without and with the candidate: means over the repeats, infinite where
+          damage is not found;
         - ``gain``: their difference; ``lowest``, ``highest``: bounds that hold, with a probability of 95 %, the gain
           of one baseline and one new period.
 
@@ -103,7 +105,8 @@ def what_to_add(
     -----
     UserWarning
         Once for each kind of doubt about the simulations, such as foreign weather; if a mode depends on parameters that
-        the measured modes hardly determine, so that the chain does not know how it moves.
+        the measured modes hardly determine, so that the chain does not know how it moves; if damage of a family is
+        not found.
 
     Notes
     -----
@@ -167,6 +170,13 @@ def what_to_add(
                 ]
     if not rows:
         raise ValueError("there is no candidate; expected modes, baseline_factors or sensors")
+    unfound = list(dict.fromkeys(row["family"] for row in rows if np.isnan(row["gain"])))
+    if unfound:
+        warn_user(
+            f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
+            "the study; expected a study with larger severities",
+            "families that are not found",
+        )
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
 

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, Matrix, as_floats, as_random_state, real_array
-from skthermo._frames import frame_like
+from skthermo._frames import check_same_rows, frame_like
 from skthermo._validation import check_is_fitted
+from skthermo._warnings import warn_user
 from skthermo.fem import check_noise
 from skthermo.surrogate._simulator import Simulator
+
+LARGE_FACTOR = 10.0
+"""Factor of a parameter that was perhaps meant in percent."""
 
 
 class ChainSimulation:
@@ -62,6 +66,11 @@ class ChainSimulation:
         ValueError
             If a damage group or a parameter is unknown, a severity is 1 or more, a factor is not positive, or the
             model cannot be changed in this way.
+
+        Warns
+        -----
+        UserWarning
+            If a factor is above 10, which may be meant in percent.
         """
         check_is_fitted(self)
         changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
@@ -165,7 +174,7 @@ class ChainSimulation:
         if stiffness is not None or mass is not None:
             simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
         theta = self._predict_theta(X) * self._factors(parameters)
-        fixed, growing = _split(damage, len(theta))
+        fixed, growing = _split(damage, X)
         simulator = simulator.damaged(fixed)
         if growing:
             severities = np.column_stack(list(growing.values()))
@@ -180,19 +189,26 @@ class ChainSimulation:
             if name not in factors:
                 raise ValueError(f"parameter {name!r} is unknown; expected some of {self.parameter_names_}")
             if not isinstance(factor, Real) or not 0 < factor < np.inf:
-                raise ValueError(f"the factor of parameter {name!r} is {factor!r}; expected a positive number")
+                raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
+            if factor > LARGE_FACTOR:
+                warn_user(
+                    f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
+                    "and not percent",
+                    "large factor",
+                )
             factors[name] = float(factor)
         return np.array(list(factors.values()))
 
 
 def _split(
-    damage: Mapping[str, float | ArrayLike] | None, n_rows: int
+    damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
 ) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
     """Severities that are the same in all rows, and those with a value for each row."""
     if damage is not None and not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     fixed: dict[str, Any] = {}
     growing: dict[str, NDArray[np.float64]] = {}
+    n_rows = np.shape(X)[0]
     for group, severity in (damage or {}).items():
         if np.ndim(severity) == 0:
             fixed[group] = severity
@@ -203,5 +219,6 @@ def _split(
                 f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
                 f"expected one severity or {n_rows}, one for each row, finite and below 1"
             )
+        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
         growing[group] = values
     return fixed, growing

@@ -154,6 +154,7 @@ def test_a_study_of_the_healthy_structure_alone(chain, tmp_path):
     assert "there is no smallest damage to report" in text
 
 
+@pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
 def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     fem, T, _ = chain
     with pytest.warns(UserWarning, match="far outside") as caught:

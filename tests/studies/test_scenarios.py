@@ -91,12 +91,12 @@ def test_sudden_damage_is_there_from_its_onset():
 @pytest.mark.parametrize(
     ("rows", "onset", "end", "message"),
     [
-        (ROWS, 10, None, "expected an onset from the first to the last record"),
-        (ROWS, -1, None, "expected an onset from the first to the last record"),
+        (ROWS, 10, None, "expected an onset that is not after the last record"),
+        (ROWS, -1, None, "expected an onset that is not after the last record"),
         (ROWS, 4, 3, "an end that is not before it"),
         (ROWS, "2025-01-03", None, "onset is '2025-01-03'; expected the number of a record$"),
         (DAYS, "soon", None, "onset is 'soon'; expected the number of a record, or a time"),
-        (DAYS, "2026-01-01", None, "expected an onset from the first to the last record"),
+        (DAYS, "2026-01-01", None, "expected an onset that is not after the last record"),
         (DAYS.tz_localize("UTC"), "2025-01-03", None, "a time in the time zone UTC"),
     ],
 )
@@ -125,6 +125,7 @@ def test_a_sweep_holds_every_group_at_every_severity():
         (lambda: Scenario(""), "name is ''"),
         (lambda: Scenario("a", {"top": 30}), "expected finite shares of the stiffness below 1, not percent"),
         (lambda: Scenario("a", {"top": np.nan}), "expected finite shares"),
+        (lambda: Scenario("a", {"top": [0.1, 0.2]}), r"has shape \(2,\); expected one number, or ProgressiveDamage"),
         (lambda: Scenario("a", "top"), "expected {group: severity}"),
         (lambda: Scenario("a", parameters={"top": 0.0}), "expected finite and positive ones"),
         (lambda: UncertainDamage("a", [0.1]), "expected a frame"),

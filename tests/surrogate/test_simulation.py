@@ -1,6 +1,7 @@
 """Simulated records of a changed structure."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from skthermo.datasets import make_truss, make_truss_campaign
@@ -56,11 +57,20 @@ def test_noise_is_what_draw_noise_gives(fem, weather, noise):
         ({"damage": {"top": np.full(60, 1.0)}}, "highest value 1.0; expected one severity or 60"),
         ({"damage": {"deck": np.full(60, 0.1)}}, r"unknown damage groups \['deck'\]"),
         ({"damage": 0.2}, "damage is 0.2; expected a mapping"),
+        ({"damage": {"top": pd.Series(0.1, range(60))}}, "damage of group 'top' have different indices"),
+        ({"mass": np.full(23, -1e6)}, "mass, with what is added, has a negative eigenvalue"),
     ],
 )
 def test_impossible_changes_are_refused(fem, weather, changes, message):
     with pytest.raises(ValueError, match=message):
         fem.simulate(weather, **changes)
+
+
+def test_a_factor_in_percent_is_doubted(fem, weather):
+    if fem.reduce:
+        fem = DataInformedFEM(make_truss(), random_state=0).fit(*fem.training_records_)
+    with pytest.warns(UserWarning, match=r"factor of parameter 'top' is 102; expected a factor, such as 1.02"):
+        fem.simulate(weather, parameters={"top": 102})
 
 
 def test_other_modes_are_those_of_the_model_at_the_same_parameters(fem, weather):

@@ -13,6 +13,7 @@ from skthermo.fem.modal import (
     EigenSolver,
     LocalModes,
     ShiftInvertSolver,
+    count_modes,
     dense_solver,
     hertz,
     may_be_missed,
@@ -156,6 +157,9 @@ class AffineCore:
         """The core with further constant stiffness and mass; its columns stay the same nominal modes."""
         stiff = self.stiffness if stiffness is None else self.stiffness.with_constant(stiffness)
         heavy = self.mass if mass is None else self.mass.with_constant(mass)
+        if mass is not None:
+            total = heavy.assemble(nominal_theta(heavy.exponents.shape[1]))[0]
+            count_modes(total, at_least=self.n_modes, what="mass, with what is added,")
         solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
         return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
 

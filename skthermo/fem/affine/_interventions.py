@@ -107,7 +107,8 @@ class Interventions:
         Raises
         ------
         ValueError
-            If a matrix has the wrong shape, is not symmetric, or holds values that are not finite.
+            If a matrix has the wrong shape, is not symmetric, or holds values that are not finite, or more mass is
+            taken away than there is.
 
         Examples
         --------

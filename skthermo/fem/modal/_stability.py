@@ -58,7 +58,7 @@ def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> No
         _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], names)
 
 
-def count_modes(mass: Matrix, *, at_least: int) -> int:
+def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> int:
     """How many modes of finite frequency a mass matrix allows.
 
     For a sparse matrix with many masses this is the number of degrees of freedom with mass.
@@ -82,7 +82,7 @@ def count_modes(mass: Matrix, *, at_least: int) -> int:
         shifted = _scaled(mass, scale) + SMALL_SHIFT * scipy.sparse.eye_array(len(diagonal), format="csc")
         negative, count = factorise(shifted) is None, int(massive.sum())
     if negative:
-        raise ValueError("the nominal mass has a negative eigenvalue; expected none below zero")
+        raise ValueError(f"the {what} has a negative eigenvalue; expected none below zero")
     if count < at_least:
         raise ValueError(
             f"n_modes is {at_least}, but {len(diagonal)} degrees of freedom, {len(diagonal) - count} of them "

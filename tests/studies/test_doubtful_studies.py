@@ -1,0 +1,90 @@
+"""Studies that cannot be right, or of which little can be said."""
+
+import numpy as np
+import pytest
+from sklearn.linear_model import Ridge
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
+from skthermo.studies._summary import band_of
+from skthermo.surrogate import DataInformedFEM
+
+YEAR = make_truss_campaign(random_state=0)
+WEATHER = make_truss_campaign(random_state=1).temperatures
+
+
+@pytest.fixture(scope="module")
+def fem():
+    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
+
+
+def study(fem, scenarios, **options):
+    return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **({"n_repeats": 2, "random_state": 0} | options))
+
+
+@pytest.mark.parametrize(("n_repeats", "expected"), [(39, 0.95), (99, 0.95), (10, 9 / 11), (2, 1 / 3)])
+def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expected):
+    random, inside = np.random.default_rng(0), []
+    for _ in range(2000):
+        rates = random.uniform(0, 1, n_repeats + 1)
+        decisions = np.where(np.arange(1000) < 1000 * rates[:, np.newaxis], -1.0, 1.0)
+        lowest, highest = band_of(decisions[:-1], 0.95)
+        inside.append(lowest <= (decisions[-1] < 0).mean() <= highest)
+    assert np.mean(inside) == pytest.approx(expected, abs=0.04)
+
+
+def test_one_repeat_has_no_band(fem):
+    results = study(fem, [Scenario("healthy")], n_repeats=1).run(WEATHER)
+    assert results[["band_lowest", "band_highest"]].isna().all(axis=None)
+
+
+def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
+    wrong = study(fem, [Scenario("healthy")])
+    with pytest.warns(
+        UserWarning, match=r"100% of the simulated records of scenario 'healthy'.*expected a baseline in Hz"
+    ):
+        wrong.run(WEATHER, YEAR.frequencies * 2 * np.pi)
+    assert any("raise an alarm" in text for text in wrong.warnings_)
+
+
+def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
+    both = study(fem, [*sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]])
+    both.run(WEATHER)
+    with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase"):
+        curve = both.minimum_detectable_damage(method="curve")
+    assert 0.1 < curve.loc[("bottom", "data-informed"), "mdd"] < 0.3
+    unknown = curve.loc[("vertical", "data-informed")]
+    assert (np.isnan(unknown["mdd"]), unknown["lowest"], np.isnan(unknown["highest"])) == (True, 0.002, True)
+    with pytest.warns(UserWarning, match=r"families \['vertical'\] have candidates without a gain"):
+        table = what_to_add(both, WEATHER, modes=[], baseline_factors=(2,))
+    assert np.isfinite(table.set_index("family")["gain"]["bottom"])
+
+
+def test_errors_name_the_family_with_damage_and_strengthening(fem):
+    mixed = study(fem, sweep(fem, (-0.1, 0.2), ["bottom"]))
+    mixed.run(WEATHER)
+    for ask in (mixed.minimum_detectable_damage, lambda: mixed.pod_curve("bottom")):
+        with pytest.raises(ValueError, match=r"family 'bottom': severities are \[-0.1, 0.2\]"):
+            ask()
+
+
+def test_what_is_no_chain_or_no_detector_is_named(fem):
+    with pytest.raises(ValueError, match=r"fem is AffineModel.*expected a fitted DataInformedFEM"):
+        study(make_truss(), [Scenario("healthy")]).run(WEATHER)
+    for detector, message in (
+        (None, "detector is None, without .*expected an outlier detector"),
+        (MahalanobisDetector, "a class; expected"),
+        (Ridge(), r"Ridge\(\), without \['decision_function', 'score_samples'\]"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            DetectabilityStudy(fem, detector, [Scenario("healthy")]).run(WEATHER)
+
+
+def test_strengthening_is_compared_by_its_magnitude(fem):
+    stronger = study(fem, sweep(fem, (-0.1, -0.2, -0.3), ["bottom"]))
+    stronger.run(WEATHER)
+    found = stronger.minimum_detectable_damage(method="curve")["mdd"].iloc[0]
+    table = what_to_add(stronger, WEATHER, modes=[], baseline_factors=(2,))
+    assert -0.3 < found < -0.1
+    assert table["mdd_now"][0] == pytest.approx(-found, abs=0.05)
