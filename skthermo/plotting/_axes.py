@@ -7,7 +7,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo.plotting._style import GREY, drawing, label_of, pyplot
+from skthermo.plotting._style import GREY, drawing, label_of, plain, pyplot
+
+HANDLE, LETTER = 0.5, 0.085
+"""Inches that the symbol and a letter of a legend take."""
 
 Axes: TypeAlias = Any
 """Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
@@ -80,11 +83,18 @@ def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> 
     if not handles:
         return
     if is_own_figure:
+        n_columns = legend_columns(labels, axes[0].figure, n_columns)
         axes[0].figure.legend(
             handles, labels, loc="outside upper center", ncols=n_columns, frameon=False, markerscale=scale
         )
     else:
         axes[0].legend(frameon=False, markerscale=scale, fontsize="small")
+
+
+def legend_columns(labels: Sequence[str], figure: Any, most: int) -> int:
+    """How many columns of a legend fit into the width of a figure."""
+    widest = HANDLE + LETTER * max(map(len, labels))
+    return int(np.clip(figure.get_figwidth() // widest, 1, most))
 
 
 def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
@@ -96,7 +106,7 @@ def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
         ax.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
         ax.set_xlabel(label or "date")
     else:
-        ax.set_xlabel(label or str(index.name or "record"))
+        ax.set_xlabel(label or plain(index.name or "record"))
 
 
 def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Index) -> None:
@@ -105,11 +115,11 @@ def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Inde
         for ax in axes:
             ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
         above = axes[0].get_xaxis_transform()
-        axes[0].text(on_axis(place, index), 1.03, f" {text}", transform=above, fontsize="small")
+        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
 
 
 def on_axis(place: Any, index: pd.Index) -> Any:
-    """A time without its time zone, or a number; on an axis of time a number is the position of a record.
+    """A time in the zone of the index, or a number; on an axis of time, a number is the position of a record.
 
     Raises
     ------
@@ -125,4 +135,7 @@ def on_axis(place: Any, index: pd.Index) -> Any:
         if not 0 <= place < len(index):
             raise ValueError(f"there is no record number {place!r}; expected a time, or 0 to {len(index) - 1}")
         place = index[int(place)]
-    return pd.Timestamp(place).tz_localize(None).to_datetime64()
+    time = pd.Timestamp(place)
+    if time.tz is not None and index.tz is not None:
+        time = time.tz_convert(index.tz)
+    return time.tz_localize(None).to_datetime64()

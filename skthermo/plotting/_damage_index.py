@@ -9,7 +9,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
-from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style
+from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
 from skthermo.plotting._tables import as_tables, in_time
 
 
@@ -239,20 +239,20 @@ class DamageIndexDisplay:
         self.points_, self.threshold_lines_ = {}, []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
             self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
-            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": threshold_label}
+            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": plain(threshold_label)}
             self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
             if self.onset is not None:
                 first = next(iter(self.scenarios[title].values()))
                 one.axvline(
                     on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
                 )
-            one.set_title(title)
+            one.set_title(shortened(title))
             if log:
                 one.set_yscale("log")
             else:
                 one.set_ylim(bottom=0)
             if ax is not None or number % n_columns == 0:
-                one.set_ylabel(self.label if height > 3 else self.label.replace(" (", "\n("))
+                one.set_ylabel(plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
         for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
             date_axis(one, next(iter(self.scenarios[title].values())).index)
         figure_legend(self.axes_, ax is None, n_columns=5)
@@ -264,7 +264,8 @@ class DamageIndexDisplay:
         for number, (label, table) in enumerate(tables.items()):
             x, values = in_time(table)
             style = marker_style(number, len(x))
-            drawn += ax.plot(x, values[:, 0], **{**style, "color": colours.get(label, style["color"])}, label=label)
+            style |= {"color": colours.get(label, style["color"]), "label": shortened(label)}
+            drawn += ax.plot(x, values[:, 0], **style)
         return drawn
 
 

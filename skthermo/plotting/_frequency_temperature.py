@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows, column_names
 from skthermo.plotting._axes import Axes, figure_legend, panel_names, panels
-from skthermo.plotting._style import label_of, marker_style, with_unit
+from skthermo.plotting._style import label_of, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like
 
 
@@ -187,7 +187,7 @@ class FrequencyTemperatureDisplay:
         self.points_ = {}
         for number, (label, table) in enumerate(tables.items()):
             if table is not None:
-                style = {**marker_style(number, len(table)), "label": label, "alpha": 0.7 if number else 1.0}
+                style = {**marker_style(number, len(table)), "label": plain(label), "alpha": 0.7 if number else 1.0}
                 self.points_[label] = [
                     one.plot(self.temperature.to_numpy(), table.iloc[:, column].to_numpy(), **style)[0]
                     for column, one in enumerate(self.axes_)

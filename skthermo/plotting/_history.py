@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
-from skthermo.plotting._style import line_style, marker_style, with_unit
+from skthermo.plotting._style import line_style, marker_style, shortened, with_unit
 from skthermo.plotting._tables import as_tables, in_time, with_breaks
 
 
@@ -182,7 +182,8 @@ class HistoryDisplay:
             x, values = in_time(table) if has_points else with_breaks(*in_time(table))
             style = marker_style(number, len(x)) if has_points else line_style(number, number - (kind == "auto"))
             self.lines_[label] = [
-                one.plot(x, values[:, column], **style, label=label)[0] for column, one in enumerate(self.axes_)
+                one.plot(x, values[:, column], **style, label=shortened(label))[0]
+                for column, one in enumerate(self.axes_)
             ]
         for one, name in zip(self.axes_, names, strict=True):
             one.set_ylabel(with_unit(f"{name}\n{self.quantity}" if self.quantity else name, self.unit))

@@ -6,7 +6,7 @@ import numpy as np
 
 from skthermo.plotting._axes import Axes, panels
 from skthermo.plotting._heat_map import draw_heat_map
-from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of
+from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, shortened
 
 NEEDED = {
     "table": {"severity", "standard_error", "significant"},
@@ -15,6 +15,9 @@ NEEDED = {
 }
 N_ERRORS = 2
 """Standard errors on either side of an estimate."""
+
+SHORT = 8
+"""Number of letters up to which names of modes fit beside each other."""
 
 
 class IdentifiedDamageDisplay:
@@ -115,7 +118,8 @@ class IdentifiedDamageDisplay:
         similarity = self.identified.similarity
         self.image_ = draw_heat_map(self.axes_[2], similarity, 1.0)
         self.axes_[2].set_title("cosine between groups")
-        self.axes_[2].tick_params(axis="x", labelrotation=45 if len(similarity) > 3 else 0)
+        if len(similarity) > 3:
+            lean(self.axes_[2])
         self.figure_.colorbar(self.image_, ax=self.axes_[2], shrink=0.8)
         return self
 
@@ -136,14 +140,15 @@ class IdentifiedDamageDisplay:
                 ax.plot(severity[rows], places[rows], linestyle="", **style)
         ax.axvline(0, color=BLACK, linewidth=0.8)
         names = [
-            str(name) + ("" if one else "\n(not determined)") for name, one in zip(table.index, known, strict=True)
+            shortened(name) + ("" if one else "\n(not determined)")
+            for name, one in zip(table.index, known, strict=True)
         ]
         ax.set_yticks(places, names)
         ax.set(title=f"severity ± {N_ERRORS} standard errors", xlabel="severity (%)", ylim=(len(table) - 0.5, -0.5))
         ax.legend(frameon=False, fontsize="small")
         unseen = list(getattr(self.identified, "unseen", ()))
         if unseen:
-            text = f"left out, as these modes do not show them: {', '.join(map(str, unseen))}"
+            text = f"left out, as these modes do not show them: {', '.join(map(shortened, unseen))}"
             ax.text(0.5, -0.2, text, transform=ax.transAxes, ha="center", va="top", fontsize="small", wrap=True)
         return drawn
 
@@ -158,5 +163,13 @@ class IdentifiedDamageDisplay:
         self.explained_ = ax.plot(places + 0.1, shifts["explained"].to_numpy(), **style)[0]
         ax.axhline(0, color=BLACK, linewidth=0.8)
         ax.set_xticks(places, [label_of(name) for name in shifts.index])
+        if max(len(str(name)) for name in shifts.index) > SHORT:
+            lean(ax)
         ax.set(title="shift of frequencies", ylabel="shift (%)", xlim=(-0.5, len(shifts) - 0.5))
         ax.legend(frameon=False, fontsize="small")
+
+
+def lean(ax: Axes) -> None:
+    """Turn the labels of the horizontal axis so that long ones end below their ticks."""
+    for label in ax.get_xticklabels():
+        label.set(rotation=45, ha="right", rotation_mode="anchor")

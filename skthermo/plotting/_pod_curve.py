@@ -6,7 +6,7 @@ import numpy as np
 
 from skthermo._arrays import Array
 from skthermo.plotting._axes import Axes, one_axes
-from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS
+from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS, shortened
 
 NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
 QUANTILE = 1.959964
@@ -116,12 +116,12 @@ class PODCurveDisplay:
         self._draw_shares(severities, colour, marker)
         drawn = np.linspace(severities.min(), severities.max(), N_DRAWN)
         pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
-        style = {"color": colour, "linestyle": dashes, "label": self.label or "fitted curve", "gid": "POD"}
+        style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
         self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
         self.marks_ = self._draw_marks(colour) if marks else {}
         self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
-        self.ax_.legend(frameon=False, fontsize="small", loc="best")
+        self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
         return self
 
     def _draw_shares(self, severities: Array, colour: str, marker: str) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
-from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, with_unit
+from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
 
@@ -231,16 +231,16 @@ class PredictionDisplay:
         x_line, predicted = with_breaks(*in_time(self.predicted))
         points = marker_style(0, len(x))
         for column, one in enumerate(self.axes_):
-            self.measured_ += one.plot(x, measured[:, column], **points, label=self.labels[0])
+            self.measured_ += one.plot(x, measured[:, column], **points, label=plain(self.labels[0]))
             style = line_style(1)
-            self.predicted_ += one.plot(x_line, predicted[:, column], **style, label=self.labels[1])
+            self.predicted_ += one.plot(x_line, predicted[:, column], **style, label=plain(self.labels[1]))
         if self.lowest is None or self.highest is None:
             return
         lowest, highest = (with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest))
         is_known = np.isfinite(lowest) & np.isfinite(highest)
         for column, one in enumerate(self.axes_):
             ends = lowest[:, column], highest[:, column]
-            style = {"color": ORANGE, "alpha": 0.25, "linewidth": 0, "zorder": 1, "label": self.interval_label}
+            style = {"color": ORANGE, "alpha": 0.25, "linewidth": 0, "zorder": 1, "label": plain(self.interval_label)}
             self.bands_.append(one.fill_between(x_line, *ends, where=is_known[:, column], **style))
 
     def _draw_scatter(self, names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, real_array
 from skthermo.fem import Structure
-from skthermo.plotting._axes import Axes
+from skthermo.plotting._axes import Axes, legend_columns
 from skthermo.plotting._members import (
     add_lines,
     add_points,
@@ -20,7 +20,7 @@ from skthermo.plotting._members import (
     sort_members,
 )
 from skthermo.plotting._members import structure_axes as new_axes
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, pyplot
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
 
 WIDTH, THIN = 2.5, 0.8
 
@@ -198,7 +198,7 @@ class StructureDisplay:
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
         if is_own_figure and self.structure.dimension == 3:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
-        return self.figure_.colorbar(shown, label=self.label or "", **place)
+        return self.figure_.colorbar(shown, label=plain(self.label or ""), **place)
 
     def _draw_groups(self, linewidth: float | Mapping[str, float]) -> None:
         groups, nodes = self.structure.groups, self.structure.nodes
@@ -224,8 +224,8 @@ class StructureDisplay:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
         if not handles:
             return
-        labels = [handle.get_label().replace("_", " ") for handle in handles]
-        style = {"ncols": 5, "frameon": False, "fontsize": "small"}
+        labels = [shortened(handle.get_label()) for handle in handles]
+        style = {"ncols": legend_columns(labels, self.figure_, 5), "frameon": False, "fontsize": "small"}
         if not is_own_figure:
             self.ax_.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), **style)
         else:

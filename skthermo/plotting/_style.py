@@ -14,6 +14,9 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
 
 MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
+LONGEST = 30
+"""Number of letters from which names would take the room of what is drawn."""
+
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 
 
@@ -27,16 +30,39 @@ def pyplot() -> ModuleType:
     return drawing("matplotlib.pyplot")
 
 
+def shortened(name: Hashable) -> str:
+    """A name for a legend, a title or a tick: a very long one loses its middle, dollar signs stay as they are."""
+    text = str(name)
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2].rstrip()} ... {text[-LONGEST // 3 :].lstrip()}"
+    return plain(text)
+
+
+def plain(text: Hashable) -> str:
+    """A text whose dollar signs matplotlib draws as they are, in lines where they enclose no formula."""
+    return "\n".join(_plain_line(line) for line in str(text).split("\n"))
+
+
+def _plain_line(line: str) -> str:
+    if "$" not in line:
+        return line
+    try:
+        drawing("matplotlib.mathtext").MathTextParser("path").parse(line)
+    except ValueError:
+        return line.replace("\\$", "$").replace("$", "\\$")
+    return line
+
+
 def label_of(name: Hashable) -> str:
     """A column's name as text; f1 becomes a symbol with an index."""
     text = str(name)
     found = re.fullmatch(r"([fT])_?(\d+)", text)
-    return f"${found[1]}_{{{found[2]}}}$" if found else text
+    return f"${found[1]}_{{{found[2]}}}$" if found else shortened(text)
 
 
 def with_unit(quantity: str, unit: str) -> str:
     """Label of an axis."""
-    return f"{quantity} ({unit})" if unit else quantity
+    return plain(f"{quantity} ({unit})" if unit else quantity)
 
 
 def marker_style(number: int, n_points: int) -> dict[str, object]:

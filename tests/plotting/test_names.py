@@ -1,0 +1,74 @@
+"""Names from data, and times of other zones, in displays."""
+
+from io import BytesIO
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.fem import Bar, Structure
+from skthermo.plotting import (
+    DamageIndexDisplay,
+    FrequencyTemperatureDisplay,
+    HistoryDisplay,
+    PODCurveDisplay,
+    PredictionDisplay,
+    SensitivityDisplay,
+    StructureDisplay,
+)
+from skthermo.plotting._style import label_of
+from skthermo.studies import pod_curve
+
+HOSTILE = "$E_{x$ & 50% <b>"
+LONG = "a very long name of a damage group that somebody wrote, number 7"
+TABLE = pd.DataFrame(np.linspace(4, 5, 20).reshape(10, 2), columns=[HOSTILE, LONG])
+
+
+def structure():
+    steel = {"E": 210e9, "A": 0.01, "density": 7850.0}
+    ends = {0: "ab", 1: "bc", 2: "ca"}
+    members = {name: Bar(*pair, **steel) for name, pair in ends.items()}
+    return Structure(
+        {"a": (0, 0), "b": (1, 0), "c": (0.5, 1)}, members, {"a": "xy", "b": "y"}, {HOSTILE: [0], LONG: [1]}
+    )
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: HistoryDisplay.from_predictions({HOSTILE: TABLE, LONG: TABLE}, marks={HOSTILE: 3}),
+        lambda: PredictionDisplay.from_predictions(TABLE, TABLE, labels=(HOSTILE, LONG), unit=HOSTILE),
+        lambda: FrequencyTemperatureDisplay.from_predictions(TABLE[HOSTILE], TABLE, TABLE, labels=(HOSTILE, LONG)),
+        lambda: DamageIndexDisplay.from_scenarios({HOSTILE: TABLE[LONG], LONG: TABLE[LONG]}, 4.5, label=HOSTILE),
+        lambda: PODCurveDisplay.from_predictions(pod_curve([0.1, 0.2], [3, 17], [20, 20]), label=HOSTILE),
+        lambda: PODCurveDisplay.from_predictions(pod_curve([0.1, 0.2], [3, 17], [20, 20]), label=2 * LONG),
+        lambda: SensitivityDisplay.from_predictions(TABLE),
+        lambda: StructureDisplay.from_structure(structure(), groups=[HOSTILE, LONG]),
+        lambda: StructureDisplay.from_structure(structure(), {HOSTILE: 0.1}, label=HOSTILE),
+    ],
+)
+def test_any_name_can_be_drawn_and_leaves_room_for_the_data(draw):
+    figure = draw().figure_
+    figure.savefig(BytesIO(), format="png")  # a warning of a layout that does not fit is an error
+    assert min(ax.get_position().width for ax in figure.axes[:1]) > 0.3
+    plt.close(figure)
+
+
+def test_names_keep_their_beginning_and_end_and_their_formulas():
+    assert label_of("f1") == "$f_{1}$"
+    assert label_of(r"$\alpha$ (1)") == r"$\alpha$ (1)"
+    assert label_of("5 $ and 6") == r"5 \$ and 6"
+    assert label_of(HOSTILE) == HOSTILE.replace("$", r"\$")
+    assert label_of("span_1") == "span_1"
+    assert label_of(LONG).startswith("a very long")
+    assert label_of(LONG).endswith("number 7")
+    assert len(label_of(LONG)) <= 35
+
+
+def test_the_onset_may_be_in_another_time_zone():
+    index = pd.date_range("2024-07-01", periods=48, freq="h", tz="Europe/Berlin")
+    onset = pd.Timestamp("2024-07-01 22:00", tz="UTC")
+    display = DamageIndexDisplay.from_predictions(pd.Series(1.0, index), 2.0, onset=onset)
+    line = next(line for line in display.ax_.lines if line.get_label() == "onset of damage")
+    assert pd.Timestamp(line.get_xdata()[0]) == pd.Timestamp("2024-07-02")  # local time, as the records
