@@ -3,12 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.ensemble import ExtraTreesRegressor
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import DetectabilityStudy, identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::5]
@@ -207,3 +208,15 @@ def test_draws_make_a_scenario(fem):
     assert results["scenario"].tolist() == ["as found"]
     assert results["rate"].between(0.5, 1).all()
     assert repr(found).startswith("IdentifiedDamage(bottom=0.2 ± ")
+
+
+def test_a_mapper_that_has_learned_noise_finds_no_damage_in_healthy_records():
+    """Its own residuals are nothing like those of new records."""
+    year, later = (make_truss_campaign(random_state=seed) for seed in (0, 107))
+    mapper = TemperatureMapper(ExtraTreesRegressor(20, random_state=0))
+    fem = DataInformedFEM(make_truss(), mapper=mapper, random_state=0).fit(year.temperatures, year.frequencies)
+    found = identify_damage(fem, later.temperatures[:60], later.frequencies[:60], GROUPS, random_state=0)
+    assert not found.table["significant"].any()
+    honest = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    expected = identify_damage(honest, later.temperatures[:60], later.frequencies[:60], GROUPS, random_state=0)
+    assert (found.shifts["standard_error"] > 0.8 * expected.shifts["standard_error"]).all()
