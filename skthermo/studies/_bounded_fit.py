@@ -103,6 +103,19 @@ def highest_likely(fit: BoundedFit, column: int) -> float:
     return float(brentq(excess, fit.severities[column], HIGHEST, xtol=1e-6)) if excess(HIGHEST) > 0 else HIGHEST
 
 
+def error_beside(slopes: Array, severities: Array, column: int) -> float:
+    """Half of how far a severity can move, up or down, until the fit is worse by two standard errors."""
+    others, target = np.delete(slopes, column, axis=1), slopes @ severities
+
+    def excess(severity: float) -> float:
+        return _misfit(others, target - severity * slopes[:, column]) - 4.0
+
+    found = severities[column]
+    lowest = brentq(excess, 0.0, found, xtol=1e-6) if found > 0 and excess(0.0) > 0 else 0.0
+    highest = brentq(excess, found, HIGHEST, xtol=1e-6) if excess(HIGHEST) > 0 else HIGHEST
+    return float(max(found - lowest, highest - found)) / 2
+
+
 def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:
     """Probability that a healthy structure's shift is explained by damage as much as this one's."""
     gained = fit.target @ fit.target - _misfit(fit.slopes, fit.target)
@@ -112,9 +125,14 @@ def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random
     return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
 
 
-def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int) -> float:
-    """Probability of the part that a group has in a fit where it is undamaged: one-sided Student's t."""
-    return float(stats.t.sf(np.sqrt(max(without.misfit - fit.misfit, 0.0)), n_periods))
+def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int, column: int, nominal: Array) -> float:
+    """Probability of the part that a group has in a fit where it is undamaged: one-sided Student's t.
+
+    The part counts only as far as the others cannot take it at the nominal state, too.
+    """
+    others = np.delete(nominal, column, axis=1)
+    gained = min(without.misfit - fit.misfit, _misfit(others, nominal @ fit.severities))
+    return float(stats.t.sf(np.sqrt(max(gained, 0.0)), n_periods))
 
 
 def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:

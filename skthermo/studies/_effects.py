@@ -60,6 +60,17 @@ class FrequencyEffects:
         weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
         return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), groups, healthy)
 
+    def nominal(self) -> "FrequencyEffects":
+        """The same effects at the model's nominal state.
+
+        What the records do not determine may have drifted in theta, and a symmetric structure with it out of its
+        symmetry: mirror images would seem to differ.
+        """
+        theta = np.ones((1, self.theta.shape[1]))
+        solved = self.fem.simulator_.frequencies(theta, self.fem.n_jobs, warn=False)
+        healthy = np.log(as_floats(self.fem.aligner_.inverse_transform(solved)))
+        return FrequencyEffects(self.fem, theta, np.ones_like(healthy), self.groups, healthy)
+
     def __call__(self, severities: Array) -> tuple[Array, Array]:
         """Change of each mode, (n_modes,), and its derivatives by the severities, (n_modes, n_groups)."""
         exact = hasattr(self.fem.model, "with_damage_parameters")

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._arrays import Array
 from skthermo.studies._bounded_fit import (
     HIGHEST,
     BoundedFit,
+    error_beside,
     p_of_damage,
     p_of_group,
     p_of_misfit,
@@ -25,6 +27,7 @@ N_DRAWS = 500
 
 def findings(
     comparison: Comparison,
+    nominal: Array,
     names: Sequence[str],
     shift: Shift,
     modes: Sequence[Any],
@@ -33,12 +36,17 @@ def findings(
     significance: float,
     random: np.random.RandomState,
 ) -> IdentifiedDamage:
-    """Fit the groups together and one by one, and test what is found."""
-    fit, healthy = comparison.fit(), comparison.slopes()
-    confused = list(dict.fromkeys(confused_groups(healthy) + confused_groups(fit.slopes)))
+    """Fit the groups together and one by one, and test what is found; ``nominal``: effects at the nominal state."""
+    fit = comparison.fit()
+    confused = list(dict.fromkeys(confused_groups(nominal) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
     errors, covariance = standard_errors(fit, N_DRAWS, random)
-    p_values = [p_of_group(fit, without, shift.n_periods) for without in _fits_without(comparison, fit)]
+    for column in {column for group in confused for column in group}:
+        errors[column] = max(errors[column], error_beside(nominal, fit.severities, column))
+    p_values = [
+        p_of_group(fit, without, shift.n_periods, column, nominal)
+        for column, without in enumerate(_fits_without(comparison, fit))
+    ]
     table = pd.DataFrame(
         {
             "severity": fit.severities,
@@ -57,7 +65,7 @@ def findings(
         table=table,
         shifts=_shift_table(shift, fit, modes),
         single=_single_fits(comparison, names, shift),
-        similarity=pd.DataFrame(cosines(healthy), names, names),
+        similarity=pd.DataFrame(cosines(nominal), names, names),
         covariance=pd.DataFrame(covariance, names, names),
         draws=pd.DataFrame(comparison.members(draws), columns=list(of_model)),
         confused=[tuple(names[column] for column in group) for group in confused],

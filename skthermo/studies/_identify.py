@@ -121,7 +121,11 @@ def identify_damage(
     if shapes is not None:
         parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
     every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
-    slopes = every.slopes()
+    at_nominal = [Part(effects.nominal(), shift.mean, shift.covariance)]
+    if shapes is not None:
+        ones = np.ones((1, effects.theta.shape[1]))
+        at_nominal.append(_of_shapes(fem, ones, of_model, shapes, dofs, shape_noise))
+    slopes, nominal = every.slopes(), Comparison(at_nominal, every.incidence)
     alone = errors_alone(slopes)
     seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
     if not seen:
@@ -130,9 +134,10 @@ def identify_damage(
             f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
             f"{errors}. More records or other modes would lower them"
         )
-    joined = [list(group) for group in (merge_confused(slopes, seen) if merge else seen)]
+    joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
     found = findings(
         every.of(joined),
+        nominal.of(joined).slopes(),
         [" + ".join(labels[column] for column in group) for group in joined],
         shift,
         fem.mode_names_,

@@ -119,7 +119,7 @@ def test_p_values_of_healthy_structures_are_uniform():
     fits = [linear_fit(slopes, random.standard_normal(6)) for _ in range(400)]
     assert np.mean([p_of_misfit(fit, 10_000) < 0.05 for fit in fits]) == pytest.approx(0.05, abs=0.03)
     without = [linear_fit(slopes[:, 1:], fit.target) for fit in fits]
-    p_values = [p_of_group(*both, 10_000) for both in zip(fits, without, strict=True)]
+    p_values = [p_of_group(*both, 10_000, 0, slopes) for both in zip(fits, without, strict=True)]
     assert np.mean(np.less(p_values, 0.05)) == pytest.approx(0.05, abs=0.03)
     assert np.mean([p_of_damage(fit, 10_000, 100, random) < 0.05 for fit in fits[:200]]) < 0.08
     few = linear_fit(slopes[:2], random.standard_normal(2) + slopes[:2].sum(axis=1))
