@@ -84,14 +84,17 @@ def identify_damage(
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
-    weather. Its covariance comes from periods of the training records, each of the new records' length if there are
-    enough of them, judged by the other periods, and counts how many training records have weather like that of the new
-    ones. Severities follow from non-negative least squares in standard errors of the shifts, repeated with exact
-    derivatives on the damaged model until they no longer change. Their standard errors are those of the bounded
-    estimate, from fits to redrawn shifts, and not below half of what a severity can grow by until the fit is worse by
-    two standard errors, however the other groups adapt. A group is significant if the best fit without it is worse by
-    more than errors would make it (one-sided, Bonferroni over the groups).
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
+    similar weather. Its covariance comes from periods of the training records, each of the new records' length if
+    there are enough of them, judged by the other periods, and counts how many training records have weather like
+    that of the new ones. Severities follow from non-negative least squares in standard errors of the shifts,
+    repeated with exact derivatives on the damaged model until they no longer change. Their standard errors are
+    those of the bounded estimate, from fits to redrawn shifts, and not below half of what a severity can grow by
+    until the fit is worse by two standard errors, however the other groups adapt. A group is significant if the
+    best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the groups). What
+    groups have in common is judged at the model's nominal state, too, because a chain may have drifted out of the
+    symmetry of its structure; the standard error of a group in such a set covers what the others could take from
+    it.
 
     Examples
     --------
