@@ -1,0 +1,171 @@
+"""The bridge of `make_kw51_campaign`: how weather moves its stiffness and mass, and its retrofit."""
+
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo.datasets._kw51 import updated_model
+from skthermo.datasets._kw51_structure import N_BAYS, N_PANELS, kw51_structure
+from skthermo.datasets._kw51_weather import REFERENCE
+from skthermo.fem import AffineModel, PointMass, ReducedModel, Spring, Structure
+
+TRUTH = {
+    "E_gir": "deck_beams",
+    "E_pla": "plate",
+    "E_arc": "arch",
+    "E_br": "braces",
+    "E_con": "connections",
+    "E_pip": "pipes",
+    "E_b": "ballast",
+    "I_33g": ("I_yy", "girders"),
+    "K_bea": "bearings",
+    "M_b": ("mass", "ballast"),
+}
+BOX = {
+    **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
+    "E_con": 0.05,
+    "E_b": (0.8, 2.2),
+    "I_33g": (0.9, 1.9),
+    "K_bea": (0.3, 2.2),
+    "M_b": 0.03,
+}
+TOLERANCE = 2e-5
+
+STEEL = 3.5e-4  # 1/K
+CONNECTIONS = 1.2e-3
+BALLAST, COMPOSITE = 4e-3, 1.5e-3
+BEARINGS = 0.03
+FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.8, 0.7, 2.0  # ratio, ratio, K
+MOISTURE = 0.0035  # standard deviation of the ballast's mass
+
+SLIDING, ROCKING = 1e7, 3e7  # N/m and N m/rad at each bearing
+
+STIFFENED = {"arch_connections": 0.906, "deck_connections": 0.430}
+ADDED = {"arch": 353.0, "deck": 837.0}  # kg at each joint
+
+
+def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
+    """Multipliers of the parameters ``TRUTH`` in every hour."""
+    warm = weather[["steel", "sun", "slab"]] - REFERENCE
+    frozen = 1 - np.exp(-weather["frost"] / FROST_DEPTH)
+    return pd.DataFrame(
+        {
+            "E_gir": 1 - STEEL * warm["steel"],
+            "E_pla": 1 - STEEL * warm["slab"],
+            "E_arc": 1 - STEEL * warm["sun"],
+            "E_br": 1 - STEEL * warm["sun"],
+            "E_con": 1 - CONNECTIONS * warm["sun"],
+            "E_pip": 1 - STEEL * warm["sun"],
+            "E_b": (1 - BALLAST * warm["slab"]) * (1 + FROZEN_BALLAST * frozen),
+            "I_33g": (1 - COMPOSITE * warm["slab"]) * (1 + FROZEN_COMPOSITE * frozen),
+            "K_bea": np.exp(-BEARINGS * warm["steel"]),
+            "M_b": 1 + MOISTURE * weather["moisture"],
+        }
+    )
+
+
+def truth_structure(*, with_joint_masses: bool = False) -> Structure:
+    """KW51 with bearings that resist sliding and rocking and, where asked for, the masses that its retrofit adds."""
+    bridge = kw51_structure()
+    bearings = {
+        **{("bearing", s, "x"): Spring(("deck", s, N_PANELS), "x", SLIDING) for s in (0, N_BAYS)},
+        **{
+            ("bearing", s, line, "ry"): Spring(("deck", s, line), "ry", ROCKING)
+            for s in (0, N_BAYS)
+            for line in (0, N_PANELS)
+        },
+    }
+    masses = {("mass", node): PointMass(node, m=ADDED[node[-1]]) for node in bridge.nodes if node[0] == "joint"}
+    added = masses if with_joint_masses else {}
+    groups = bridge.groups
+    groups |= {
+        "bearings": list(bearings),
+        "deck_beams": groups["girders"] | groups["transverse_beams"] | groups["stiffeners"],
+    }
+    return Structure(
+        nodes=bridge.nodes,
+        members=bridge.members | bearings | added,
+        supports=bridge.supports,
+        groups=groups | ({"joint masses": list(added)} if added else {}),
+    )
+
+
+@lru_cache(maxsize=1)
+def truth_model() -> AffineModel:
+    """The healthy bridge, updated, with the parameters ``TRUTH``."""
+    return updated_model(truth_structure(), TRUTH, 6)
+
+
+@lru_cache(maxsize=1)
+def reduced_truth() -> ReducedModel:
+    """The same, reduced within ``BOX``."""
+    return truth_model().reduced(BOX, tol=TOLERANCE, random_state=0)
+
+
+@lru_cache(maxsize=4)
+def changed_truth(bounds: tuple[tuple[str, float, float], ...], has_masses: bool) -> ReducedModel:
+    """The same, with a factor of the stiffness of each group in ``bounds`` and, last but for them, added mass."""
+    parameters = TRUTH | ({"added mass": ("mass", "joint masses")} if has_masses else {})
+    model = updated_model(truth_structure(with_joint_masses=has_masses), parameters, 6)
+    box = BOX | ({"added mass": (NO_MASS, 1.0)} if has_masses else {})
+    box |= {f"1 - {group}": (lowest, highest) for group, lowest, highest in bounds}
+    groups = [group for group, _, _ in bounds]
+    return model.with_damage_parameters(groups).reduced(box, tol=TOLERANCE, random_state=0)
+
+
+NO_MASS = 1e-9
+
+
+def retrofit_keywords() -> dict[str, object]:
+    """The retrofit as the keyword arguments of `DataInformedFEM.simulate`."""
+    mass = [ADDED[node[-1]] if node[0] == "joint" and d in "xyz" else 0.0 for node, d in kw51_structure().dofs]
+    return {"damage": {group: -share for group, share in STIFFENED.items()}, "mass": np.array(mass)}
+
+
+def simulate(
+    theta: pd.DataFrame, factors: pd.DataFrame, mass_share: Array, dofs: NDArray[np.intp] | None = None
+) -> tuple[Array, Array | None]:
+    """Frequencies (n, 6) in Hz and, at ``dofs``, shapes (n, 6, n_dofs).
+
+    ``factors`` multiply the stiffness of the groups that are its columns; ``mass_share`` multiplies the mass that the
+    retrofit adds.
+    """
+    factors = factors.loc[:, (factors != 1).any()]
+    changed = (factors != 1).any(axis=1).to_numpy() | (mass_share > 0)
+    rows = theta.to_numpy()
+    frequencies = np.empty((len(rows), 6))
+    shapes = None if dofs is None else np.empty((len(rows), 6, len(dofs)))
+    for chosen in (~changed, changed):
+        if not chosen.any():
+            continue
+        values = rows[chosen]
+        if chosen is changed:
+            has_masses = bool((mass_share > 0).any())
+            bounds = tuple((group, _down(column.min()), -_down(-column.max())) for group, column in factors.items())
+            model = changed_truth(bounds, has_masses)
+            masses = np.maximum(mass_share[chosen, np.newaxis], NO_MASS)
+            values = np.hstack([values, masses, factors[chosen]] if has_masses else [values, factors[chosen]])
+        else:
+            model = reduced_truth()
+        if shapes is None:
+            frequencies[chosen] = model.frequencies(values)
+        else:
+            frequencies[chosen], shapes[chosen] = _modes_at(model, values, dofs)
+    return frequencies, shapes
+
+
+def _down(value: float) -> float:
+    """Rounded down to two digits, so that similar campaigns share a reduced model."""
+    return float(np.floor(100 * value - 1e-9) / 100)
+
+
+def _modes_at(model: ReducedModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
+    frequencies, shapes = [], []
+    for rows in np.array_split(theta, max(1, len(theta) // 500)):
+        f, phi = model.modes(rows)
+        frequencies.append(f)
+        shapes.append(phi[:, dofs].transpose(0, 2, 1))
+    return np.vstack(frequencies), np.vstack(shapes)

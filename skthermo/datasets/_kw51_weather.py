@@ -1,0 +1,83 @@
+"""Weather at KW51, drawn hour by hour: temperatures of its members, frost, moisture of the ballast."""
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+from scipy.stats import norm
+
+from skthermo._arrays import Array
+
+START = pd.Timestamp("2018-10-01")
+N_HOURS = 11328
+REFERENCE = 10.0  # C, near the mean before the retrofit
+
+MEAN, SEASON, COLDEST_DAY = 12.75, 7.75, 18.0  # C, C, day of the year
+ANOMALY, ANOMALY_SEASON, ANOMALY_HOURS = 3.1, 0.5, 30.0
+SWING_WINTER, SWING_SUMMER, CLOUD_HOURS = 1.0, 4.0, 18.0
+WARMEST_HOUR = 16.0
+SUN_SWING, SUN_LEAD = 1.4, 2.0
+SLAB_HOURS = 24.0
+COLD_SPELL, COLD_SPELL_SCATTER, COLD_SPELL_HOURS = -3.0, 0.3, 60.0
+FROST_BELOW, FROST_HOURS = 1.5, 24.0
+MOISTURE_HOURS = 36.0
+
+
+def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
+    """Hourly weather: "steel", "sun" and "slab" in C, "frost" in K below freezing, "moisture" (standard deviation 1).
+
+    "steel" is the temperature below the deck, "sun" that of the members above it, "slab" that of the plate and the
+    ballast. A longer record begins with the same hours as a shorter one.
+    """
+    index = pd.date_range(START, periods=max(n_hours, N_HOURS), freq="h", name="time")
+    anomaly, cloud, moisture = (
+        smooth_noise(len(index), hours, random) for hours in (ANOMALY_HOURS, CLOUD_HOURS, MOISTURE_HOURS)
+    )
+    day = index.day_of_year.to_numpy() - 1 + index.hour.to_numpy() / 24
+    season = -np.cos(2 * np.pi * (day - COLDEST_DAY) / 365.25)
+    steady = MEAN + SEASON * season + (ANOMALY + ANOMALY_SEASON * season) * anomaly
+    swing = (SWING_WINTER + (SWING_SUMMER - SWING_WINTER) * (1 + season) / 2) * 2 * norm.cdf(cloud)
+    hour = index.hour.to_numpy()
+    steel = steady + swing * cycle(hour)
+    spell = cold_spell(index, steel, random)
+    steel += spell
+    sun = steady + spell + SUN_SWING * swing * cycle(hour + SUN_LEAD)
+    weather = {
+        "steel": steel,
+        "sun": sun,
+        "slab": memory(steel, SLAB_HOURS),
+        "frost": memory(np.maximum(FROST_BELOW - steel, 0.0), FROST_HOURS),
+        "moisture": moisture,
+    }
+    return pd.DataFrame(weather, index=index).iloc[:n_hours]
+
+
+def cycle(hour: Array) -> Array:
+    """Daily cycle between -1 and 1."""
+    return np.cos(2 * np.pi * (hour - WARMEST_HOUR) / 24)
+
+
+def cold_spell(index: pd.DatetimeIndex, steel: Array, random: np.random.RandomState) -> Array:
+    """What brings the coldest hour of the first January to about -3 C, fading over days before and after it."""
+    january = np.flatnonzero((index.month == 1) & (index.year == START.year + 1))
+    coldest = january[steel[january].argmin()]
+    wanted = COLD_SPELL + COLD_SPELL_SCATTER * random.standard_normal()
+    hours = np.arange(len(index)) - coldest
+    return (wanted - steel[coldest]) * np.exp(-((hours / COLD_SPELL_HOURS) ** 2))
+
+
+def smooth_noise(n_hours: int, hours: float, random: np.random.RandomState, n_columns: int = 1) -> Array:
+    """Stationary Gaussian series of variance 1, twice smoothed: correlation (1 + t / hours) exp(-t / hours)."""
+    decay = np.exp(-1 / hours)
+    settled = int(10 * hours)
+    noise = random.standard_normal((settled + n_hours, n_columns))
+    once = lfilter([1 - decay], [1, -decay], noise, axis=0)
+    twice = lfilter([1 - decay], [1, -decay], once, axis=0)[settled:]
+    variance = (1 - decay) ** 4 * (1 + decay**2) / (1 - decay**2) ** 3
+    return (twice / np.sqrt(variance)).squeeze()
+
+
+def memory(values: Array, hours: float) -> Array:
+    """Exponentially weighted mean of the past, which starts settled at the first value."""
+    decay = np.exp(-1 / hours)
+    start = np.array([decay * values[0]])
+    return lfilter([1 - decay], [1, -decay], values, zi=start)[0]
