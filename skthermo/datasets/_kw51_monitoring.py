@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from skthermo._arrays import Array
-from skthermo.datasets._kw51_structure import N_BAYS, N_PANELS, kw51_structure
+from skthermo.datasets._kw51_structure import N_PANELS, kw51_structure
 from skthermo.datasets._kw51_weather import REFERENCE, smooth_noise
 
 NOISE = (0.0030, 0.0017, 0.0016, 0.0025, 0.0013, 0.0015)
