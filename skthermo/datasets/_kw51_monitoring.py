@@ -9,9 +9,9 @@ from skthermo._arrays import Array
 from skthermo.datasets._kw51_structure import N_PANELS, kw51_structure
 from skthermo.datasets._kw51_weather import REFERENCE, smooth_noise
 
-NOISE = (0.0030, 0.0017, 0.0016, 0.0025, 0.0013, 0.0015)
+NOISE = (0.0030, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
 COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
-WIND = np.array([0.75, 0.75, 0.0, 0.75, 0.0, 0.0])
+WIND = np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
 OUTAGE = 0.02
 BLOCK_HOURS = 5.0
 

@@ -26,22 +26,22 @@ TRUTH = {
 }
 BOX = {
     **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
-    "E_con": 0.05,
-    "E_b": (0.8, 2.2),
-    "I_33g": (0.9, 1.9),
-    "K_bea": (0.3, 2.2),
-    "M_b": 0.03,
+    "E_con": 0.035,
+    "E_b": (0.9, 1.7),
+    "I_33g": (0.9, 2.2),
+    "K_bea": (0.6, 1.6),
+    "M_b": 0.015,
 }
 TOLERANCE = 1e-4  # the reduced models' own estimate; frequencies were found within 3e-5
 LASTING = 500  # hours
 NO_MASS = 1e-9  # share, because multipliers are positive
 
-STEEL = 3.5e-4  # 1/K
-CONNECTIONS = 1.2e-3
-BALLAST, COMPOSITE = 4e-3, 1.5e-3
-BEARINGS = 0.03
-FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.8, 0.7, 2.0  # ratio, ratio, K
-MOISTURE = 0.0035  # standard deviation of the ballast's mass
+STEEL = 3.6e-4  # 1/K
+CONNECTIONS = 8e-4
+BALLAST, COMPOSITE = 1.5e-3, 1.5e-3
+BEARINGS = 0.012
+FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.5, 1.0, 2.0  # ratio, ratio, K
+MOISTURE = 0.0018  # standard deviation of the ballast's mass
 
 SLIDING, ROCKING = 1e7, 3e7  # N/m and N m/rad at each bearing
 
