@@ -9,11 +9,11 @@ from skthermo._arrays import Array
 from skthermo.datasets._kw51_structure import N_PANELS, kw51_structure
 from skthermo.datasets._kw51_weather import REFERENCE, smooth_noise
 
-NOISE = (0.0030, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
+NOISE = (0.003, 0.0018, 0.0016, 0.0026, 0.00115, 0.0015)
 COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
 WIND = np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
 OUTAGE = 0.02
-BLOCK_HOURS = 5.0
+BLOCK_HOURS = 4.0
 
 FIRST_TEMPERATURE = pd.Timestamp("2018-11-21 12:00")
 TEMPERATURE_GAPS = 0.0122
@@ -30,12 +30,12 @@ SENSORS = {
     "aBD17Cz": ("deck", 16, "C", "z"),
     "aBD23Ay": ("deck", 22, "A", "y"),
     "aBD23Az": ("deck", 22, "A", "z"),
-    "aAR0910Ay": ("arch", 9.5, "A", "y"),
-    "aAR0910Cy": ("arch", 9.5, "C", "y"),
-    "aAR1516Ay": ("arch", 15.5, "A", "y"),
-    "aAR1516Cy": ("arch", 15.5, "C", "y"),
-    "aAR2122Ay": ("arch", 21.5, "A", "y"),
-    "aAR2122Cy": ("arch", 21.5, "C", "y"),
+    "aAR0910Ay": ("arch", 10, "A", "y"),
+    "aAR0910Cy": ("arch", 10, "C", "y"),
+    "aAR1516Ay": ("arch", 16, "A", "y"),
+    "aAR1516Cy": ("arch", 16, "C", "y"),
+    "aAR2122Ay": ("arch", 22, "A", "y"),
+    "aAR2122Cy": ("arch", 22, "C", "y"),
 }
 
 
