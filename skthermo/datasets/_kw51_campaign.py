@@ -48,7 +48,7 @@ def make_kw51_campaign(
     ----------
     n_hours : int, default=11328
         Number of hourly records from 2018-10-01 00:00 on.
-    noise : float or array-like of shape (6,), default=(0.003, 0.0018, 0.0016, 0.0026, 0.00115, 0.0015)
+    noise : float or array-like of shape (6,), default=(0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
         Relative standard deviation of the Gaussian noise on every frequency.
     gaps : bool, default=True
         Whether temperatures and modes are missing in blocks.
@@ -191,8 +191,8 @@ def make_kw51_campaign(
     """
     n_hours = positive_integer(n_hours, "n_hours")
     deviations = check_noise(noise, 6)
-    seeds = as_random_state(random_state).randint(2**31 - 1, size=5)
-    for_weather, for_noise, for_damping, for_gaps, for_shapes = map(np.random.RandomState, seeds)
+    seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
+    for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 
     weather = draw_weather(n_hours, for_weather)
     index, theta = weather.index, thermal_multipliers(weather)
@@ -206,7 +206,7 @@ def make_kw51_campaign(
     temperatures = weather["steel"].to_frame("tBD31A")
     missing = np.zeros(clean.shape, dtype=bool)
     if gaps:
-        temperatures[missing_temperatures(index, for_gaps)] = np.nan
+        temperatures[missing_temperatures(index, for_sensor)] = np.nan
         missing = missing_modes(n_hours, for_gaps)
     frequencies[missing], damping[missing] = np.nan, np.nan
     modes, ratios = [[f"{letter}{mode + 1}" for mode in range(6)] for letter in ("f", "xi")]

@@ -9,7 +9,7 @@ from skthermo._arrays import Array
 from skthermo.datasets._kw51_structure import N_PANELS, kw51_structure
 from skthermo.datasets._kw51_weather import REFERENCE, smooth_noise
 
-NOISE = (0.003, 0.0018, 0.0016, 0.0026, 0.00115, 0.0015)
+NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
 COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
 WIND = np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
 OUTAGE = 0.02
@@ -41,13 +41,13 @@ SENSORS = {
 
 def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours without temperature: until the sensor was installed, and a few blocks later."""
-    block = smooth_noise(len(index), 2 * BLOCK_HOURS, random) < ndtri(TEMPERATURE_GAPS)
+    block = smooth_noise(len(index), 1, 2 * BLOCK_HOURS, random)[:, 0] < ndtri(TEMPERATURE_GAPS)
     return block | (index < FIRST_TEMPERATURE)
 
 
 def missing_modes(n_hours: int, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours (n_hours, 6) in which a mode was not identified: in blocks, lateral modes of the arches together."""
-    wind, outage, *own = smooth_noise(n_hours, BLOCK_HOURS, random, 2 + len(COVERAGE)).T
+    wind, outage, *own = smooth_noise(n_hours, 2 + len(COVERAGE), BLOCK_HOURS, random).T
     excitation = np.sqrt(WIND) * wind[:, np.newaxis] + np.sqrt(1 - WIND) * np.array(own).T
     return (excitation < ndtri(1 - COVERAGE / (1 - OUTAGE))) | (outage < ndtri(OUTAGE))[:, np.newaxis]
 
