@@ -11,8 +11,8 @@ START = pd.Timestamp("2018-10-01")
 N_HOURS = 11328
 REFERENCE = 10.0  # C, near the mean before the retrofit
 
-MEAN, SEASON, COLDEST_DAY = 12.75, 7.75, 18.0  # C, C, day of the year
-ANOMALY, ANOMALY_SEASON, ANOMALY_HOURS = 3.15, 0.75, 30.0
+MEAN, SEASON, COLDEST_DAY = 13.2, 7.75, 18.0  # C, C, day of the year
+ANOMALY, ANOMALY_SEASON, ANOMALY_HOURS, LIMIT = 3.5, 0.9, 30.0, 2.5
 SCATTER, SCALES, FIRST_WINTER = 4.2, (0.7, 1.3), slice(1236, 5424)  # C; from the first temperature to the retrofit
 SWING_WINTER, SWING_SUMMER, CLOUDED, CLOUD_HOURS = 1.0, 5.0, 0.4, 18.0
 WARMEST_HOUR = 16.0
@@ -38,7 +38,7 @@ def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
     day = index.day_of_year.to_numpy() - 1 + index.hour.to_numpy() / 24
     season = -np.cos(2 * np.pi * (day - COLDEST_DAY) / 365.25)
     steady = MEAN + SEASON * season
-    anomaly *= ANOMALY + ANOMALY_SEASON * season
+    anomaly = (ANOMALY + ANOMALY_SEASON * season) * LIMIT * np.tanh(anomaly / LIMIT)
     steady += anomaly * scale_for_scatter(steady[FIRST_WINTER], anomaly[FIRST_WINTER])
     clear = CLOUDED + 2 * (1 - CLOUDED) * norm.cdf(cloud)
     swing = clear * (SWING_WINTER + (SWING_SUMMER - SWING_WINTER) * (1 + season) / 2)
