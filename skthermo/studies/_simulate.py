@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._threads import single_blas_thread
+from skthermo._warnings_once import without_warnings
 from skthermo.studies._state import State
 from skthermo.studies._view import View
-from skthermo.studies._warnings_once import without_warnings
 
 SIMULATED, TRUE = "data-informed", "reference"
 

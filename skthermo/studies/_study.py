@@ -13,6 +13,7 @@ from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
 from skthermo._warnings import warn_user
+from skthermo._warnings_once import warnings_once
 from skthermo.studies._candidate import Arrangement
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
@@ -21,7 +22,6 @@ from skthermo.studies._simulate import SIMULATED, TRUE, Trial, clean_frequencies
 from skthermo.studies._state import State, check_groups
 from skthermo.studies._summary import damage_index, summary
 from skthermo.studies._view import read_baseline
-from skthermo.studies._warnings_once import warnings_once
 
 MANY_FALSE_ALARMS = 0.5
 """Rate of false alarms from which a warning is given: the baseline and the simulation are not of one structure."""
@@ -207,7 +207,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         seed_parts(self.detector_, seeded(self.random_state))
         self.detector_.fit(healthy)
         measured = {} if reference is None or callable(reference) else reference
-        with warnings_once() as self.warnings_, single_blas_thread():
+        with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
             clean = clean_frequencies(self.fem, list(scenarios.values()), T, n_repeats)
             truth = reference if callable(reference) else None
             trial = Trial(self.fem, self.detector_, view, list(scenarios.values()), T, clean, self.noise, truth)
