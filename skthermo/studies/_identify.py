@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
-from skthermo._validation import check_array, check_is_fitted
+from skthermo._validation import check_array
 from skthermo._warnings import warn_each
+from skthermo._warnings_once import warnings_once
+from skthermo.studies._chain import check_chain, named_as_in_fit
 from skthermo.studies._comparison import Comparison, Part, remembered
 from skthermo.studies._effects import FrequencyEffects
 from skthermo.studies._findings import doubts, findings
@@ -73,14 +75,15 @@ def identify_damage(
     Raises
     ------
     ValueError
-        If T and F differ in rows, a group is unknown, no record can be compared, no group can be seen, or the model
-        cannot be damaged.
+        If fem is no fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group can be
+        seen, or the model cannot be damaged.
 
     Warns
     -----
     UserWarning
-        If groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
-        shifts.
+        Once for each kind: if the weather is unlike that of the training records, temperatures have other names than in
+        fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
+        the shifts.
 
     Notes
     -----
@@ -108,7 +111,7 @@ def identify_damage(
     >>> found.severities.round(2).to_dict()
     {'top': 0.0, 'diagonal': 0.1}
     """
-    check_is_fitted(fem)
+    check_chain(fem)
     if not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
     if shapes is None and dofs is not None:
@@ -116,10 +119,13 @@ def identify_damage(
     frequencies, members = _read(fem, T, F), read_groups(fem.model, groups)
     labels = list(members)
     of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
-    shift = measured_shift(fem, T, frequencies, noise)
+    T = named_as_in_fit(fem, T)
+    with warnings_once():
+        theta = as_floats(fem.predict_parameters(T))
+        shift = measured_shift(fem, T, theta, frequencies, noise)
     if not shift.n_records.any():
         raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
-    effects = FrequencyEffects.of(fem, T, frequencies, of_model)
+    effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
     parts = [Part(remembered(effects), shift.mean, shift.covariance)]
     if shapes is not None:
         parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))

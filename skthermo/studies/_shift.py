@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats
 from skthermo.fem import check_noise
+from skthermo.studies._chain import healthy_frequencies
 
 N_PERIODS, MOST_PERIODS = 12, 60
 """Number of periods that the training records are divided into: more where the new records are few."""
@@ -37,8 +38,10 @@ class Shift(NamedTuple):
     n_periods: int
 
 
-def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
+def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
     """The shift, and its covariance by what healthy periods of the training records show, each judged by the others.
+
+    The parameters theta are those at the temperatures T.
 
     Raises
     ------
@@ -46,7 +49,7 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
         If the noise is neither "fitted" nor relative standard deviations above 0.
     """
     residuals, number = fem.expected_residuals(T, return_number=True)
-    shifts = np.log(F / (as_floats(fem.predict(T)) * (1 + as_floats(residuals))))
+    shifts = np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + as_floats(residuals))))
     mean, n_records = _mean(shifts), (~np.isnan(shifts)).sum(axis=0)
     scale = np.sqrt(1 / np.maximum(n_records, 1) + 1 / np.maximum(number, 1))
     trained = fem.residuals_.values

@@ -11,10 +11,11 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
-from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
+from skthermo._validation import _num_samples, seed_parts, seeded
 from skthermo._warnings import warn_user
 from skthermo._warnings_once import warnings_once
 from skthermo.studies._candidate import Arrangement
+from skthermo.studies._chain import check_chain
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
 from skthermo.studies._pod_fit import check_probability
@@ -192,9 +193,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             Once for each kind of doubt about the simulations, such as foreign weather; if most records of the healthy
             structure raise an alarm.
         """
-        if not hasattr(self.fem, "simulate"):
-            raise ValueError(f"fem is {self.fem!r:.200}; expected a fitted DataInformedFEM")
-        check_is_fitted(self.fem)
+        check_chain(self.fem)
         check_detector(self.detector)
         n_repeats = positive_integer(self.n_repeats, "n_repeats")
         if interval not in INTERVALS:
