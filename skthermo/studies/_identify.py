@@ -1,6 +1,7 @@
 """Which damage explains a shift of frequencies."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -75,8 +76,8 @@ def identify_damage(
     Raises
     ------
     ValueError
-        If fem is no fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group can be
-        seen, or the model cannot be damaged.
+        If fem is no fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group can
+        be seen, or the model cannot be damaged.
 
     Warns
     -----
@@ -129,13 +130,13 @@ def identify_damage(
     parts = [Part(remembered(effects), shift.mean, shift.covariance)]
     if shapes is not None:
         parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
-    every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
+    incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
+    every = Comparison(parts, incidence, labels, of_model)
     at_nominal = [Part(effects.nominal(), shift.mean, shift.covariance)]
     if shapes is not None:
         ones = np.ones((1, effects.theta.shape[1]))
         at_nominal.append(_of_shapes(fem, ones, of_model, shapes, dofs, shape_noise))
-    slopes, nominal = every.slopes(), Comparison(at_nominal, every.incidence)
-    alone = errors_alone(slopes)
+    nominal, alone = replace(every, parts=at_nominal), errors_alone(every.slopes())
     seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
     if not seen:
         errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
@@ -144,17 +145,9 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
-    found = findings(
-        every.of(joined),
-        nominal.of(joined).slopes(),
-        [" + ".join(labels[column] for column in group) for group in joined],
-        shift,
-        fem.mode_names_,
-        of_model,
-        [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE],
-        significance,
-        as_random_state(random_state),
-    )
+    unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
+    random = as_random_state(random_state)
+    found = findings(every.of(joined), nominal.of(joined), shift, unseen, significance, random)
     warn_each(doubts(found))
     return found
 

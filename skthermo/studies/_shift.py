@@ -1,5 +1,6 @@
 """Shift of measured frequencies from the healthy structure's in the same weather, and how sure it is."""
 
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -30,12 +31,15 @@ class Shift(NamedTuple):
         How many records it is the mean of.
     n_periods : int
         How many independent periods the covariance stands on, pseudo-periods included.
+    modes : list
+        Names of the modes.
     """
 
     mean: Array
     covariance: Array
     n_records: NDArray[np.intp]
     n_periods: int
+    modes: Sequence[Any]
 
 
 def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
@@ -57,7 +61,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
         deviations = check_noise(noise, len(mean))
         if (deviations == 0).any():
             raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-        return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained))
+        return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained), fem.mode_names_)
     if noise != "fitted":
         raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
     n_rows = max(int(n_records.max()), 1)
@@ -67,7 +71,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     judged = ~np.isnan(np.diag(covariance))
     covariance = np.where(np.outer(judged, judged), covariance, np.eye(len(mean)))
     mean = np.where(judged, mean, np.nan)
-    return Shift(mean, covariance * np.outer(scale, scale), n_records, n_periods + PSEUDO_PERIODS)
+    return Shift(mean, covariance * np.outer(scale, scale), n_records, n_periods + PSEUDO_PERIODS, fem.mode_names_)
 
 
 def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:
