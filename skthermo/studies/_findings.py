@@ -47,7 +47,7 @@ def findings(
     random : RandomState
         Of the draws.
     """
-    fit, names, at_nominal = comparison.fit(), comparison.names, nominal.slopes()
+    fit, names, at_nominal = comparison.fit(), list(comparison.names), nominal.slopes()
     confused = list(dict.fromkeys(confused_groups(at_nominal) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
     errors, covariance = standard_errors(fit, N_DRAWS, random)
@@ -65,7 +65,7 @@ def findings(
             "p_value": p_values,
             "significant": np.array(p_values) < significance / len(names),
         },
-        index=list(names),
+        index=names,
     )
     return IdentifiedDamage(
         table=table,
