@@ -102,11 +102,12 @@ def doubts(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST:.0%}: {highest}"
     if not found.converged:
         yield "unsettled severities", "severities still change from step to step; expected them to settle"
-    if found.misfit_p_value < found.significance:
+    if found.is_unexplained:
+        other = "something else changed too, or the frequencies scatter more than in the training records"
         yield (
             "unexplained shifts",
-            f"damage of these groups does not explain the shifts (probability {found.misfit_p_value:.2g}): something "
-            "else changed too, or the frequencies scatter more than in the training records",
+            f"damage of these groups does not explain the shifts (probability {found.misfit_p_value:.2g}): "
+            f"{found.likely_cause or other}",
         )
 
 

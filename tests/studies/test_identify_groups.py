@@ -1,5 +1,7 @@
 """Damage groups that look alike, that cannot be seen, or that do not explain the shifts; bad input."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -103,16 +105,50 @@ def test_a_shift_that_no_group_makes(truss):
     with pytest.warns(UserWarning, match="damage of these groups does not explain the shifts"):
         found = identify_damage(truss, WEATHER, F, GROUPS, random_state=0)
     assert found.misfit_p_value < 0.01
+    assert found.is_unexplained
     assert "does not explain all shifts: mode f" in found.summary()
 
 
 def test_higher_frequencies_are_no_damage(truss):
     F = simulated(truss, WEATHER) * 1.05
-    with pytest.warns(UserWarning, match="does not explain the shifts"):
+    with pytest.warns(UserWarning, match="does not explain the shifts .*: 6 of 6 frequencies rose"):
         found = identify_damage(truss, WEATHER, F, GROUPS, random_state=0)
+    said = (
+        r"6 of 6 frequencies rose, that of mode f\d by 5.00%; strengthening is not sought, because severities are not"
+    )
+    assert re.search(said, found.summary())
     assert found.severities.tolist() == [0.0, 0.0, 0.0]
     assert found.p_value > 0.9
     assert found.damage == {}
+
+
+def test_one_higher_frequency_that_no_damage_explains(truss):
+    F = simulated(truss, WEATHER)
+    F.iloc[:, 3] *= 1.03
+    with pytest.warns(UserWarning, match="does not explain the shifts .*: 1 of 6 frequencies rose, that of mode f4 by"):
+        identify_damage(truss, WEATHER, F, GROUPS, random_state=0)
+
+
+@pytest.mark.parametrize("damage", [None, {"top": 0.2}], ids=["healthy", "damaged"])
+def test_frequencies_in_radians_per_second_are_named(truss, damage):
+    F = simulated(truss, WEATHER, damage) * 2 * np.pi
+    with pytest.warns(UserWarning, match="about 2 pi times the predicted ones, perhaps in rad/s; expected Hz"):
+        found = identify_damage(truss, WEATHER, F, GROUPS, random_state=0)
+    assert found.summary().endswith(
+        "\nThe measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz."
+    )
+
+
+def test_damage_and_explained_shifts_have_no_other_cause(truss):
+    for damage in ({}, {"top": 0.2}):
+        found = identify_damage(truss, WEATHER, simulated(truss, WEATHER, damage), GROUPS, random_state=0)
+        assert found.likely_cause == ""
+    F = simulated(truss, WEATHER, {"top": 0.4})
+    F.iloc[:, 5] *= 1.02
+    with pytest.warns(UserWarning, match="something else changed too"):
+        found = identify_damage(truss, WEATHER, F, GROUPS, random_state=0)
+    assert found.table.loc["top", "significant"]
+    assert found.likely_cause == ""
 
 
 @pytest.mark.filterwarnings("ignore:damage of these groups does not explain")
