@@ -8,15 +8,9 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
 from skthermo.studies._summary import band_of
-from skthermo.surrogate import DataInformedFEM
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
-
-
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
 
 
 def study(fem, scenarios, **options):

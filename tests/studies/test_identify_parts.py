@@ -13,17 +13,11 @@ from skthermo.studies._groups import read_groups
 from skthermo.studies._separability import confused_groups, cosines, errors_alone, merge_confused
 from skthermo.studies._shape_effects import ShapeEffects
 from skthermo.studies._shift import covariance_of_record, measured_shift
-from skthermo.surrogate import DataInformedFEM
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::12]
 GROUPS = ["bottom", "top", "diagonal"]
 AT = np.array([0.1, 0.35, 0.0])
-
-
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
 
 
 def differences(function, at, step=1e-4):

@@ -19,11 +19,6 @@ GROUPS = ["bottom", "top", "diagonal"]
 FOREIGN, UNNAMED, UNEXPLAINED = "far outside those of the training records", "feature names", "does not explain"
 
 
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
-
-
 def warned(fem, T, F):
     """Severities, and the texts of all warnings."""
     with warnings.catch_warnings(record=True) as caught:
@@ -57,9 +52,8 @@ def test_each_kind_of_warning_comes_once(fem, make_T, kinds):
         pd.testing.assert_series_equal(found, warned(fem, T, F)[0])
 
 
-def test_frames_for_a_chain_without_names(fem):
-    nameless = DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures.to_numpy(), YEAR.frequencies)
-    found, texts, _ = warned(nameless, T, F)
+def test_frames_for_a_chain_without_names(fem, fem_of_arrays):
+    found, texts, _ = warned(fem_of_arrays, T, F.to_numpy())
     assert_each_once(texts, ["but the chain was fitted without feature names; the columns are taken in the order"])
     np.testing.assert_allclose(found, warned(fem, T, F)[0], rtol=1e-6, atol=1e-9)
 
@@ -68,15 +62,14 @@ def test_frames_for_a_chain_without_names(fem):
 def test_networks_of_all_folds_warn_together():
     network = MLPRegressor(hidden_layer_sizes=(5,), max_iter=5, random_state=0)
     fem = DataInformedFEM(make_truss(), mapper=TemperatureMapper(network), random_state=0)
-    fem.fit(YEAR.temperatures, YEAR.frequencies)
+    fem.fit(YEAR.temperatures[::4], YEAR.frequencies[::4])
     with pytest.warns(ConvergenceWarning) as caught:
         identify_damage(fem, T, F, GROUPS, random_state=0)
     assert sum(warning.category is ConvergenceWarning for warning in caught) == 1
 
 
-def test_foreign_weather_of_a_reduced_model():
-    fem = DataInformedFEM(make_truss(), reduce=True, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
-    assert_each_once(warned(fem, T + 60, F)[1], [FOREIGN, "outside the box of the reduced model", UNEXPLAINED])
+def test_foreign_weather_of_a_reduced_model(reduced_fem):
+    assert_each_once(warned(reduced_fem, T + 60, F)[1], [FOREIGN, "outside the box of the reduced model", UNEXPLAINED])
 
 
 def test_what_is_no_fitted_chain_is_named():
