@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
@@ -72,7 +73,7 @@ class TestNarrowBounds:
         model = CountedTruss(frequencies)
         for _ in range(3):
             InverseSurrogate(model, QUADRATIC, memory=str(tmp_path), narrow_bounds=True, **SETTINGS).fit(MEASURED)
-        assert solved.count(400) == 2
+        assert sum(solved) == 800
 
 
 class CountedTruss(CallableModel):
@@ -109,9 +110,9 @@ class TestRoundTrip:
 
     def test_the_chain_reports_it_and_warns_where_records_scatter_less(self):
         air = np.random.default_rng(1).uniform(-5, 30, (300, 1))
-        healthy = TRUSS.frequencies(1 - 0.0005 * (air - 10) * np.ones(4))
+        healthy = TRUSS.frequencies(1 - 0.002 * (air - 10) * np.ones(4))
         linear = TemperatureMapper(LinearRegression())
-        bad = InverseSurrogate(regressor=LinearRegression(), n_samples=100, refine=0, bounds=0.3)
+        bad = InverseSurrogate(regressor=KNeighborsRegressor(), n_samples=100, refine=0, bounds=0.2)
         with pytest.warns(UserWarning, match=r"nominal frequencies into parameters that miss 'f\d' by .* scatter"):
             rough = DataInformedFEM(TRUSS, inverse=bad, mapper=linear, random_state=0).fit(air, healthy)
         np.testing.assert_allclose(rough.report_.round_trip, 100 * rough.inverse_.round_trip())
