@@ -65,11 +65,13 @@ def load_kw51(path: str | PathLike) -> Bunch:
 
     Raises
     ------
+    FileNotFoundError
+        If there is no file at the path.
     ValueError
         If the file is damaged, a field is missing or does not fit the others, a time stamp is repeated, or a value is
         infinite, impossible (frequencies outside 0.1 to 100 Hz, damping ratios outside -1 to 1, temperatures outside
-        -60 to 80 C) or a number that stands for a missing one, such as -999. The error names the file, field, row and
-        column, counted from zero.
+        -60 to 80 C, humidity or wind far outside what is measured) or a number that stands for a missing one, such as
+        -999. The error names the file, field, row (counted from zero) and column.
 
     Warns
     -----
