@@ -1,10 +1,10 @@
 """Files in the format of KW51's monitoring, with random content or a given one."""
 
-import datetime
 import io
 import zipfile
 
 import numpy as np
+import pandas as pd
 import scipy.io
 
 SENSORS = ["aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az"]
@@ -13,10 +13,10 @@ CHANNELS = ["tBD31A", "rhBD31A", "tVL", "rhVL", "vpVL", "grVL", "drVL", "dnrVL",
 N_MODES = 14
 
 
-def date_numbers(n_records, start="2018-10-01"):
-    """MATLAB date numbers of hours."""
-    first = datetime.date.fromisoformat(start).toordinal() + 366
-    return first + np.arange(n_records)[:, np.newaxis] / 24
+def date_numbers(times):
+    """MATLAB date numbers of time stamps, (n, 1)."""
+    days = (pd.DatetimeIndex(times) - pd.Timestamp("1970-01-01")) / pd.Timedelta("1D")
+    return days.to_numpy()[:, np.newaxis] + 719529
 
 
 def cell(texts, *, is_column=False):
@@ -26,9 +26,21 @@ def cell(texts, *, is_column=False):
 
 
 def kw51_fields(
-    n_records=12, *, frequencies=None, damping=None, shapes=None, temperatures=None, seed=0, channels=CHANNELS
+    frequencies=None,
+    damping=None,
+    shapes=None,
+    temperatures=None,
+    *,
+    n_records=12,
+    times=None,
+    channels=CHANNELS,
+    seed=0,
 ):
-    """Fields of the struct `modes`; what is not given is random, with some modes that were not identified."""
+    """Fields of the struct `modes`.
+
+    What is not given is random, with some modes that were not identified, and hourly from 2018-10-01; without shapes
+    there are twelve sensors.
+    """
     random = np.random.default_rng(seed)
     given = [field for field in (frequencies, damping, shapes, temperatures) if field is not None]
     n_records = len(given[0]) if given else n_records
@@ -45,7 +57,7 @@ def kw51_fields(
     if temperatures is None:
         temperatures = random.uniform(0, 30, (n_records, len(channels)))
     return {
-        "sdn": date_numbers(n_records),
+        "sdn": date_numbers(pd.date_range("2018-10-01", periods=n_records, freq="h") if times is None else times),
         "f": np.asarray(frequencies),
         "xi": np.asarray(damping),
         "m": np.asarray(shapes),
@@ -66,8 +78,8 @@ def kw51_bytes(fields, *, compressed=True, zipped=False):
     return packed.getvalue()
 
 
-def write_kw51(path, n_records=12, *, compressed=True, **fields):
+def write_kw51(path, *args, compressed=True, **fields):
     """Write a file, zipped if its name ends so, and return its fields; arguments as those of `kw51_fields`."""
-    written = kw51_fields(n_records, **fields)
+    written = kw51_fields(*args, **fields)
     path.write_bytes(kw51_bytes(written, compressed=compressed, zipped=path.suffix == ".zip"))
     return written

@@ -44,7 +44,7 @@ def file(tmp_path):
 
 @pytest.mark.parametrize("compressed", [False, True])
 def test_a_file_is_read_as_it_was_written(file, compressed):
-    fields = write_kw51(file, 30, compressed=compressed)
+    fields = write_kw51(file, n_records=30, compressed=compressed)
     data = load_kw51(str(file))
     check_equal(data, fields)
     assert data.is_published is None
@@ -98,7 +98,7 @@ def test_the_content_tells_a_zip_file_whatever_its_name(tmp_path):
 
 
 def test_rows_stay_in_the_order_of_the_file(file):
-    fields = kw51_fields(10)
+    fields = kw51_fields(n_records=10)
     order = np.random.default_rng(1).permutation(10)
     shuffled = fields | {name: fields[name][order] for name in ("sdn", "f", "xi", "m", "env")}
     write(file, shuffled)
@@ -108,12 +108,9 @@ def test_rows_stay_in_the_order_of_the_file(file):
 
 
 def test_time_stamps_are_rounded_to_seconds(file):
-    fields = kw51_fields(3)
-    fields["sdn"] = fields["sdn"][:1] + np.array([[0.0], [0.2 / 86400], [30.6 / 86400]])
-    fields["sdn"][1] += 1 / 24
-    write(file, fields)
-    time = load_kw51(file).state.index
-    assert [str(stamp.time()) for stamp in time] == ["00:00:00", "01:00:00", "00:00:31"]
+    stamps = pd.DatetimeIndex(["2019-02-28 23:00:00.2", "2019-03-01 00:59:59.9", "2019-03-01 01:00:30.6"])
+    write_kw51(file, n_records=3, times=stamps)
+    assert (load_kw51(file).state.index == stamps.round("s")).all()
 
 
 FORMS = {
@@ -161,7 +158,7 @@ def big_endian_matrix(kind, shape, *parts, name=b""):
 
 
 def test_a_big_endian_file(file):
-    fields = kw51_fields(5)
+    fields = kw51_fields(n_records=5)
     values = []
     for field in fields.values():
         if field.dtype == object:
@@ -184,18 +181,19 @@ def test_any_campaign_that_is_written_is_read_back_equal(file, data, n_records, 
         return data.draw(arrays(float, shape, elements=st.floats(lowest, highest) | st.just(np.nan)))
 
     modes = (n_records, n_modes)
+    hours = data.draw(st.lists(st.integers(0, 11327), min_size=n_records, max_size=n_records, unique=True))
+    times = pd.Timestamp("2018-10-01") + pd.to_timedelta(hours, unit="h")
     fields = kw51_fields(
         frequencies=drawn(modes, 0.1, 100),
         damping=drawn(modes, -1, 1),
         shapes=drawn((*modes, n_sensors), -2, 2) + 1j * drawn((*modes, n_sensors), -2, 2),
         temperatures=drawn((n_records, data.draw(st.integers(1, 3))), -50, 80),
+        times=times,
     )
-    hours = data.draw(st.lists(st.integers(0, 11327), min_size=n_records, max_size=n_records, unique=True))
-    fields["sdn"] = fields["sdn"][0] + np.array(hours)[:, np.newaxis] / 24
     write(file, fields, compressed=data.draw(st.booleans()))
     loaded = load_kw51(file)
     check_equal(loaded, fields)
-    assert (loaded.state.index == pd.Timestamp("2018-10-01") + pd.to_timedelta(hours, unit="h")).all()
+    assert (loaded.state.index == times).all()
 
 
 def replaced(name, place, value):
