@@ -14,8 +14,9 @@ from skthermo._validation import Interval, _fit_context, check_is_fitted
 from skthermo.preprocessing._assignment import Pairs, close_modes, fitting_pairs
 from skthermo.preprocessing._following import assign_near, assign_while_following
 from skthermo.preprocessing._poles import Poles, read_poles
-from skthermo.preprocessing._reference_modes import read_reference, warn_of_alike
+from skthermo.preprocessing._reference_modes import ReferenceModes, read_reference, warn_of_alike
 from skthermo.preprocessing._stamps import as_duration, as_stamps
+from skthermo.preprocessing._tracked_modes import tracked_modes
 from skthermo.preprocessing._tracking_warnings import warn_of_losses, warn_of_unknown_shapes
 
 
@@ -29,8 +30,8 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
     Parameters
     ----------
     reference : tuple or mapping
-        Frequencies in Hz, (n_modes,), and shapes at the sensors, (n_sensors, n_modes), real or complex, of any scale and
-        phase; from an FE model, ``(f[0], phi[0][dofs])`` after ``f, phi = model.modes(theta)``. A mapping has
+        Frequencies in Hz, (n_modes,), and shapes at the sensors, (n_sensors, n_modes), real or complex, of any scale
+        and phase; from an FE model, ``(f[0], phi[0][dofs])`` after ``f, phi = model.modes(theta)``. A mapping has
         ``frequencies``, ``shapes`` and, optionally, ``sensors``, names by which the sensors of the records are chosen.
         Shapes may be None: then frequency alone decides. If frequencies are a Series, its index names the modes.
     max_shift : float, default=0.15
@@ -38,9 +39,9 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
     min_mac : float, default=0.8
         Lowest modal assurance criterion (MAC) of a pole's shape and that of its mode.
     follow : float, str, timedelta or None, default=None
-        Time constant with which exponential means of the assigned frequencies replace those of the reference: a number of
-        records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step. None
-        keeps the reference. Shapes are always compared with those of the reference.
+        Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
+        of records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step.
+        None keeps the reference. Shapes are always compared with those of the reference.
     max_drift : float, default=0.3
         Largest relative difference of a followed frequency from that of the reference.
     close : float, default=0.02
@@ -69,7 +70,8 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
     more than any candidate, so that no pole which fits stays unused without need. Modes that swap order thus follow
     their shapes. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is lower
     is added; with no more sensors than close modes, every shape lies in that space, and they count as distinct.
-    NaN components of a shape, from sensors that failed, are left out of its MAC.
+    NaN components of a shape, from sensors that failed, are left out of its MAC. Noise of a share e of the root mean
+    square of a shape's components lowers its MAC to about 1 / (1 + e^2), which ``min_mac`` should be well below.
 
     With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
     mode that is missing keeps its mean. Means are moved only by poles that have the shape of the reference.
@@ -169,11 +171,12 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         Parameters
         ----------
         X : mapping, sequence of mappings, DataFrame or ndarray
-            The poles. A mapping has, for all records, ``frequencies`` in Hz (n_records, n_poles) with NaN where there is
-            no pole, ``shapes`` (n_records, n_poles, n_sensors), and, optionally, ``damping`` (n_records, n_poles) and
-            ``sensors``; or lists of arrays, one a record, of different numbers of poles: (n_poles,), (n_poles,
+            The poles. A mapping has, for all records, ``frequencies`` in Hz (n_records, n_poles) with NaN where there
+            is no pole, ``shapes`` (n_records, n_poles, n_sensors), and, optionally, ``damping`` (n_records, n_poles)
+            and ``sensors``; or lists of arrays, one a record, of different numbers of poles: (n_poles,), (n_poles,
             n_sensors) and (n_poles,). A sequence has such a mapping for each record. A table holds frequencies
-            alone. Other fields are ignored, except ``index``, which gives the index of records that are not pandas objects.
+            alone. Other fields are ignored, except ``index``, which gives the index of records that are not pandas
+            objects.
 
         Returns
         -------
@@ -194,8 +197,8 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
                 Frequencies of the reference, or their means with ``follow``, with which each record was compared.
             summary : DataFrame
                 For each mode, the reference's frequency and the median of those assigned in Hz, the number and
-                share of records that have it, the share of these that are ambiguous because another pole fits the mode or
-                the pole fits another mode, and the median MAC.
+                share of records that have it, the share of these that are ambiguous because another pole fits the mode
+                or the pole fits another mode, and the median MAC.
 
         Raises
         ------
@@ -210,10 +213,10 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
             frequency; if poles have no shape.
         """
         check_is_fitted(self)
+        modes = ReferenceModes(self.frequencies_, self.shapes_, self.mode_names_, self.sensors_)
         poles = read_poles(X, self.sensors_, None if self.shapes_ is None else len(self.shapes_))
-        reference = (self.frequencies_, self.shapes_)
         groups = close_modes(self.frequencies_, self.close)
-        pairs = fitting_pairs(poles.frequencies, poles.shapes, reference, self.min_mac, groups)
+        pairs = fitting_pairs(poles.frequencies, poles.shapes, modes[:2], self.min_mac, groups)
         record, frequencies = poles.record[pairs.pole], poles.frequencies[pairs.pole]
         followed = np.tile(self.frequencies_, (len(poles.index), 1))
         if self.follow is None:
@@ -230,7 +233,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
                 n_records=n_records,
                 max_drift=self.max_drift,
             )
-        result = self._result(poles, pairs.at(chosen), pairs.at(near), followed)
+        result = tracked_modes(poles, pairs.at(chosen), pairs.at(near), followed, modes)
         if poles.shapes is not None:
             self._warn(poles, pairs, chosen, followed, result.frequencies.notna().to_numpy())
         return result
@@ -269,55 +272,6 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
             raise ValueError(f"follow is {self.follow!r}, shorter than the records' median step; expected more")
         return order, n_records
 
-    def _result(self, poles: Poles, chosen: Pairs, near: Pairs, followed: NDArray) -> Bunch:
-        names, n_records, n_modes = self.mode_names_, len(poles.index), len(self.mode_names_)
-        at = poles.record[chosen.pole], chosen.mode
-
-        def table(values: NDArray, missing: float = np.nan, columns: list[str] = names) -> pd.DataFrame:
-            cells = np.full((n_records, n_modes), missing, dtype=values.dtype)
-            cells[at] = values
-            return pd.DataFrame(cells, poles.index, columns)
-
-        frequencies = table(poles.frequencies[chosen.pole])
-        damping = None
-        if poles.damping is not None:
-            damping = table(poles.damping[chosen.pole], columns=[damping_name(name) for name in names])
-        shapes = mac = None
-        if poles.shapes is not None:
-            mac = table(chosen.mac)
-            in_phase = aligned(poles.shapes[chosen.pole], self.shapes_.T[chosen.mode])
-            shapes = np.full((n_records, n_modes, len(self.shapes_)), np.nan, dtype=in_phase.dtype)
-            shapes[at] = in_phase
-        n_poles = np.bincount(poles.record, minlength=n_records)
-        n_assigned = np.bincount(at[0], minlength=n_records)
-        rivals = np.bincount(poles.record[near.pole] * n_modes + near.mode, minlength=n_records * n_modes)
-        uses = np.bincount(near.pole, minlength=len(poles.record))
-        ambiguous = (rivals[at[0] * n_modes + at[1]] > 1) | (uses[chosen.pole] > 1)
-        n_found = frequencies.notna().sum()
-        with np.errstate(invalid="ignore"):
-            share_ambiguous = np.bincount(chosen.mode, ambiguous, minlength=n_modes) / n_found.to_numpy()
-        summary = pd.DataFrame(
-            {
-                "reference": self.frequencies_,
-                "frequency": frequencies.median(),
-                "n_records": n_found,
-                "share": n_found / max(n_records, 1),
-                "ambiguous": share_ambiguous,
-                "mac": np.nan if mac is None else mac.median(),
-            },
-            index=pd.Index(names, name="mode"),
-        )
-        return Bunch(
-            frequencies=frequencies,
-            damping=damping,
-            shapes=shapes,
-            mac=mac,
-            poles=table(poles.column[chosen.pole], -1),
-            left_over=pd.Series(n_poles - n_assigned, poles.index, name="left_over"),
-            followed=pd.DataFrame(followed, poles.index, names),
-            summary=summary,
-        )
-
     def _warn(self, poles: Poles, pairs: Pairs, chosen: NDArray, followed: NDArray, found: NDArray) -> None:
         left = pairs.at(~np.isin(pairs.pole, pairs.pole[chosen]))
         record = poles.record[left.pole]
@@ -332,15 +286,3 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         tags.input_tags.two_d_array = False
         tags.input_tags.allow_nan = True
         return tags
-
-
-def damping_name(mode: str) -> str:
-    """Name of a mode's damping ratio: xi3 for f3, xi_sway for sway."""
-    return f"xi{mode[1:]}" if mode[:1] == "f" and mode[1:].isdigit() else f"xi_{mode}"
-
-
-def aligned(shapes: NDArray, reference: NDArray) -> NDArray:
-    """Shapes (n, n_sensors) times the complex number of modulus 1 that makes their product with the reference positive."""
-    products = np.nansum(shapes * reference.conj(), axis=1, keepdims=True)
-    sizes = np.abs(products)
-    return shapes * np.divide(products.conj(), sizes, out=np.ones_like(products), where=sizes > 0)

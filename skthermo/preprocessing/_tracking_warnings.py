@@ -7,7 +7,6 @@ from skthermo._warnings import warn_user
 from skthermo.preprocessing._assignment import Pairs
 
 FEW_RECORDS = 20  # too few for a warning that a mode is missing
-RAD_PER_CYCLE = 2 * np.pi
 
 
 def warn_of_losses(
@@ -35,10 +34,11 @@ def warn_of_losses(
     """
     lost = ~found[record, pairs.mode]
     mode, record, ratio = pairs.mode[lost], record[lost], ratio[lost]
-    in_rad = np.abs(np.abs(np.log(ratio)) / np.log(RAD_PER_CYCLE) - 1) < 0.1
-    if in_rad.sum() > max(10 * found.sum(), len(ratio) / 2):
+    in_rad = np.maximum(ratio, 1 / ratio) / (2 * np.pi)
+    n_in_rad = (np.abs(in_rad - 1) < 0.15).sum()
+    if n_in_rad > max(FEW_RECORDS / 2, 10 * found.sum(), len(ratio) / 2):
         raise ValueError(
-            f"{in_rad.sum()} poles have the shapes of reference modes and about {np.median(ratio[in_rad]):.3g} times their "
+            f"{n_in_rad} poles have the shapes of reference modes and about {np.median(ratio):.3g} times their "
             f"frequencies, and {found.sum()} have their frequencies: rad/s? expected Hz in both"
         )
     problems = []
@@ -65,7 +65,7 @@ def warn_of_unknown_shapes(n_without: int, n_poles: int) -> None:
     """Warn of poles that have a frequency but no shape."""
     if n_without:
         warn_user(
-            f"{n_without} of {n_poles} poles have a frequency but no shape: zero, or NaN at all sensors but one; they are "
-            "left over",
+            f"{n_without} of {n_poles} poles have a frequency but no shape: zero, or NaN at all sensors but one; they "
+            "are left over",
             "poles without shape",
         )
