@@ -45,16 +45,12 @@ def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
     ValueError
         If a field is missing, the fields do not fit each other or the sensors, or a frequency is not positive.
     """
-    fields = _fields(X)
+    fields, given_sensors = _fields(X)
     if n_sensors is not None and fields["shapes"] is None:
         raise ValueError("X has no 'shapes'; expected mode shapes, as in the reference, or a reference without shapes")
     if n_sensors is None:
         fields["shapes"] = None
-    frequencies = fields["frequencies"]
-    if isinstance(frequencies, pd.DataFrame) or np.ndim(without_ragged(frequencies)) == 2:
-        poles = _from_arrays(**fields)
-    else:
-        poles = _from_lists(**fields)
+    poles = (_from_arrays if is_table(fields["frequencies"]) else _from_lists)(**fields)
     wrong = ~(np.isfinite(poles.frequencies) & (poles.frequencies > 0))
     if wrong.any():
         pole = np.flatnonzero(wrong)[0]
@@ -64,7 +60,9 @@ def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
         )
     if poles.shapes is None:
         return poles
-    shapes = _chosen_sensors(poles.shapes, getattr(X, "get", {}.get)("sensors"), sensors)
+    shapes = _chosen_sensors(poles.shapes, given_sensors, sensors)
+    if not len(shapes):
+        shapes = np.empty((0, n_sensors or 0), dtype=shapes.dtype)
     if shapes.shape[1] != n_sensors:
         raise ValueError(f"shapes of X have {shapes.shape[1]} sensors; expected {n_sensors}, as in the reference")
     if np.isinf(shapes).any():
@@ -72,18 +70,21 @@ def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
     return poles._replace(shapes=shapes)
 
 
-def without_ragged(values: Any) -> Any:
-    """Values as an array where all entries have the same length, else as they are."""
-    return np.asarray(values) if isinstance(values, np.ndarray) and values.dtype != object else ()
+def is_table(values: Any) -> bool:
+    """Whether values are a frame or a two-dimensional array, not a list of arrays."""
+    return isinstance(values, pd.DataFrame) or (
+        isinstance(values, np.ndarray) and values.dtype != object and values.ndim == 2
+    )
 
 
-def _fields(X: Any) -> dict[str, Any]:
-    """Frequencies, damping ratios, shapes and index of all records."""
+def _fields(X: Any) -> tuple[dict[str, Any], Any]:
+    """Frequencies, damping ratios, shapes and index of all records, and the names of their sensors."""
+    sensors = None
     if isinstance(X, Mapping):
-        fields = {name: X.get(name) for name in FIELDS}
+        fields, sensors = {name: X.get(name) for name in FIELDS}, X.get("sensors")
         if fields["frequencies"] is None:
             raise ValueError(f"X has the fields {list(X)}; expected 'frequencies', and mostly 'shapes' and 'damping'")
-    elif isinstance(X, pd.DataFrame) or np.ndim(without_ragged(X)) == 2:
+    elif is_table(X):
         fields = {"frequencies": X, "damping": None, "shapes": None}
     elif isinstance(X, Sequence | pd.Series) and len(X) and all(isinstance(record, Mapping) for record in X):
         fields = {}
@@ -94,6 +95,10 @@ def _fields(X: Any) -> dict[str, Any]:
             fields[name] = [record[name] for record in X] if any(has) else None
         if fields["frequencies"] is None:
             raise ValueError(f"record 0 has the fields {list(next(iter(X)))}; expected 'frequencies'")
+        names = {None if record.get("sensors") is None else tuple(record["sensors"]) for record in X}
+        if len(names) > 1:
+            raise ValueError(f"records name different sensors, such as {list(names)[:2]}; expected the same in all")
+        sensors = names.pop()
     else:
         raise ValueError(
             f"X is of type {type(X).__name__}; expected a mapping with 'frequencies', 'shapes' and 'damping' of all "
@@ -106,7 +111,7 @@ def _fields(X: Any) -> dict[str, Any]:
     fields["index"] = pd.RangeIndex(len(frequencies)) if index is None else pd.Index(index)
     if len(fields["index"]) != len(frequencies):
         raise ValueError(f"the index has {len(fields['index'])} entries; expected {len(frequencies)}, one a record")
-    return fields
+    return fields, sensors
 
 
 def _from_arrays(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -> Poles:
@@ -152,7 +157,7 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
     """One array for each record, of as many entries as the record has frequencies."""
     if len(values) != len(lengths):
         raise ValueError(f"{what} has {len(values)} records and frequencies {len(lengths)}; expected the same number")
-    rows = [_numbers(row, what) for row in values]
+    rows = [as_floats(row) if what == "damping" else _numbers(row, what) for row in values]
     for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
         if length == 0 and row.size == 0:
             rows[i] = np.empty((0,) * ndim)
@@ -165,11 +170,13 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
 def _numbers(values: Any, what: str) -> NDArray:
     try:
         array = np.asarray(without_mask(values))
-        return array.astype(np.result_type(array.dtype, np.float32), copy=False)
+        if array.dtype.kind == "O":
+            array = array.astype(complex)
     except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"{what} of X is not an array of numbers ({error}); expected numbers, real or complex"
-        ) from error
+        raise ValueError(f"{what} of X is no array of numbers ({error}); expected numbers, real or complex") from error
+    if array.dtype.kind not in "biufc":
+        raise ValueError(f"{what} of X is of type {array.dtype}; expected numbers, real or complex")
+    return array.astype(np.result_type(array.dtype, np.float32), copy=False)
 
 
 def _chosen_sensors(shapes: NDArray, given: Any, wanted: list | None) -> NDArray:

@@ -2,14 +2,17 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/mode_tracker.py
 
-A cell is a record and a mode. It is right if the mode's true pole is assigned, or none where the mode is missing. Eight
-modes at random real shapes vary by up to 5 % with a year's temperature; two of them cross. A fifth of the modes is missing
-in each record, and 40 % of all poles are spurious: at random frequencies, with shapes that mix those of all modes at random.
-Shape noise is complex, and relative to the root mean square of a shape's components.
+A cell is a record and a mode. It is right if the mode's true pole is assigned, or none where the mode is missing.
+
+Eight modes of random real shapes vary by up to 5 % with a year's temperature, and two of them cross. A fifth of the
+modes is missing in each record, and 40 % of all poles are spurious: at random frequencies, with shapes that mix those of all
+modes, or of the two nearest, at random. Shape noise is complex, and relative to the root mean square of a shape's
+components.
 """
 
 import argparse
 import time
+import warnings
 
 import numpy as np
 
@@ -75,8 +78,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--records", type=int, default=10_000)
     options = parser.parse_args()
-    import warnings
-
     warnings.simplefilter("ignore")  # on modes that frequency alone confuses
     records, true, reference = simulated_poles(options.records)
     for follow in (None, 200):

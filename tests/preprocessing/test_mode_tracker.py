@@ -2,9 +2,7 @@
 
 import itertools
 import pickle
-import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -17,9 +15,7 @@ from sklearn.utils import Bunch
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
 from skthermo.preprocessing._assignment import MISSED, assign, shape_agreement
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from mode_tracker import right, simulated_poles, ways
+from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)
 F0, PHI = np.array([2.0, 2.3, 4.0]), RNG.normal(size=(6, 3))
@@ -261,7 +257,7 @@ def test_no_records_and_empty_records():
 def test_modes_never_found_and_modes_found_elsewhere_give_one_warning():
     raw = padded(F0 * [1, 1.3, 1], extra=1)
     raw.frequencies[:, 3] = np.nan
-    with pytest.warns(UserWarning) as caught:
+    with pytest.warns(UserWarning, match="found in none") as caught:
         ModeTracker((F0, PHI)).fit_transform(raw)
     assert len(caught) == 1
     assert "['f2', 'f3'] are found in none of 50" in str(caught[0].message)
@@ -302,7 +298,9 @@ def test_rad_per_second_is_an_error(factor):
         ({"shapes": GOOD.shapes[:, :, :5]}, "have 5 sensors; expected 6"),
         ({"shapes": GOOD.shapes.transpose(0, 2, 1)}, r"shapes has shape \(12, 6, 3\); expected \(12, 3"),
         ({"shapes": GOOD.shapes * np.inf}, "infinite"),
-        ({"shapes": [["a"]]}, "not an array of numbers"),
+        ({"shapes": [["a"]]}, "expected numbers, real or complex"),
+        ({"shapes": [[1, 2], [3]]}, "no array of numbers"),
+        ({"damping": GOOD.damping * 1j}, "complex"),
         ({"damping": GOOD.damping[:5]}, "frequencies has 12 rows and damping 5"),
         ({"frequencies": list(GOOD.frequencies), "shapes": list(GOOD.shapes)[:5]}, "shapes has 5 records"),
         ({"frequencies": list(GOOD.frequencies), "shapes": list(GOOD.shapes[:, :2])}, r"record 0 has shape \(2, 6\)"),
