@@ -5,8 +5,8 @@
 A cell is a record and a mode. It is right if the mode's true pole is assigned, or none where the mode is missing.
 
 Eight modes of random real shapes vary by up to 5 % with a year's temperature, and two of them cross. A fifth of the
-modes is missing in each record, and 40 % of all poles are spurious: at random frequencies, with shapes that mix those of all
-modes, or of the two nearest, at random. Shape noise is complex, and relative to the root mean square of a shape's
+modes is missing in each record, and 40 % of all poles are spurious: at random frequencies, with shapes that mix those of
+all modes, or of the two nearest, at random. Shape noise is complex, and relative to the root mean square of a shape's
 components.
 """
 
