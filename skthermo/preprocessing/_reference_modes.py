@@ -45,8 +45,9 @@ def read_reference(reference: Any) -> ReferenceModes:
     if not (np.isfinite(frequencies) & (frequencies > 0)).all():
         raise ValueError(f"reference frequencies are {frequencies}; expected positive values in Hz")
     n_modes = len(frequencies)
-    names = [str(name) for name in given.index] if isinstance(given, pd.Series) else None
-    names = names or [f"f{mode + 1}" for mode in range(n_modes)]
+    names = [f"f{mode + 1}" for mode in range(n_modes)]
+    if isinstance(given, pd.Series) and not isinstance(given.index, pd.RangeIndex):
+        names = [str(name) for name in given.index]
     if len(set(names)) < n_modes:
         raise ValueError(f"reference modes are named {names}; expected different names")
     if shapes is not None:
@@ -80,8 +81,8 @@ def warn_of_alike(modes: ReferenceModes, max_shift: float, min_mac: float) -> No
         first = "/".join(modes.names[mode] for mode in pairs[alike][0])
         by = "no shapes are given" if modes.shapes is None else f"their shapes at the sensors have a MAC of {min_mac:g}"
         warn_user(
-            f"{alike.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: frequencies "
-            f"that differ from both by at most max_shift={max_shift:g} exist, and {by}"
+            f"{alike.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
+            f"frequency can lie within max_shift={max_shift:g} of both, and {by}"
             f"{'' if modes.shapes is None else ' or more'}; expected a smaller max_shift, or more sensors",
             "modes that can be confused",
         )
