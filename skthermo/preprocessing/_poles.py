@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import as_floats, without_mask
+from skthermo._arrays import as_floats, real_array, without_mask
 from skthermo._frames import check_same_rows
 
 FIELDS = ("frequencies", "damping", "shapes")
@@ -126,13 +126,13 @@ def _from_arrays(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -
     if shapes is not None:
         shapes = _numbers(shapes, "shapes")
         if shapes.ndim != 3 or shapes.shape[:2] != F.shape:
-            raise ValueError(f"shapes has shape {shapes.shape}; expected {F.shape + ('n_sensors',)}")
+            raise ValueError(f"shapes have shape {shapes.shape}; expected {F.shape + ('n_sensors',)}")
         shapes = shapes[record, column]
     return Poles(record, column, F[record, column], damping, shapes, index)
 
 
 def _from_lists(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -> Poles:
-    rows = [as_floats(row) for row in frequencies]
+    rows = [real_array(row, f"frequencies of record {i}") for i, row in enumerate(frequencies)]
     for i, row in enumerate(rows):
         if row.ndim != 1:
             raise ValueError(f"frequencies of record {i} have shape {row.shape}; expected a vector for each record")
@@ -163,7 +163,7 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
             rows[i] = np.empty((0,) * ndim)
         elif row.ndim != ndim or len(row) != length:
             expected = (int(length),) if ndim == 1 else (int(length), "n_sensors")
-            raise ValueError(f"{what} of record {i} has shape {row.shape}; expected {expected}")
+            raise ValueError(f"{what} of record {i} have shape {row.shape}; expected {expected}")
     return rows
 
 
