@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,24 +12,15 @@ from sklearn.utils import Bunch, check_random_state
 
 from skthermo._arrays import Bounds, as_floats
 from skthermo._frames import column_names, frame_like
-from skthermo._models import check_model
-from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, validate_data
-from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, add_noise, check_bounds, check_noise, check_theta, evaluate
-from skthermo.surrogate._box import Box
-from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
+from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted
+from skthermo.fem import FEModel, check_theta, evaluate
 from skthermo.surrogate._networks import default_network
-from skthermo.surrogate._refined_inverse import RefinedInverse
 from skthermo.surrogate._refinement import Refinement
-from skthermo.surrogate._regression import MultiplierRegressor
-from skthermo.surrogate._simulator import Simulator, tolerance
-
-MANY_REORDERED = 0.1
-"""Share of simulations with modes in another order above which a warning is given. A share of 5 % does not harm the
-truss's results; 29 % doubles the error of Z24."""
+from skthermo.surrogate._simulated_training import SimulatedTraining
+from skthermo.surrogate._simulator import Simulator
 
 
-class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
+class InverseSurrogate(TransformerMixin, SimulatedTraining):
     """Parameters of an FE model from frequencies, learned from simulations; eqs. (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
@@ -48,6 +38,9 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         parameter to its half-width or to (lowest, highest).
     n_samples : int, default=1000
         Number of simulations.
+    narrow_bounds : bool, default=False
+        Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
+        records that `fit` sees have their parameters. An inverse that is not refined becomes several times as accurate.
     noise : float or array-like of shape (n_modes,), default=0.0
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
@@ -84,7 +77,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     samples_ : Bunch
         ``theta`` and ``frequencies`` of the training samples, before noise.
     box_ : Box or None
-        The bounds, if the samples were simulated; else None.
+        The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
@@ -131,6 +124,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         "regressor": [HasMethods(["fit", "predict"]), None],
         "bounds": [Real, "array-like", dict],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
+        "narrow_bounds": ["boolean"],
         "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
         "refine": [Interval(Integral, 0, None, closed="left"), None],
         "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
@@ -147,6 +141,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         *,
         bounds: Bounds = 0.3,
         n_samples: int = 1000,
+        narrow_bounds: bool = False,
         noise: ArrayLike = 0.0,
         refine: int | None = None,
         prior: ArrayLike | Mapping[str, float] | None = None,
@@ -159,6 +154,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         self.regressor = regressor
         self.bounds = bounds
         self.n_samples = n_samples
+        self.narrow_bounds = narrow_bounds
         self.noise = noise
         self.refine = refine
         self.prior = prior
@@ -174,7 +170,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes), optional
-            Frequencies in Hz. Without y only the number and names of the columns are used.
+            Frequencies in Hz. Without y they give the columns, ``scatter_`` and, with ``narrow_bounds``, the bounds.
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
             Multipliers of each row of X. Without y, frequencies and multipliers are simulated.
 
@@ -199,7 +195,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         random = check_random_state(self.random_state)
         self.box_ = None
         self.n_steps_ = self._n_steps()
-        if self.model is not None and y is None:
+        is_simulated = self.model is not None and y is None
+        if is_simulated:
             frequencies, theta = self._simulate(X, random)
         else:
             frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
@@ -208,7 +205,10 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
                 self.parameter_names_ = list(self.model.parameter_names)
                 self.simulator_ = Simulator(self.model)
             self.samples_ = Bunch(theta=theta, frequencies=frequencies)
-        self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
+        seed = None if self.random_state is None else random
+        self._learn(frequencies, theta, seed, log_inputs=True)
+        if is_simulated and self.narrow_bounds:
+            self._learn(*self._simulate_narrower(X, random), seed, log_inputs=True)
         if self.n_steps_:
             self.refinement_ = Refinement.of(self)
             self.scatter_ = self._scatter(X)
@@ -302,40 +302,6 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     def _scatter(self, X: ArrayLike | None) -> NDArray[np.float64]:
         measured = np.ones((0, self.model.n_modes)) if X is None else self._read_inputs(X)
         return self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
-
-    def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
-        check_model(self.model)
-        model = self.model
-        names_only = np.ones((1, model.n_modes)) if X is None else X
-        n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
-        if n_modes != model.n_modes:
-            raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
-        check_noise(self.noise, n_modes)
-        n_parameters = len(model.parameter_names)
-        if n_parameters > model.n_modes:
-            warn_user(
-                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
-                "expected more modes, or the noise of the measurement, so that the prior decides between them",
-                "few modes",
-            )
-        self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
-        is_remembered = self.memory is not None and self.random_state is None
-        seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
-        tol = tolerance(self.model, self.reduce)
-        drawn, share_reordered, reduced = remembered_simulations(
-            self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed
-        )
-        if share_reordered > MANY_REORDERED:
-            warn_user(
-                f"modes change their order in {share_reordered:.1%} of {min(self.n_samples, ORDER_CHECKS)} samples of "
-                "the box, and the model sorts them: expected narrower bounds, or a model with track=True",
-                "order of modes",
-            )
-        self.samples_ = drawn
-        self.simulator_ = Simulator(model, reduced, self.box_.bounds)
-        self.parameter_names_ = list(model.parameter_names)
-        self.y_is_vector_ = False
-        return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
 
     def _read_inputs(self, X: ArrayLike) -> NDArray[np.float64]:
         has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
