@@ -1,5 +1,7 @@
 """The retrofit of KW51: what it adds, and when."""
 
+from collections.abc import Hashable
+
 import numpy as np
 import pandas as pd
 
@@ -16,7 +18,7 @@ PROGRESS = pd.DataFrame(
 )
 
 
-def joint_masses() -> dict[object, PointMass]:
+def joint_masses() -> dict[Hashable, PointMass]:
     """A point mass at every joint."""
     joints = [node for node in kw51_structure().nodes if node[0] == "joint"]
     return {("mass", node): PointMass(node, ADDED[node[-1]]) for node in joints}

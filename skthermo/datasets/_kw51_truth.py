@@ -1,6 +1,6 @@
 """The bridge behind `make_kw51_campaign`: how weather moves its stiffness and mass."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -25,7 +25,7 @@ TRUTH = {
 }
 """Parameters of the healthy bridge, as `Structure.assemble` binds them."""
 
-BOX = {
+BOX: dict[str, float | tuple[float, float]] = {
     **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
     "E_con": 0.035,
     "E_b": (0.9, 1.7),
@@ -61,11 +61,13 @@ def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def truth_structure(added: Mapping[object, Element] | None = None) -> Structure:
+def truth_structure(added: Mapping[Hashable, Element] | None = None) -> Structure:
     """KW51 with bearings that resist sliding and rocking, and with members that are added as the group "added"."""
     bridge, added = kw51_structure(), added or {}
     ends, lines = (0, N_BAYS), (0, N_PANELS)
-    bearings = {("bearing", end, "x"): Spring(("deck", end, N_PANELS), "x", SLIDING) for end in ends}
+    bearings: dict[Hashable, Element] = {
+        ("bearing", end, "x"): Spring(("deck", end, N_PANELS), "x", SLIDING) for end in ends
+    }
     bearings |= {
         ("bearing", end, line, "ry"): Spring(("deck", end, line), "ry", ROCKING) for end in ends for line in lines
     }
