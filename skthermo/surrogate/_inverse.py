@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arrays import Bounds, as_floats
-from skthermo._frames import column_names, frame_like
+from skthermo._arrays import Bounds
+from skthermo._frames import frame_like
 from skthermo._models import check_model
-from skthermo._validation import HasMethods, Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._validation import HasMethods, Interval, _fit_context
 from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, add_noise, check_bounds, check_noise, check_theta, evaluate
+from skthermo.fem import FEModel, check_bounds, check_noise, check_theta
 from skthermo.surrogate._box import Box
+from skthermo.surrogate._inverse_inputs import InverseInputs
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._refined_inverse import RefinedInverse
@@ -30,8 +31,8 @@ MANY_REORDERED = 0.1
 truss's results; 29 % doubles the error of Z24."""
 
 
-class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
-    """Parameters of an FE model from frequencies, learned from simulations; eqs. (3)-(4).
+class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, MultiplierRegressor):
+    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; eqs. (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
 
@@ -53,12 +54,18 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
         refining finds the posterior mode. With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode
         is missing).
+    dofs : array-like of int of shape (n_sensors,), optional
+        Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
+        frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
+        Components are real, of any scale and sign; `skthermo.fem.shape_components` makes them of complex shapes.
+    shape_noise : float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of the measured components of a shape as a share of their root mean square.
     refine : int, optional
         Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row,
-        until the model has the measured frequencies (or, with ``noise``, until the posterior is largest). Rows with
-        some modes missing are estimated from the others. By default 100 for a model that gives exact derivatives
-        (``linearised`` or ``jacobian``), else 0. With a number above 0, other models are differentiated by central
-        differences: 2 n_parameters + 1 solutions a step and row.
+        until the model has the measured frequencies (or, with ``noise`` or ``dofs``, until the posterior is largest).
+        Rows with some modes missing are estimated from the others. By default 100 for a model that gives exact
+        derivatives (``linearised`` or ``jacobian``; with ``dofs``, ``linearised_modes``), else 0. With a number above
+        0, other models are differentiated by central differences: 2 n_parameters + 1 solutions a step and row.
     prior : float, array-like of shape (n_parameters,) or mapping, optional
         Standard deviations of a Gaussian prior of ln theta about the middle of the bounds, for refining. By default
         that of values spread evenly over the box.
@@ -82,7 +89,9 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     inputs_, targets_ : Standardiser
         Means and scales of the log frequencies and of the log parameters.
     samples_ : Bunch
-        ``theta`` and ``frequencies`` of the training samples, before noise.
+        ``theta``, ``frequencies`` and, with ``dofs``, ``shapes`` of the training samples, before noise.
+    shape_inputs_ : ShapeInputs or None
+        With ``dofs``: how columns of shapes are read.
     box_ : Box or None
         The bounds, if the samples were simulated; else None.
     n_steps_ : int
@@ -95,9 +104,9 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
     parameter_names_ : list of str or None
         Their names: the model's, or those of the frame that `fit` saw.
     n_features_in_ : int
-        Number of modes.
+        Number of columns of X.
     feature_names_in_ : ndarray of str
-        Names of the modes, where `fit` saw a frame with such names.
+        Their names, where `fit` saw a frame with such names.
 
     Notes
     -----
@@ -132,6 +141,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         "bounds": [Real, "array-like", dict],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
         "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "dofs": ["array-like", None],
+        "shape_noise": [Interval(Real, 0, 1, closed="neither"), "array-like"],
         "refine": [Interval(Integral, 0, None, closed="left"), None],
         "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
@@ -148,6 +159,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         bounds: Bounds = 0.3,
         n_samples: int = 1000,
         noise: ArrayLike = 0.0,
+        dofs: ArrayLike | None = None,
+        shape_noise: ArrayLike = 0.01,
         refine: int | None = None,
         prior: ArrayLike | Mapping[str, float] | None = None,
         reduce: bool | float = False,
@@ -160,6 +173,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         self.bounds = bounds
         self.n_samples = n_samples
         self.noise = noise
+        self.dofs = dofs
+        self.shape_noise = shape_noise
         self.refine = refine
         self.prior = prior
         self.reduce = reduce
@@ -174,7 +189,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes), optional
-            Frequencies in Hz. Without y only the number and names of the columns are used.
+            Frequencies in Hz and, with ``dofs``, components of shapes. Without y only the number and names of the
+            columns are used.
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
             Multipliers of each row of X. Without y, frequencies and multipliers are simulated.
 
@@ -199,16 +215,18 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         random = check_random_state(self.random_state)
         self.box_ = None
         self.n_steps_ = self._n_steps()
+        self.shape_inputs_ = self._read_dofs()
         if self.model is not None and y is None:
-            frequencies, theta = self._simulate(X, random)
+            inputs, theta = self._simulate(X, random)
         else:
-            frequencies, theta = self._read_xy(X, y, ("frequencies", "theta"))
+            inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
             if self.model is not None:
                 check_theta(theta, self.model.parameter_names, allow_nan=True)
                 self.parameter_names_ = list(self.model.parameter_names)
                 self.simulator_ = Simulator(self.model)
-            self.samples_ = Bunch(theta=theta, frequencies=frequencies)
-        self._learn(frequencies, theta, None if self.random_state is None else random, log_inputs=True)
+            self.samples_ = Bunch(theta=theta, frequencies=inputs)
+        inputs = self._scored(inputs, theta)
+        self._learn(inputs, theta, None if self.random_state is None else random, log_inputs=True)
         if self.n_steps_:
             self.refinement_ = Refinement.of(self)
             self.scatter_ = self._scatter(X)
@@ -219,8 +237,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
+        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+            Frequencies in Hz and, with ``dofs``, components of shapes.
         y : array-like of shape (n_samples, ...), optional
             Without a model, the multipliers of each row of X. With a model y is ignored, because the inverse learns
             from simulations; in a pipeline, y is the target of a later step.
@@ -237,8 +255,8 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
+        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+            Frequencies in Hz and, with ``dofs``, components of shapes.
 
         Returns
         -------
@@ -257,60 +275,11 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
             self._warn_of_box(theta, self.box_.far_outside(theta))
         return frame_like(X, theta, self.get_feature_names_out())
 
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Frequencies of given parameters, computed by the FE model.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_parameters)
-            Multipliers.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz; NaN in rows with NaN. A frame, whose columns must be the model's parameters, gives a
-            frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If the estimator has no model, or the parameters are not the model's.
-        """
-        check_is_fitted(self)
-        if self.model is None:
-            raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
-        modes = getattr(self, "feature_names_in_", [f"f{i + 1}" for i in range(self.model.n_modes)])
-        return frame_like(X, evaluate(self.model, X, n_jobs=self.n_jobs), modes)
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the parameters.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Ignored.
-
-        Returns
-        -------
-        ndarray of str
-            The model's parameter names, else y's columns, else theta1, theta2, ...
-        """
-        check_is_fitted(self)
-        numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
-        return np.array(self.parameter_names_ or numbered, dtype=object)
-
-    def _scatter(self, X: ArrayLike | None) -> NDArray[np.float64]:
-        measured = np.ones((0, self.model.n_modes)) if X is None else self._read_inputs(X)
-        return self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
-
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         check_model(self.model)
         model = self.model
-        names_only = np.ones((1, model.n_modes)) if X is None else X
-        n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
-        if n_modes != model.n_modes:
-            raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
-        check_noise(self.noise, n_modes)
+        self._check_columns(X)
+        check_noise(self.noise, model.n_modes)
         n_parameters = len(model.parameter_names)
         if n_parameters > model.n_modes:
             warn_user(
@@ -323,7 +292,7 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
         tol = tolerance(self.model, self.reduce)
         drawn, share_reordered, reduced = remembered_simulations(
-            self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed
+            self.memory, model, self.bounds, self.n_samples, tol, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
         )
         if share_reordered > MANY_REORDERED:
             warn_user(
@@ -335,15 +304,4 @@ class InverseSurrogate(TransformerMixin, RefinedInverse, MultiplierRegressor):
         self.simulator_ = Simulator(model, reduced, self.box_.bounds)
         self.parameter_names_ = list(model.parameter_names)
         self.y_is_vector_ = False
-        return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
-
-    def _read_inputs(self, X: ArrayLike) -> NDArray[np.float64]:
-        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
-        frequencies = super()._read_inputs(X if has_names else as_floats(X))
-        if self.inputs_.log and (frequencies <= 0).any():
-            row, column = np.argwhere(frequencies <= 0)[0]
-            raise ValueError(
-                f"row {row} of {column_names(X, 'f')[column]!r} is {frequencies[row, column]:g}; expected positive "
-                "frequencies in Hz, NaN where one is missing"
-            )
-        return frequencies
+        return self._noisy(drawn, random), drawn.theta

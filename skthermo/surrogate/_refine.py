@@ -83,13 +83,13 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
 
 def normalised_misfit(objective: Objective, found: Local) -> Array:
     """Root mean square of the residuals in standard deviations of the noise."""
-    n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
+    n_measured = np.maximum((~objective.missing).sum(axis=1), 1)
     return np.sqrt(((found.residual / objective.noise) ** 2).sum(axis=1) / n_measured)
 
 
 def gap(objective: Objective, found: Local, lower: int) -> Array:
     """Difference of ln f between two neighbouring modes of the model; NaN where one of them is missing."""
-    fitted = (objective.log_measured - found.residual)[:, lower : lower + 2]
+    fitted = (objective.log_measured - found.residual[:, : objective.log_measured.shape[1]])[:, lower : lower + 2]
     return fitted[:, 1] - fitted[:, 0]
 
 

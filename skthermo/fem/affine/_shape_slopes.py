@@ -1,7 +1,7 @@
 """Mode shapes of many theta at some degrees of freedom, with their derivatives."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._arrays import Array
 from skthermo.fem._dofs import check_dofs
 from skthermo.fem.affine._core import AffineCore
+from skthermo.fem.affine._terms import DenseTerms
 from skthermo.fem.modal import shape_derivatives
 
 
@@ -56,17 +57,18 @@ class ShapeSlopes:
         """
         places = check_dofs(dofs, self.n_dof)
         core, basis = self._core, self._basis
-        solve = _dense if core.is_dense else _one_by_one
+        solve = _batch if isinstance(core.stiffness, DenseTerms) else _one_by_one
         frequencies, jacobian, shapes, slopes = self._in_chunks(lambda rows: solve(core, rows, places, basis), theta)
         return frequencies, jacobian, shapes, slopes
 
 
-def _dense(
+def _batch(
     core: AffineCore, theta: Array, dofs: NDArray[np.intp], basis: Array | None
 ) -> tuple[Array, Array, Array, Array]:
     frequencies, shapes = core.modes(theta)
     jacobian = core.frequency_slopes(theta, frequencies, shapes)
-    slopes = shape_derivatives(core.stiffness, core.mass, theta, (2 * np.pi * frequencies) ** 2, shapes)
+    terms = cast(DenseTerms, core.stiffness), cast(DenseTerms, core.mass)
+    slopes = shape_derivatives(*terms, theta, (2 * np.pi * frequencies) ** 2, shapes)
     if basis is None:
         return frequencies, jacobian, shapes[:, dofs], slopes[:, dofs]
     return frequencies, jacobian, basis[dofs] @ shapes, np.einsum("di,simp->sdmp", basis[dofs], slopes, optimize=True)

@@ -24,11 +24,15 @@ class ParametrisedMatrix(Protocol):
     def derivatives(self, theta: Array, vectors: Array) -> Array:
         """(dA / d theta_p) times each vector at one row of theta, (n_dof, n_vectors, n_parameters)."""
 
-    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
-        """The same at every row of theta, (n_samples, n_dof, n_vectors, n_parameters); dense matrices only."""
-
     def scaled(self, factors: Array) -> Any:
         """The same matrix with each of its terms multiplied."""
 
     def projected(self, basis: Array) -> Any:
         """The dense matrix basis' A basis."""
+
+
+class DenseMatrix(ParametrisedMatrix, Protocol):
+    """A dense matrix as a function of theta."""
+
+    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n_dof, n_vectors, n_parameters)."""

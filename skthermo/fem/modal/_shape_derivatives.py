@@ -3,14 +3,14 @@
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.modal._matrices import ParametrisedMatrix
+from skthermo.fem.modal._matrices import DenseMatrix
 
 NUDGE = 1e-9
 """Share of the stiffness that is added where a repeated eigenvalue makes the equations singular."""
 
 
 def shape_derivatives(
-    stiffness: ParametrisedMatrix, mass: ParametrisedMatrix, theta: Array, eigenvalues: Array, shapes: Array
+    stiffness: DenseMatrix, mass: DenseMatrix, theta: Array, eigenvalues: Array, shapes: Array
 ) -> Array:
     """Derivatives of mode shapes of unit modal mass, (n_samples, n, n_modes, n_parameters).
 
@@ -59,7 +59,8 @@ def _solve_bordered(matrices: Array, borders: Array, right: Array, scale: Array)
     bordered[:, :n, n] = bordered[:, n, :n] = borders * factors[:, np.newaxis]
     right[:, n] *= factors[:, np.newaxis]
     try:
-        return np.linalg.solve(bordered, right)[:, :n]
+        found = np.linalg.solve(bordered, right)
     except np.linalg.LinAlgError:
         bordered[:, :n, :n] += NUDGE * largest[:, np.newaxis, np.newaxis] * np.eye(n)
-        return np.linalg.solve(bordered, right)[:, :n]
+        found = np.linalg.solve(bordered, right)
+    return np.asarray(found, dtype=float)[:, :n]
