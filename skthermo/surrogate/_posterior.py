@@ -103,6 +103,11 @@ class Objective:
         shapes = None if self.shapes is None else self.shapes.of(rows)
         return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior, shapes)
 
+    def without_shapes(self) -> "Objective":
+        """The objective of frequencies alone."""
+        noise = self.noise[:, : self.log_measured.shape[1]]
+        return Objective(self.linearise, self.log_measured, noise, self.prior)
+
     def with_modes(self, order: NDArray) -> "Objective":
         """The objective with the measured modes in another order."""
         shapes = None if self.shapes is None else self.shapes.with_modes(order)

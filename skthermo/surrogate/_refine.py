@@ -32,9 +32,10 @@ def refine(
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start; rows that have converged, and stalled.
 
     Other rows have only run out of steps. The frequencies of a model that sorts its modes have kinks where modes cross,
-    and rows may stall there; such rows are started again beyond the kink.
+    and rows may stall there; such rows are started again beyond the kink. Where two modes exchange their shapes, steps
+    may end among the wrong ones; rows with a large misfit start again at what frequencies alone say.
     """
-    found, converged, stalled = minimise(objective, start, n_steps)
+    found, converged, stalled = minimise(objective, start.copy(), n_steps)
 
     def again(rows: NDArray[np.intp], beyond: Array) -> None:
         part = objective.of(rows)
@@ -52,6 +53,10 @@ def refine(
         rows = np.flatnonzero(~converged | (normalised_misfit(objective, found) > LARGE_MISFIT))
         if rows.size:
             again(rows, np.tile(objective.prior.mean, (len(rows), 1)))
+    if objective.shapes is not None:
+        rows = np.flatnonzero(~converged | (normalised_misfit(objective, found) > LARGE_MISFIT))
+        if rows.size:
+            again(rows, minimise(objective.of(rows).without_shapes(), start[rows], n_steps)[0].x)
     return found, converged, stalled
 
 
