@@ -13,13 +13,13 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._io._memory_limit import MemoryLimit
+from skthermo._io._zip import read_member
 
 HEADER_READERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
 }
 LONGEST_HEADER = 20_000
-PIECE = 1 << 20
 FORMATS = {
     "csr": scipy.sparse.csr_array,
     "csc": scipy.sparse.csc_array,
@@ -43,7 +43,7 @@ def read_npz(file: Path, limit: MemoryLimit) -> dict[str, NDArray]:
                 name = member.filename.removesuffix(".npy")
                 variable = f"variable {name!r} is "
                 limit.take(member.file_size)
-                arrays[name] = array = _array(_content(archive, member))
+                arrays[name] = array = _array(read_member(archive, member))
                 limit.take(0 if array.dtype in (float, complex) else 16 * array.size)
     except Exception as error:  # a damaged file can fail in every way
         raise ValueError(f"{file}: {variable}not readable as .npz ({error})") from error
@@ -80,18 +80,6 @@ def read_sparse_npz(file: Path, limit: MemoryLimit) -> scipy.sparse.sparray:
     except Exception as error:  # arrays that do not belong together can fail in every way
         raise ValueError(f"{file}: not a sparse matrix of scipy.sparse.save_npz ({error})") from error
     return matrix
-
-
-def _content(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytearray:
-    """A member's bytes, decompressed piece by piece and compared with its checksum."""
-    content, end = bytearray(member.file_size), 0
-    with archive.open(member) as stream:
-        while piece := stream.read(PIECE):
-            content[end : end + len(piece)] = piece
-            end += len(piece)
-    if end != member.file_size:
-        raise ValueError(f"{end} bytes; expected {member.file_size}")
-    return content
 
 
 def _array(content: bytearray) -> NDArray:

@@ -13,7 +13,8 @@ from skthermo._warnings import warn_each, warn_user
 from skthermo._weather import TrainingRange
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
 from skthermo.surrogate._chain_shapes import steps_without_prior, with_shapes
-from skthermo.surrogate._mapper_inputs import mapper_inputs
+from skthermo.surrogate._inverse import InverseSurrogate
+from skthermo.surrogate._mapper_inputs import last_step, mapper_inputs
 from skthermo.surrogate._refined_inverse import unconverged
 from skthermo.surrogate._report import fit_report
 from skthermo.surrogate._simulator import Simulator, tolerance
@@ -82,8 +83,19 @@ class ChainSteps:
         self.simulator_ = self._simulator(learned)
         predicted = self.simulator_.frequencies(learned[rows], self.n_jobs, warn=False)
         predicted = as_floats(self.aligner_.inverse_transform(predicted))
+        last = last_step(self.inverse_)
         self.report_ = fit_report(
-            self.model, T, F, theta, as_floats(inputs), trained, self.box_, rows, predicted, self._n_unconverged
+            self.model,
+            T,
+            F,
+            theta,
+            as_floats(inputs),
+            trained,
+            self.box_,
+            rows,
+            predicted,
+            self._n_unconverged,
+            last.round_trip() if isinstance(last, InverseSurrogate) else None,
         )
         warn_each(self.report_.warnings())
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,25 +12,15 @@ from sklearn.utils import Bunch, check_random_state
 
 from skthermo._arrays import Bounds
 from skthermo._frames import frame_like
-from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, _fit_context
-from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, check_bounds, check_noise, check_theta
-from skthermo.surrogate._box import Box
-from skthermo.surrogate._inverse_inputs import InverseInputs
-from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
+from skthermo.fem import FEModel, check_theta
 from skthermo.surrogate._networks import default_network
-from skthermo.surrogate._refined_inverse import RefinedInverse
 from skthermo.surrogate._refinement import Refinement
-from skthermo.surrogate._regression import MultiplierRegressor
-from skthermo.surrogate._simulator import Simulator, tolerance
-
-MANY_REORDERED = 0.1
-"""Share of simulations with modes in another order above which a warning is given. A share of 5 % does not harm the
-truss's results; 29 % doubles the error of Z24."""
+from skthermo.surrogate._simulated_training import SimulatedTraining
+from skthermo.surrogate._simulator import Simulator
 
 
-class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, MultiplierRegressor):
+class InverseSurrogate(TransformerMixin, SimulatedTraining):
     """Parameters of an FE model from frequencies and mode shapes, learned from simulations; eqs. (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
@@ -49,6 +38,9 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         parameter to its half-width or to (lowest, highest).
     n_samples : int, default=1000
         Number of simulations.
+    narrow_bounds : bool, default=False
+        Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
+        records that `fit` sees have their parameters. An inverse that is not refined becomes several times as accurate.
     noise : float or array-like of shape (n_modes,), default=0.0
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
@@ -93,7 +85,7 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
     shape_inputs_ : ShapeInputs or None
         With ``dofs``: how columns of shapes are read.
     box_ : Box or None
-        The bounds, if the samples were simulated; else None.
+        The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
@@ -140,6 +132,7 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         "regressor": [HasMethods(["fit", "predict"]), None],
         "bounds": [Real, "array-like", dict],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
+        "narrow_bounds": ["boolean"],
         "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
         "dofs": ["array-like", None],
         "shape_noise": [Interval(Real, 0, 1, closed="neither"), "array-like"],
@@ -158,6 +151,7 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         *,
         bounds: Bounds = 0.3,
         n_samples: int = 1000,
+        narrow_bounds: bool = False,
         noise: ArrayLike = 0.0,
         dofs: ArrayLike | None = None,
         shape_noise: ArrayLike = 0.01,
@@ -172,6 +166,7 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         self.regressor = regressor
         self.bounds = bounds
         self.n_samples = n_samples
+        self.narrow_bounds = narrow_bounds
         self.noise = noise
         self.dofs = dofs
         self.shape_noise = shape_noise
@@ -188,9 +183,9 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes), optional
-            Frequencies in Hz and, with ``dofs``, components of shapes. Without y only the number and names of the
-            columns are used.
+        X : array-like or DataFrame of shape (n_samples, n_features_in_), optional
+            Frequencies in Hz and, with ``dofs``, components of shapes. Without y they give the columns, ``scatter_``
+            and, with ``narrow_bounds``, the bounds.
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
             Multipliers of each row of X. Without y, frequencies and multipliers are simulated.
 
@@ -216,7 +211,8 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         self.box_ = None
         self.n_steps_ = self._n_steps()
         self.shape_inputs_ = self._read_dofs()
-        if self.model is not None and y is None:
+        is_simulated = self.model is not None and y is None
+        if is_simulated:
             inputs, theta = self._simulate(X, random)
         else:
             inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
@@ -225,8 +221,11 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
                 self.parameter_names_ = list(self.model.parameter_names)
                 self.simulator_ = Simulator(self.model)
             self.samples_ = Bunch(theta=theta, frequencies=inputs)
-        inputs = self._scored(inputs, theta)
-        self._learn(inputs, theta, None if self.random_state is None else random, log_inputs=True)
+        seed = None if self.random_state is None else random
+        self._learn(self._scored(inputs, theta), theta, seed, log_inputs=True)
+        if is_simulated and self.narrow_bounds:
+            inputs, theta = self._simulate_narrower(X, random)
+            self._learn(self._scored(inputs, theta), theta, seed, log_inputs=True)
         if self.n_steps_:
             self.refinement_ = Refinement.of(self)
             self.scatter_ = self._scatter(X)
@@ -274,34 +273,3 @@ class InverseSurrogate(TransformerMixin, InverseInputs, RefinedInverse, Multipli
         if not self.n_steps_ and self.box_ is not None:
             self._warn_of_box(theta, self.box_.far_outside(theta))
         return frame_like(X, theta, self.get_feature_names_out())
-
-    def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
-        check_model(self.model)
-        model = self.model
-        self._check_columns(X)
-        check_noise(self.noise, model.n_modes)
-        n_parameters = len(model.parameter_names)
-        if n_parameters > model.n_modes:
-            warn_user(
-                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
-                "expected more modes, or the noise of the measurement, so that the prior decides between them",
-                "few modes",
-            )
-        self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
-        is_remembered = self.memory is not None and self.random_state is None
-        seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
-        tol = tolerance(self.model, self.reduce)
-        drawn, share_reordered, reduced = remembered_simulations(
-            self.memory, model, self.bounds, self.n_samples, tol, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
-        )
-        if share_reordered > MANY_REORDERED:
-            warn_user(
-                f"modes change their order in {share_reordered:.1%} of {min(self.n_samples, ORDER_CHECKS)} samples of "
-                "the box, and the model sorts them: expected narrower bounds, or a model with track=True",
-                "order of modes",
-            )
-        self.samples_ = drawn
-        self.simulator_ = Simulator(model, reduced, self.box_.bounds)
-        self.parameter_names_ = list(model.parameter_names)
-        self.y_is_vector_ = False
-        return self._noisy(drawn, random), drawn.theta

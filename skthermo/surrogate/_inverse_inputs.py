@@ -48,9 +48,7 @@ class InverseInputs(MultiplierRegressor):
         if self.model is None:
             raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
         names = getattr(self, "feature_names_in_", self._column_names())
-        if self.shape_inputs_ is None:
-            return frame_like(X, evaluate(self.model, X, n_jobs=self.n_jobs), names)
-        return frame_like(X, self.shape_inputs_.of_parameters(self.model, X, self.n_jobs), names)
+        return frame_like(X, self._of_parameters(X), names)
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the parameters.
@@ -75,6 +73,12 @@ class InverseInputs(MultiplierRegressor):
         if self.model is None:
             raise ValueError("dofs are given without a model; expected an FE model whose degrees of freedom they are")
         return ShapeInputs.of(self.model, self.dofs, self.shape_noise)
+
+    def _of_parameters(self, theta: ArrayLike) -> Array:
+        """Inputs that the model gives for rows of theta, without noise."""
+        if self.shape_inputs_ is None:
+            return evaluate(self.model, theta, n_jobs=self.n_jobs)
+        return self.shape_inputs_.of_parameters(self.model, theta, self.n_jobs)
 
     def _column_names(self) -> list[str]:
         modes = [f"f{i + 1}" for i in range(self.model.n_modes)]

@@ -23,6 +23,9 @@ ROWS_PER_PARAMETER = 10
 WORSE_THAN_MEAN = 1.2
 """Ratio of the chain's error to that of the training mean from which a warning is given."""
 
+UNSEEN = 0.1
+"""Percent of a frequency below which single records from ambient vibration show nothing."""
+
 LARGE_OFFSET = 15.0
 """Difference in percent between a measured mode and the model's above which a warning is given."""
 
@@ -62,6 +65,11 @@ class FitReport:
         Number of rows used for ``errors``, spread evenly over the training rows.
     n_unconverged : int or None
         Rows whose parameters have not converged in refining; None without refining.
+    round_trip : Series or None
+        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
+        where the inverse does not give it.
+    scatter : Series or None
+        Standard deviation of measured over predicted frequencies, by mode, in percent.
 
     Examples
     --------
@@ -84,6 +92,8 @@ class FitReport:
     errors: pd.DataFrame
     n_scored: int
     n_unconverged: int | None = None
+    round_trip: pd.Series | None = None
+    scatter: pd.Series | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -104,7 +114,8 @@ class FitReport:
 
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
-        return table.join(self.errors.round(3).add_suffix(" (%)"))
+        table = table.join(self.errors.round(3).add_suffix(" (%)"))
+        return table if self.round_trip is None else table.assign(**{"round trip (%)": self.round_trip.round(3)})
 
     def _parameters(self) -> pd.DataFrame:
         percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
@@ -139,6 +150,17 @@ class FitReport:
                 "modes: see report_.offsets, update the model, or use aligner=BiasAligner(model)",
             )
 
+        round_trip = pd.Series(dtype=float) if self.round_trip is None else self.round_trip.abs()
+        if (round_trip > self.scatter.clip(lower=UNSEEN)).any():
+            worst = (round_trip / self.scatter.clip(lower=UNSEEN)).idxmax()
+            yield (
+                "round trip",
+                f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
+                f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
+                f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
+                "refines its estimates, narrow_bounds=True, or more samples",
+            )
+
 
 def fit_report(
     model: FEModel,
@@ -151,6 +173,7 @@ def fit_report(
     rows: NDArray[np.intp],
     predicted: Array,
     n_unconverged: int | None,
+    round_trip: Array | None,
 ) -> FitReport:
     """The report of a fit, from its records, estimates and the frequencies predicted for some rows."""
     names = list(model.parameter_names)
@@ -160,6 +183,7 @@ def fit_report(
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
     known = ~np.isnan(theta).any(axis=1)
     scatter = np.nanstd(measured / predicted, axis=0)
+    modes = column_names(F, "f")
     return FitReport(
         n_rows=len(theta),
         n_trained=int(trained.sum()),
@@ -168,9 +192,11 @@ def fit_report(
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
         deviations=pd.Series(smallest_deviations(model, theta[known], scatter), index=names),
-        errors=pd.DataFrame(errors, index=column_names(F, "f")),
+        errors=pd.DataFrame(errors, index=modes),
         n_scored=len(rows),
         n_unconverged=n_unconverged,
+        round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
+        scatter=pd.Series(100 * scatter, index=modes),
     )
 
 

@@ -4,8 +4,8 @@
 
 Bytes are flipped, cut off, inserted or exchanged, and numbers that state lengths are changed; of compressed files also
 the content, which is then compressed again with right checksums. Each file is read in a process of its own, with many
-others, by `load_affine` or `load_z24`. A file passes if it is read, or refused by a ValueError or OSError that names
-it, within 256 MB. The exit code is 1 if one does not.
+others, by `load_affine`, `load_z24` or `load_kw51`. A file passes if it is read, or refused by a ValueError or OSError
+that names it, within 256 MB. The exit code is 1 if one does not.
 """
 
 import argparse
@@ -27,7 +27,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
-from skthermo.datasets import load_z24
+from skthermo.datasets import load_kw51, load_z24
 from skthermo.fem import load_affine
 
 MOST_MEGABYTES = 256
@@ -38,6 +38,7 @@ WORDS = [b"-1", b"0", b"1", b"7", b"1000000", b"100000000", b"2147483648", b"999
 HEADER_OF_MAT = 128
 MILLION = 10**6
 MOST_ZEROS = 500 * MILLION
+OF_DATA = {"z24": load_z24, "kw51": load_kw51}
 BEGINNING = 200  # bytes in which most lengths stand
 
 
@@ -62,6 +63,30 @@ def z24_text():
     table = np.hstack([np.arange(12)[:, np.newaxis], fields["data"], *(fields[f"Z24_{name}"] for name in names)])
     header = ",".join(["record", "f1", "f2", "f3", "f4", *names, "state"])
     return "\n".join([header, *(",".join(f"{value:.6g}" for value in row) + ",undamaged" for row in table)]) + "\n"
+
+
+def kw51_file(*, compressed=False, zipped=False):
+    """A struct of numbers, three-dimensional complex ones among them, texts in cells, and a matrix of characters."""
+    random = np.random.default_rng(0)
+    shapes = random.normal(size=(2, 5, 3, 2))
+    sensors = np.empty((1, 2), dtype=object)
+    sensors[0, :] = ["aBD17Az", "aAR1516Ay"]
+    modes = {
+        "sdn": 737334 + np.arange(5)[:, np.newaxis] / 24,
+        "f": random.normal([1.9, 2.6, 4.1], 0.01, (5, 3)),
+        "xi": random.uniform(0.001, 0.05, (5, 3)),
+        "m": shapes[0] + 1j * shapes[1],
+        "labels_m": sensors,
+        "env": random.integers(0, 30, (5, 4)),
+        "labels_env": np.array(["tBD31A", "rhBD31A", "tVL", "grVL"]),
+    }
+    content = written(lambda stream: scipy.io.savemat(stream, {"modes": modes}, do_compression=compressed))
+    if not zipped:
+        return content
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("trackedmodes.mat", content)
+    return stream.getvalue()
 
 
 def written(write):
@@ -101,6 +126,9 @@ def valid_files():
         "z24, csv": ("z24", "z24.csv", z24_text().encode()),
         "z24, mat": ("z24", "z24.mat", mat(z24_fields())),
         "z24, mat compressed": ("z24", "z24.mat", mat(z24_fields(), compressed=True)),
+        "kw51, mat": ("kw51", "trackedmodes.mat", kw51_file()),
+        "kw51, mat compressed": ("kw51", "trackedmodes.mat", kw51_file(compressed=True)),
+        "kw51, zip": ("kw51", "trackedmodes.zip", kw51_file(zipped=True)),
     }
     for form in ("csr", "csc", "coo", "bsr", "dia"):
         files[f"sparse npz, {form}"] = ("folder", "E_1.npz", sparse_npz(form))
@@ -167,7 +195,10 @@ def mutated_inside(content, random):
 def read(loader, file):
     """What became of one file: "read", "refused", or what was wrong."""
     try:
-        load_z24(file) if loader == "z24" else load_affine(file.parent if loader == "folder" else file, n_modes=2)
+        if loader in OF_DATA:
+            OF_DATA[loader](file)
+        else:
+            load_affine(file.parent if loader == "folder" else file, n_modes=2)
     except (ValueError, OSError) as error:
         names_it = file.name in str(error) or str(file.parent) in str(error)
         return "refused" if names_it else f"an error that does not name the file: {type(error).__name__}: {error}"

@@ -1,0 +1,306 @@
+"""Reading KW51's monitoring: files as they were published, in every way that MATLAB may have stored them; bad ones."""
+
+import hashlib
+import struct
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from skthermo.datasets import _kw51_file, load_kw51
+from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
+
+FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*has the MD5 checksum:UserWarning")
+HOUR = pd.Timedelta("1h")
+
+
+def check_equal(data, fields):
+    """What was loaded is what was written, to the bit."""
+    np.testing.assert_array_equal(data.frequencies, fields["f"])
+    np.testing.assert_array_equal(data.damping, fields["xi"])
+    np.testing.assert_array_equal(data.temperatures, fields["env"])
+    np.testing.assert_array_equal(data.shapes, fields["m"])
+    assert data.sensors == fields["labels_m"].ravel().tolist()
+    assert list(data.temperatures) == fields["labels_env"].ravel().tolist()
+    for table in (data.frequencies, data.damping, data.state):
+        assert table.index.equals(data.temperatures.index)
+    assert len(data.state) == len(data.shapes) == len(data.temperatures)
+
+
+def write(file, fields, **options):
+    file.write_bytes(kw51_bytes(fields, **options))
+    return file
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "trackedmodes.mat"
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_file_is_read_as_it_was_written(file, compressed):
+    fields = write_kw51(file, n_records=30, compressed=compressed)
+    data = load_kw51(str(file))
+    check_equal(data, fields)
+    assert data.is_published is None
+    assert data.temperatures.index.name == "time"
+    assert (data.temperatures.index == pd.date_range("2018-10-01", periods=30, freq="h")).all()
+    assert list(data.frequencies) == [f"f{number}" for number in range(1, 15)]
+    assert list(data.damping) == [f"xi{number}" for number in range(1, 15)]
+    assert data.temperatures[["tBD31A"]].shape == (30, 1)
+    assert data.sensors == SENSORS
+
+
+def test_the_whole_record_is_hourly_and_the_retrofit_lies_where_it_was(file):
+    n_records = 11328
+    write_kw51(
+        file,
+        frequencies=np.full((n_records, 1), 2.0),
+        damping=np.full((n_records, 1), 0.01),
+        shapes=np.ones((n_records, 1, 1)),
+        temperatures=np.full((n_records, 1), 20.0),
+    )
+    data = load_kw51(file)
+    assert data.state.groupby(data.state, sort=False).size().to_dict() == {
+        "before": 5424,
+        "during": 3241,
+        "after": 2663,
+    }
+    time = data.state.index
+    assert (np.diff(time) == HOUR).all()
+    assert time[-1] == pd.Timestamp("2020-01-15 23:00")
+    assert data.state[pd.Timestamp("2019-05-14 23:00") :].iloc[:2].tolist() == ["before", "during"]
+    assert data.state[pd.Timestamp("2019-09-27 00:00") :].iloc[:2].tolist() == ["during", "after"]
+
+
+def test_a_zip_file_says_whether_it_is_the_published_one(tmp_path, monkeypatch):
+    file = tmp_path / "trackedmodes.zip"
+    fields = write_kw51(file)
+    with pytest.warns(UserWarning, match=r"trackedmodes\.zip has the MD5 checksum .* may differ") as caught:
+        data = load_kw51(file)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert data.is_published is False
+    check_equal(data, fields)
+    monkeypatch.setattr(_kw51_file, "PUBLISHED_MD5", hashlib.md5(file.read_bytes()).hexdigest())
+    assert load_kw51(file).is_published is True
+
+
+@NOT_PUBLISHED
+def test_the_content_tells_a_zip_file_whatever_its_name(tmp_path):
+    file = write(tmp_path / "download", kw51_fields(), zipped=True)
+    check_equal(load_kw51(file), kw51_fields())
+
+
+def test_rows_stay_in_the_order_of_the_file(file):
+    fields = kw51_fields(n_records=10)
+    order = np.random.default_rng(1).permutation(10)
+    shuffled = fields | {name: fields[name][order] for name in ("sdn", "f", "xi", "m", "env")}
+    write(file, shuffled)
+    data = load_kw51(file)
+    check_equal(data, shuffled)
+    assert (data.state.index == pd.date_range("2018-10-01", periods=10, freq="h")[order]).all()
+
+
+def test_time_stamps_are_rounded_to_seconds(file):
+    stamps = pd.DatetimeIndex(["2019-02-28 23:00:00.2", "2019-03-01 00:59:59.9", "2019-03-01 01:00:30.6"])
+    write_kw51(file, n_records=3, times=stamps)
+    assert (load_kw51(file).state.index == stamps.round("s")).all()
+
+
+FORMS = {
+    "another order": lambda fields: dict(reversed(fields.items())),
+    "another field": lambda fields: {"note": "text", "settings": {"a": 1.0}} | fields,
+    "row of times": lambda fields: fields | {"sdn": fields["sdn"].T},
+    "columns of labels": lambda fields: fields | {"labels_m": cell(SENSORS, is_column=True)},
+    "characters": lambda fields: fields | {"labels_env": np.array(CHANNELS)},
+    "nested cells": lambda fields: fields | {"labels_env": cell([cell([label]) for label in CHANNELS])},
+    "cells of a cell": lambda fields: fields | {"labels_m": cell([cell(SENSORS)])},
+    "complex": lambda fields: fields | {"f": fields["f"] + 0j},
+    "single": lambda fields: fields | {"env": fields["env"].astype("f4")},
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_in_which_matlab_may_have_stored_it(file, form):
+    fields = kw51_fields()
+    write(file, FORMS[form](fields))
+    if form == "single":
+        fields["env"] = fields["env"].astype("f4").astype(float)
+    check_equal(load_kw51(file), fields)
+
+
+def test_whole_numbers_and_real_shapes(file):
+    whole = np.random.default_rng(0).integers(1, 20, (6, 3))
+    fields = kw51_fields(
+        frequencies=whole.astype("u1"), damping=whole * 0, shapes=np.ones((6, 3, 2)), temperatures=whole.astype("i2")
+    )
+    write(file, fields)
+    data = load_kw51(file)
+    check_equal(data, fields)
+    assert np.iscomplexobj(data.shapes)
+    assert set(data.frequencies.dtypes) == {np.dtype(float)}
+
+
+def big_endian_element(kind, content):
+    return struct.pack(">II", kind, len(content)) + content + b"\0" * (-len(content) % 8)
+
+
+def big_endian_matrix(kind, shape, *parts, name=b""):
+    head = (struct.pack(">II", kind, 0), struct.pack(f">{len(shape)}i", *shape), name)
+    elements = [big_endian_element(*part) for part in (*zip((6, 5, 1), head, strict=True), *parts)]
+    return big_endian_element(14, b"".join(elements))
+
+
+def test_a_big_endian_file(file):
+    fields = kw51_fields(n_records=5)
+    values = []
+    for field in fields.values():
+        if field.dtype == object:
+            texts = [big_endian_matrix(4, (1, len(text)), (16, text.encode())) for text in field.flat]
+            values.append(big_endian_element(14, big_endian_matrix(1, field.shape)[8:] + b"".join(texts)))
+        else:
+            parts = [field.real, field.imag] if np.iscomplexobj(field) else [field]
+            parts = [(9, part.astype(">f8").tobytes(order="F")) for part in parts]
+            values.append(big_endian_matrix(6 | 0x0800 * (len(parts) - 1), field.shape, *parts))
+    names = b"".join(name.encode().ljust(32, b"\0") for name in fields)
+    head = big_endian_matrix(2, (1, 1), (5, struct.pack(">i", 32)), (1, names), name=b"modes")[8:]
+    file.write_bytes(b"MATLAB 5.0".ljust(124) + b"\1\0MI" + big_endian_element(14, head + b"".join(values)))
+    check_equal(load_kw51(file), fields)
+
+
+@FUZZ
+@given(data=st.data(), n_records=st.integers(1, 5), n_modes=st.integers(1, 4), n_sensors=st.integers(1, 3))
+def test_any_campaign_that_is_written_is_read_back_equal(file, data, n_records, n_modes, n_sensors):
+    def drawn(shape, lowest, highest):
+        return data.draw(arrays(float, shape, elements=st.floats(lowest, highest) | st.just(np.nan)))
+
+    modes = (n_records, n_modes)
+    hours = data.draw(st.lists(st.integers(0, 11327), min_size=n_records, max_size=n_records, unique=True))
+    times = pd.Timestamp("2018-10-01") + pd.to_timedelta(hours, unit="h")
+    fields = kw51_fields(
+        frequencies=drawn(modes, 0.1, 100),
+        damping=drawn(modes, -1, 1),
+        shapes=drawn((*modes, n_sensors), -2, 2) + 1j * drawn((*modes, n_sensors), -2, 2),
+        temperatures=drawn((n_records, data.draw(st.integers(1, 3))), -50, 80),
+        times=times,
+    )
+    write(file, fields, compressed=data.draw(st.booleans()))
+    loaded = load_kw51(file)
+    check_equal(loaded, fields)
+    assert (loaded.state.index == times).all()
+
+
+def replaced(name, place, value):
+    values = kw51_fields()[name].copy()
+    values[place] = value
+    return {name: values}
+
+
+N = 12
+SHAPE = r"\(12, 14, 12\)"
+BAD = [
+    ({"xi": None}, r"no field \['xi'\] in 'modes'; found \['env', 'f', "),
+    ({"f": "text"}, "field 'f' is text, a cell array or a struct; expected a full array"),
+    ({"f": np.empty((0, 14))}, r"field 'f' has shape \(0, 14\); expected records"),
+    ({"f": np.ones((N, 14, 2))}, r"field 'f' has shape \(12, 14, 2\)"),
+    ({"f": np.ones((N, 1001))}, "expected records times at most 1000 modes"),
+    ({"f": np.ones((N, 13))}, r"field 'xi' has shape \(12, 14\); expected \(12, 13\)"),
+    ({"sdn": np.ones((N + 1, 1))}, r"field 'sdn' has shape \(13, 1\); expected \(12, 1\)"),
+    ({"xi": np.ones((N - 1, 14))}, r"field 'xi' has shape \(11, 14\); expected \(12, 14\)"),
+    ({"m": np.ones((N, 12, 14))}, rf"field 'm' has shape \(12, 12, 14\); expected {SHAPE}"),
+    ({"m": np.ones((N, 14))}, rf"field 'm' has shape \(12, 14\); expected {SHAPE}"),
+    ({"env": np.ones((N, 10))}, r"field 'env' has shape \(12, 10\); expected \(12, 11\)"),
+    ({"labels_env": cell(CHANNELS[:-1])}, r"field 'env' has shape \(12, 11\); expected \(12, 10\)"),
+    ({"labels_m": cell(SENSORS[:-1])}, rf"field 'm' has shape {SHAPE}; expected \(12, 14, 11\)"),
+    ({"labels_m": np.ones((N, 1))}, "field 'labels_m' holds something else than texts"),
+    ({"labels_m": cell([""] + SENSORS[1:])}, r"field 'labels_m' has \d+ names, .*expected 1 to 1000 that differ"),
+    ({"labels_m": cell(["\1"] + SENSORS[1:])}, "field 'labels_m' has 12 names"),
+    ({"labels_env": cell(["tVL"] + CHANNELS[1:])}, "field 'labels_env' has 11 names.*expected 1 to 1000 that differ"),
+    (replaced("sdn", 3, np.nan), "field 'sdn', row 3 is nan; expected a MATLAB date number"),
+    (replaced("sdn", 3, 17805.5), "field 'sdn', row 3 is 17805.5; expected a MATLAB date number"),
+    (replaced("sdn", 3, -999), "field 'sdn', row 3 is -999.0"),
+    (replaced("sdn", 3, np.inf), "field 'sdn', row 3 is inf"),
+    (replaced("sdn", 3, kw51_fields()["sdn"][1]), "field 'sdn', row 3 repeats 2018-10-01 01:00:00"),
+    (replaced("f", (2, 5), 0.01), "field 'f', row 2, column 'f6' is 0.01; expected 0.1 to 100, or NaN"),
+    (replaced("f", (2, 5), -999), "field 'f', row 2, column 'f6' is -999;"),
+    (replaced("f", (2, 5), np.inf), "field 'f', row 2, column 'f6' is inf;"),
+    ({"f": np.full((N, 14), 2 + 1j)}, "field 'f' has complex numbers"),
+    (replaced("xi", (0, 1), 1.5), "field 'xi', row 0, column 'xi2' is 1.5; expected -1 to 1, or NaN"),
+    (replaced("env", (4, 0), 85), "field 'env', row 4, column 'tBD31A' is 85; expected -60 to 80"),
+    (replaced("env", (4, 2), -60.5), "field 'env', row 4, column 'tVL' is -60.5; expected -60 to 80"),
+    (replaced("env", (4, 5), -999), "field 'env', row 4, column 'grVL' is -999; expected a measured value"),
+    (replaced("env", (4, 5), np.inf), "field 'env', row 4, column 'grVL' is inf; expected a measured value"),
+    (replaced("env", (4, 10), 999), "field 'env', row 4, column 'wdVL' is 999; expected -360 to 720"),
+    (replaced("m", (4, 3, 1), 1j * np.inf), "field 'm', sensor 'aBD17Ay', row 4, column 'f4' is inf"),
+    (replaced("m", (4, 3, 1), -9999), "field 'm', sensor 'aBD17Ay', row 4, column 'f4' is -9999"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), BAD)
+def test_bad_content_names_file_field_and_place(tmp_path, changes, message):
+    fields = {name: value for name, value in (kw51_fields() | changes).items() if value is not None}
+    with pytest.raises(ValueError, match=rf"broken\.mat: .*{message}"):
+        load_kw51(write(tmp_path / "broken.mat", fields))
+
+
+def test_files_of_another_kind_are_refused(tmp_path, monkeypatch):
+    file = tmp_path / "other.mat"
+    with pytest.raises(FileNotFoundError, match=r"other\.mat is not a file"):
+        load_kw51(file)
+    with pytest.raises(FileNotFoundError, match="is not a file"):
+        load_kw51(tmp_path)
+    scipy.io.savemat(file, {"data": np.ones((2, 2)), "nc": 1})
+    with pytest.raises(ValueError, match=r"other\.mat: the variables are \['data', 'nc'\]; expected a struct 'modes'"):
+        load_kw51(file)
+    file.write_bytes(b"")
+    with pytest.raises(ValueError, match=r"other\.mat: not a MATLAB v5 file"):
+        load_kw51(file)
+    for modes in (np.ones((2, 2)), "text"):
+        with pytest.raises(ValueError, match=r"other\.mat: 'modes' is no single struct; expected a struct"):
+            load_kw51(write(file, modes))
+    several = np.zeros((2, 1), dtype=[(name, "O") for name in kw51_fields()])
+    with pytest.raises(ValueError, match=r"other\.mat: 'modes' is no single struct"):
+        load_kw51(write(file, several))
+    monkeypatch.setattr(_kw51_file, "LARGEST_FILE", 1000)
+    with pytest.raises(ValueError, match=r"other\.mat: \d+ MB; expected at most 0 MB"):
+        load_kw51(write(file, kw51_fields()))
+
+
+def outcome(file, content):
+    """The loaded tables, or what the error says."""
+    file.write_bytes(content)
+    try:
+        return load_kw51(file)
+    except ValueError as error:
+        return str(error)
+
+
+SMALL = kw51_fields(frequencies=np.full((3, 2), 2.0), shapes=np.ones((3, 2, 2)) * 1j, channels=CHANNELS[:3])
+
+
+@NOT_PUBLISHED
+@FUZZ
+@given(cut=st.integers(0, 10**6), position=st.integers(0, 10**6), byte=st.integers(0, 255))
+@pytest.mark.parametrize("form", ["mat", "packed", "zip"])
+def test_damaged_and_truncated_files_never_become_nonsense(tmp_path, form, cut, position, byte):
+    content = kw51_bytes(SMALL, compressed=form == "packed", zipped=form == "zip")
+    damaged = bytearray(content)
+    damaged[position % len(content)] = byte
+    for name, changed in (("damaged", bytes(damaged)), ("short", content[: cut % len(content)])):
+        file = tmp_path / f"{name}.{'zip' if form == 'zip' else 'mat'}"
+        data = outcome(file, changed)
+        if isinstance(data, str):
+            assert file.name in data
+        else:
+            assert data.frequencies.stack().dropna().between(0.1, 100).all()
+            assert data.temperatures.filter(regex="tBD31A|tVL").stack().dropna().between(-60, 80).all()
+            assert not np.isinf(data.shapes).any()
+            assert data.state.index.is_unique
+            assert data.shapes.shape == (*data.frequencies.shape, len(data.sensors))
+            assert len(data.temperatures) == len(data.damping) == len(data.state) == len(data.shapes)
