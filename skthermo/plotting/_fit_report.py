@@ -5,9 +5,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo.plotting._axes import Axes, panels
+from skthermo.plotting._axes import LETTER, Axes, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, label_of
 from skthermo.surrogate import FitReport
+
+WIDTH, LETTERS = 4.6, 8
+"""Inches of a panel whose bars have names of up to so many letters; longer names make it wider."""
 
 
 class FitReportDisplay:
@@ -85,7 +88,9 @@ class FitReportDisplay:
         """
         report = self.report
         longest = max(len(report.offsets), len(report.deviations))
-        self.axes_ = panels(ax, ["errors", "offsets", "deviations", "outside"], (4.6, 1.2 + 0.32 * longest), 2)
+        n_letters = max(len(label_of(name)) for name in (*report.offsets.index, *report.deviations.index))
+        size = (WIDTH + LETTER * max(n_letters - LETTERS, 0), 1.2 + 0.32 * longest)
+        self.axes_ = panels(ax, ["errors", "offsets", "deviations", "outside"], size, 2)
         self.figure_ = self.axes_[0].figure
         errors, offsets, deviations, outside = self.axes_
         styles = {

@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows
+from skthermo._warnings_once import warnings_once
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
 from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
@@ -108,6 +109,11 @@ class PredictionDisplay:
         ------
         ValueError
             If temperatures and frequencies have different rows, or intervals are asked of an estimator without any.
+
+        Warns
+        -----
+        UserWarning
+            Once for each kind of doubt about the weather, such as rows without temperatures.
         """
         check_same_rows(X, y, ("temperatures", "frequencies"))
         if confidence is not None and not hasattr(estimator, "predict_interval"):
@@ -115,10 +121,10 @@ class PredictionDisplay:
                 f"confidence is {confidence!r}, and {estimator!r:.200} has no method 'predict_interval'; expected an "
                 "estimator with one, such as DataInformedFEM, or confidence=None"
             )
-        predicted = estimator.predict(X)
         if confidence is None or options.get("kind") == "scatter":
-            return cls.from_predictions(y, predicted, **options)
-        lowest, highest = estimator.predict_interval(X, confidence)
+            return cls.from_predictions(y, estimator.predict(X), **options)
+        with warnings_once():
+            predicted, (lowest, highest) = estimator.predict(X), estimator.predict_interval(X, confidence)
         label = f"interval, {100 * confidence:g} %"
         return cls.from_predictions(y, predicted, lowest, highest, **{"interval_label": label, **options})
 

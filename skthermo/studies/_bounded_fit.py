@@ -89,31 +89,32 @@ def standard_errors(fit: BoundedFit, n_draws: int, random: np.random.RandomState
     """
     errors = redrawn(fit.slopes, fit.slopes @ fit.severities, n_draws, random) - fit.severities
     covariance = errors.T @ errors / n_draws
-    growth = [highest_likely(fit, column) - severity for column, severity in enumerate(fit.severities)]
-    return np.maximum(np.sqrt(np.diag(covariance)), np.array(growth) / 2), covariance
-
-
-def highest_likely(fit: BoundedFit, column: int) -> float:
-    """Severity of a group that worsens the linear fit by two standard errors, the others being fitted anew."""
-    others, least = np.delete(fit.slopes, column, axis=1), _misfit(fit.slopes, fit.target)
-
-    def excess(severity: float) -> float:
-        return _misfit(others, fit.target - severity * fit.slopes[:, column]) - least - 4.0
-
-    return float(brentq(excess, fit.severities[column], HIGHEST, xtol=1e-6)) if excess(HIGHEST) > 0 else HIGHEST
+    least = _misfit(fit.slopes, fit.target)
+    highest = [likely_range(fit.slopes, fit.target, *found, least)[1] for found in enumerate(fit.severities)]
+    return np.maximum(np.sqrt(np.diag(covariance)), (np.array(highest) - fit.severities) / 2), covariance
 
 
 def error_beside(slopes: Array, severities: Array, column: int) -> float:
     """Half of how far a severity can move, up or down, until the fit is worse by two standard errors."""
-    others, target = np.delete(slopes, column, axis=1), slopes @ severities
+    found = float(severities[column])
+    lowest, highest = likely_range(slopes, slopes @ severities, column, found)
+    return max(found - lowest, highest - found) / 2
+
+
+def likely_range(slopes: Array, target: Array, column: int, found: float, least: float = 0.0) -> tuple[float, float]:
+    """Range of a severity around the one found in which a linear fit is worse by up to two standard errors.
+
+    The others are fitted anew; ``least`` is the misfit of the best fit.
+    """
+    others = np.delete(slopes, column, axis=1)
 
     def excess(severity: float) -> float:
-        return _misfit(others, target - severity * slopes[:, column]) - 4.0
+        return _misfit(others, target - severity * slopes[:, column]) - least - 4.0
 
-    found = severities[column]
-    lowest = brentq(excess, 0.0, found, xtol=1e-6) if found > 0 and excess(0.0) > 0 else 0.0
-    highest = brentq(excess, found, HIGHEST, xtol=1e-6) if excess(HIGHEST) > 0 else HIGHEST
-    return float(max(found - lowest, highest - found)) / 2
+    def end(bound: float) -> float:
+        return float(brentq(excess, found, bound, xtol=1e-6)) if excess(bound) > 0 > excess(found) else bound
+
+    return end(0.0), end(HIGHEST)
 
 
 def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:

@@ -1,6 +1,7 @@
 """Measured shifts beside the effects of damage, in standard errors."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -49,15 +50,30 @@ class Comparison:
     parts : list of Part
     incidence : ndarray of shape (n_model_groups, n_groups)
         1 where a group contains a group of the model.
+    names : list of str
+        Of the groups.
+    of_model : list of str
+        Names of the model's groups.
     """
 
     parts: list[Part]
     incidence: Array
+    names: Sequence[str] = ()
+    of_model: Sequence[str] = ()
 
     def of(self, columns: list[list[int]]) -> "Comparison":
         """The comparison for some groups, each of one or several joined."""
-        incidence = [self.incidence[:, joined].max(axis=1) for joined in columns]
-        return Comparison(self.parts, np.array(incidence).reshape(len(columns), len(self.incidence)).T)
+        incidence = np.array([self.incidence[:, joined].max(axis=1) for joined in columns])
+        names = [" + ".join(self.names[column] for column in joined) for joined in columns] if self.names else ()
+        return replace(self, incidence=incidence.reshape(len(columns), len(self.incidence)).T, names=names)
+
+    @property
+    def contents(self) -> dict[str, list[str]]:
+        """The model's groups that each group contains."""
+        return {
+            name: [group for group, inside in zip(self.of_model, column, strict=True) if inside]
+            for name, column in zip(self.names, self.incidence.T, strict=True)
+        }
 
     def slopes(self) -> Array:
         """Effects of small severities in standard errors, (n_observed, n_groups)."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from skthermo._arrays import Array, as_floats
+from skthermo.studies._chain import healthy_frequencies
 
 MOST_ROWS, MOST_SLOW_ROWS = 100, 24
 """How many records, spread evenly over all, effects are averaged over: fewer where a solution takes long."""
@@ -46,16 +47,14 @@ class FrequencyEffects:
     simulators: dict[float, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, fem: Any, T: Any, F: Array, groups: Sequence[str]) -> "FrequencyEffects":
-        """Effects in the weather of some records; a mode's mean is over those that have it."""
+    def of(cls, fem: Any, theta: Array, F: Array, groups: Sequence[str]) -> "FrequencyEffects":
+        """Effects at the parameters of some records; a mode's mean is over those records that have it."""
         is_slow = fem.simulator_.reduced is None and getattr(fem.model, "prefer", "processes") == "processes"
-        theta = as_floats(fem.predict_parameters(T))
-        present = ~np.isnan(F) & ~np.isnan(theta).any(axis=1)[:, np.newaxis]
+        present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
         rows = np.flatnonzero(present.any(axis=1))
         most = MOST_SLOW_ROWS if is_slow else MOST_ROWS
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
-        solved = fem.simulator_.frequencies(theta[rows], fem.n_jobs, warn=False)
-        healthy = np.log(as_floats(fem.aligner_.inverse_transform(solved)))
+        healthy = np.log(healthy_frequencies(fem, theta[rows]))
         weights = np.where(np.isnan(healthy), 0.0, present[rows])
         weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
         return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), groups, healthy)
@@ -67,8 +66,7 @@ class FrequencyEffects:
         symmetry: mirror images would seem to differ.
         """
         theta = np.ones((1, self.theta.shape[1]))
-        solved = self.fem.simulator_.frequencies(theta, self.fem.n_jobs, warn=False)
-        healthy = np.log(as_floats(self.fem.aligner_.inverse_transform(solved)))
+        healthy = np.log(healthy_frequencies(self.fem, theta))
         return FrequencyEffects(self.fem, theta, np.ones_like(healthy), self.groups, healthy)
 
     def __call__(self, severities: Array) -> tuple[Array, Array]:

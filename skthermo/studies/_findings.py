@@ -1,12 +1,10 @@
 """The result of an identification: tables, tests and warnings from fits."""
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
 from skthermo.studies._bounded_fit import (
     HIGHEST,
     BoundedFit,
@@ -27,24 +25,36 @@ N_DRAWS = 500
 
 def findings(
     comparison: Comparison,
-    nominal: Array,
-    names: Sequence[str],
+    nominal: Comparison,
     shift: Shift,
-    modes: Sequence[Any],
-    of_model: Sequence[str],
     unseen: list[str],
     significance: float,
     random: np.random.RandomState,
 ) -> IdentifiedDamage:
-    """Fit the groups together and one by one, and test what is found; ``nominal``: effects at the nominal state."""
-    fit = comparison.fit()
-    confused = list(dict.fromkeys(confused_groups(nominal) + confused_groups(fit.slopes)))
+    """Fit the groups together and one by one, and test what is found.
+
+    Parameters
+    ----------
+    comparison, nominal : Comparison
+        Of the measured changes with the effects of the groups, in the weather of the records and at the model's nominal
+        state.
+    shift : Shift
+        Of the frequencies.
+    unseen : list of str
+        Names of the groups that are left out.
+    significance : float
+        Probability with which any group of a healthy structure is called damaged.
+    random : RandomState
+        Of the draws.
+    """
+    fit, names, at_nominal = comparison.fit(), list(comparison.names), nominal.slopes()
+    confused = list(dict.fromkeys(confused_groups(at_nominal) + confused_groups(fit.slopes)))
     draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
     errors, covariance = standard_errors(fit, N_DRAWS, random)
     for column in {column for group in confused for column in group}:
-        errors[column] = max(errors[column], error_beside(nominal, fit.severities, column))
+        errors[column] = max(errors[column], error_beside(at_nominal, fit.severities, column))
     p_values = [
-        p_of_group(fit, without, shift.n_periods, column, nominal)
+        p_of_group(fit, without, shift.n_periods, column, at_nominal)
         for column, without in enumerate(_fits_without(comparison, fit))
     ]
     table = pd.DataFrame(
@@ -55,22 +65,18 @@ def findings(
             "p_value": p_values,
             "significant": np.array(p_values) < significance / len(names),
         },
-        index=list(names),
+        index=names,
     )
-    members = {
-        name: [group for group, inside in zip(of_model, column, strict=True) if inside]
-        for name, column in zip(names, comparison.incidence.T, strict=True)
-    }
     return IdentifiedDamage(
         table=table,
-        shifts=_shift_table(shift, fit, modes),
-        single=_single_fits(comparison, names, shift),
-        similarity=pd.DataFrame(cosines(nominal), names, names),
+        shifts=_shift_table(shift, fit),
+        single=_single_fits(comparison, shift),
+        similarity=pd.DataFrame(cosines(at_nominal), names, names),
         covariance=pd.DataFrame(covariance, names, names),
-        draws=pd.DataFrame(comparison.members(draws), columns=list(of_model)),
+        draws=pd.DataFrame(comparison.members(draws), columns=list(comparison.of_model)),
         confused=[tuple(names[column] for column in group) for group in confused],
         unseen=unseen,
-        members=members,
+        members=comparison.contents,
         p_value=p_of_damage(fit, shift.n_periods, N_DRAWS, random),
         misfit=fit.misfit,
         misfit_p_value=p_of_misfit(fit, shift.n_periods),
@@ -96,15 +102,16 @@ def doubts(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST:.0%}: {highest}"
     if not found.converged:
         yield "unsettled severities", "severities still change from step to step; expected them to settle"
-    if found.misfit_p_value < found.significance:
+    if found.is_unexplained:
+        other = "something else changed too, or the frequencies scatter more than in the training records"
         yield (
             "unexplained shifts",
-            f"damage of these groups does not explain the shifts (probability {found.misfit_p_value:.2g}): something "
-            "else changed too, or the frequencies scatter more than in the training records",
+            f"damage of these groups does not explain the shifts (probability {found.misfit_p_value:.2g}): "
+            f"{found.likely_cause or other}",
         )
 
 
-def _shift_table(shift: Shift, fit: BoundedFit, modes: Sequence[Any]) -> pd.DataFrame:
+def _shift_table(shift: Shift, fit: BoundedFit) -> pd.DataFrame:
     known = np.flatnonzero(~np.isnan(shift.mean))
     explained = np.full(len(shift.mean), np.nan)
     explained[known] = fit.explained[: len(known)]
@@ -115,7 +122,7 @@ def _shift_table(shift: Shift, fit: BoundedFit, modes: Sequence[Any]) -> pd.Data
             "standard_error": np.where(np.isnan(shift.mean), np.nan, np.sqrt(np.diag(shift.covariance))),
             "n_records": shift.n_records,
         },
-        index=list(modes),
+        index=list(shift.modes),
     )
 
 
@@ -126,9 +133,9 @@ def _fits_without(comparison: Comparison, fit: BoundedFit) -> Iterator[BoundedFi
         yield comparison.of(others).fit() if severity > 0 else fit
 
 
-def _single_fits(comparison: Comparison, names: Sequence[str], shift: Shift) -> pd.DataFrame:
+def _single_fits(comparison: Comparison, shift: Shift) -> pd.DataFrame:
     """Each group's own best fit, the best first."""
-    fits = [comparison.of([[column]]).fit() for column in range(len(names))]
+    fits = [comparison.of([[column]]).fit() for column in range(len(comparison.names))]
     return pd.DataFrame(
         {
             "severity": [fit.severities[0] for fit in fits],
@@ -136,5 +143,5 @@ def _single_fits(comparison: Comparison, names: Sequence[str], shift: Shift) -> 
             "misfit": [fit.misfit for fit in fits],
             "misfit_p_value": [p_of_misfit(fit, shift.n_periods) for fit in fits],
         },
-        index=list(names),
+        index=list(comparison.names),
     ).sort_values("misfit", kind="stable")

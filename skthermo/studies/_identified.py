@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from skthermo.studies._likely_cause import likely_cause, unexplained
 from skthermo.studies._uncertain import UncertainDamage
 
 
@@ -91,6 +92,20 @@ class IdentifiedDamage:
         return self.table["standard_error"]
 
     @property
+    def is_unexplained(self) -> bool:
+        """Whether damage of these groups does not explain the shifts."""
+        return self.misfit_p_value < self.significance
+
+    @property
+    def likely_cause(self) -> str:
+        """What seems to have shifted the frequencies where damage does not: their unit, or a stiffer structure.
+
+        Empty if a group is damaged, the shifts are explained, or nothing suggests a cause.
+        """
+        is_damaged = bool(self.table["significant"].eq(True).any())
+        return likely_cause(self.shifts) if self.is_unexplained and not is_damaged else ""
+
+    @property
     def damage(self) -> dict[str, float]:
         """Severities of the model's groups that are not 0, as `DataInformedFEM.simulate` takes them."""
         found: dict[str, float] = {}
@@ -134,14 +149,16 @@ class IdentifiedDamage:
         lines += [f"{_named(group)} cannot be told apart by these modes." for group in self.confused]
         if self.unseen:
             lines.append(f"{_named(self.unseen)} cannot be seen: the standard error would be above 10 %.")
-        unexplained = (self.shifts["measured"] - self.shifts["explained"]) / self.shifts["standard_error"]
-        if self.misfit_p_value < self.significance and unexplained.notna().any():
-            worst = unexplained.abs().idxmax()
+        rest = unexplained(self.shifts)
+        if self.is_unexplained and not np.isnan(rest).all():
+            worst = int(np.nanargmax(np.abs(rest)))
+            measured, explained = self.shifts[["measured", "explained"]].to_numpy(dtype=float)[worst]
             lines.append(
-                "Damage of these groups does not explain all shifts: mode "
-                f"{worst} moved by {self.shifts.loc[worst, 'measured']:.2%}, explained "
-                f"{self.shifts.loc[worst, 'explained']:.2%}."
+                f"Damage of these groups does not explain all shifts: mode {self.shifts.index[worst]} moved by "
+                f"{measured:.2%}, explained {explained:.2%}."
             )
+            if self.likely_cause:
+                lines.append(f"{self.likely_cause[0].upper()}{self.likely_cause[1:]}.")
         elif np.isnan(self.misfit_p_value):
             lines.append("There are no more modes than damaged groups, so that any shift can be explained.")
         return "\n".join(lines)

@@ -1,6 +1,7 @@
 """Which damage explains a shift of frequencies."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -8,8 +9,10 @@ from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
-from skthermo._validation import check_array, check_is_fitted
+from skthermo._validation import check_array
 from skthermo._warnings import warn_each
+from skthermo._warnings_once import warnings_once
+from skthermo.studies._chain import check_chain, named_as_in_fit
 from skthermo.studies._comparison import Comparison, Part, remembered
 from skthermo.studies._effects import FrequencyEffects
 from skthermo.studies._findings import doubts, findings
@@ -73,14 +76,15 @@ def identify_damage(
     Raises
     ------
     ValueError
-        If T and F differ in rows, a group is unknown, no record can be compared, no group can be seen, or the model
-        cannot be damaged.
+        If fem is no fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group can
+        be seen, or the model cannot be damaged.
 
     Warns
     -----
     UserWarning
-        If groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
-        shifts.
+        Once for each kind: if the weather is unlike that of the training records, temperatures have other names than in
+        fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
+        the shifts.
 
     Notes
     -----
@@ -108,7 +112,7 @@ def identify_damage(
     >>> found.severities.round(2).to_dict()
     {'top': 0.0, 'diagonal': 0.1}
     """
-    check_is_fitted(fem)
+    check_chain(fem)
     if not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
     if shapes is None and dofs is not None:
@@ -116,20 +120,23 @@ def identify_damage(
     frequencies, members = _read(fem, T, F), read_groups(fem.model, groups)
     labels = list(members)
     of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
-    shift = measured_shift(fem, T, frequencies, noise)
+    T = named_as_in_fit(fem, T)
+    with warnings_once():
+        theta = as_floats(fem.predict_parameters(T))
+        shift = measured_shift(fem, T, theta, frequencies, noise)
     if not shift.n_records.any():
         raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
-    effects = FrequencyEffects.of(fem, T, frequencies, of_model)
+    effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
     parts = [Part(remembered(effects), shift.mean, shift.covariance)]
     if shapes is not None:
         parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
-    every = Comparison(parts, np.array([[float(name in members[label]) for label in labels] for name in of_model]))
+    incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
+    every = Comparison(parts, incidence, labels, of_model)
     at_nominal = [Part(effects.nominal(), shift.mean, shift.covariance)]
     if shapes is not None:
         ones = np.ones((1, effects.theta.shape[1]))
         at_nominal.append(_of_shapes(fem, ones, of_model, shapes, dofs, shape_noise))
-    slopes, nominal = every.slopes(), Comparison(at_nominal, every.incidence)
-    alone = errors_alone(slopes)
+    nominal, alone = replace(every, parts=at_nominal), errors_alone(every.slopes())
     seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
     if not seen:
         errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
@@ -138,17 +145,9 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
-    found = findings(
-        every.of(joined),
-        nominal.of(joined).slopes(),
-        [" + ".join(labels[column] for column in group) for group in joined],
-        shift,
-        fem.mode_names_,
-        of_model,
-        [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE],
-        significance,
-        as_random_state(random_state),
-    )
+    unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
+    random = as_random_state(random_state)
+    found = findings(every.of(joined), nominal.of(joined), shift, unseen, significance, random)
     warn_each(doubts(found))
     return found
 

@@ -49,6 +49,7 @@ def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: Arra
 
 
 def places_of(magnitudes: Array, log: bool) -> Array:
+    """Places on the axis along which the logit is linear: magnitudes of severities, or their logarithms."""
     return np.log(magnitudes) if log else magnitudes
 
 
@@ -63,6 +64,7 @@ def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, floa
 
 
 def within(bracket: tuple[float, float]) -> str:
+    """Text of a bracket, whose upper end may be unknown (NaN)."""
     lowest, highest = bracket
     return f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
 

@@ -1,5 +1,6 @@
 """Shift of measured frequencies from the healthy structure's in the same weather, and how sure it is."""
 
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats
 from skthermo.fem import check_noise
+from skthermo.studies._chain import healthy_frequencies
 
 N_PERIODS, MOST_PERIODS = 12, 60
 """Number of periods that the training records are divided into: more where the new records are few."""
@@ -29,16 +31,21 @@ class Shift(NamedTuple):
         How many records it is the mean of.
     n_periods : int
         How many independent periods the covariance stands on, pseudo-periods included.
+    modes : list
+        Names of the modes.
     """
 
     mean: Array
     covariance: Array
     n_records: NDArray[np.intp]
     n_periods: int
+    modes: Sequence[Any]
 
 
-def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
+def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
     """The shift, and its covariance by what healthy periods of the training records show, each judged by the others.
+
+    The parameters theta are those at the temperatures T.
 
     Raises
     ------
@@ -46,7 +53,7 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
         If the noise is neither "fitted" nor relative standard deviations above 0.
     """
     residuals, number = fem.expected_residuals(T, return_number=True)
-    shifts = np.log(F / (as_floats(fem.predict(T)) * (1 + as_floats(residuals))))
+    shifts = np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + as_floats(residuals))))
     mean, n_records = _mean(shifts), (~np.isnan(shifts)).sum(axis=0)
     scale = np.sqrt(1 / np.maximum(n_records, 1) + 1 / np.maximum(number, 1))
     trained = fem.residuals_.values
@@ -54,7 +61,7 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
         deviations = check_noise(noise, len(mean))
         if (deviations == 0).any():
             raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-        return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained))
+        return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained), fem.mode_names_)
     if noise != "fitted":
         raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
     n_rows = max(int(n_records.max()), 1)
@@ -64,7 +71,7 @@ def measured_shift(fem: Any, T: Any, F: Array, noise: ArrayLike | Literal["fitte
     judged = ~np.isnan(np.diag(covariance))
     covariance = np.where(np.outer(judged, judged), covariance, np.eye(len(mean)))
     mean = np.where(judged, mean, np.nan)
-    return Shift(mean, covariance * np.outer(scale, scale), n_records, n_periods + PSEUDO_PERIODS)
+    return Shift(mean, covariance * np.outer(scale, scale), n_records, n_periods + PSEUDO_PERIODS, fem.mode_names_)
 
 
 def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._threads import single_blas_thread
+from skthermo._validation import _num_samples
+from skthermo._warnings_once import without_warnings
 from skthermo.studies._state import State
 from skthermo.studies._view import View
-from skthermo.studies._warnings_once import without_warnings
 
 SIMULATED, TRUE = "data-informed", "reference"
 
@@ -65,6 +67,19 @@ class Trial:
                         f"frequencies for the {len(self.T)} rows of T"
                     )
                 yield scenario.name, TRUE, self.view.reference(records, self.T, scenario.name)
+
+    def first(self, measured: Mapping[str, Any], seeds: NDArray) -> tuple[dict[tuple[str, str], Any], dict]:
+        """Records of the first repeat beside measured ones, by scenario and source, and what says when they were taken.
+
+        Measured records have times of their own if they are a frame, or differ in number from the weather.
+        """
+        tables = {(name, source): table for name, source, table in self.tables(0, seeds)}
+        rows = dict.fromkeys(tables, self.T)
+        for name, records in measured.items():
+            tables[name, TRUE] = self.view.reference(records, self.T, name)
+            is_own = isinstance(records, pd.DataFrame) or _num_samples(records) != _num_samples(self.T)
+            rows[name, TRUE] = records if is_own else self.T
+        return tables, rows
 
     def decisions(self, repeat: int, seeds: NDArray) -> dict[tuple[str, str], Array]:
         """Decision function by scenario and source, each (n_records,)."""

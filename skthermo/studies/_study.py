@@ -11,17 +11,18 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
-from skthermo._validation import _num_samples, check_is_fitted, seed_parts, seeded
+from skthermo._validation import _num_samples, seed_parts, seeded
 from skthermo._warnings import warn_user
+from skthermo._warnings_once import warnings_once
 from skthermo.studies._candidate import Arrangement
+from skthermo.studies._chain import check_chain
 from skthermo.studies._curves import StudyCurves
 from skthermo.studies._intervals import INTERVALS
 from skthermo.studies._pod_fit import check_probability
-from skthermo.studies._simulate import SIMULATED, TRUE, Trial, clean_frequencies, judge
+from skthermo.studies._simulate import SIMULATED, Trial, clean_frequencies, judge
 from skthermo.studies._state import State, check_groups
 from skthermo.studies._summary import damage_index, summary
 from skthermo.studies._view import read_baseline
-from skthermo.studies._warnings_once import warnings_once
 
 MANY_FALSE_ALARMS = 0.5
 """Rate of false alarms from which a warning is given: the baseline and the simulation are not of one structure."""
@@ -192,9 +193,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             Once for each kind of doubt about the simulations, such as foreign weather; if most records of the healthy
             structure raise an alarm.
         """
-        if not hasattr(self.fem, "simulate"):
-            raise ValueError(f"fem is {self.fem!r:.200}; expected a fitted DataInformedFEM")
-        check_is_fitted(self.fem)
+        check_chain(self.fem)
         check_detector(self.detector)
         n_repeats = positive_integer(self.n_repeats, "n_repeats")
         if interval not in INTERVALS:
@@ -206,18 +205,12 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
         self.detector_ = clone(self.detector)
         seed_parts(self.detector_, seeded(self.random_state))
         self.detector_.fit(healthy)
+        truth = reference if callable(reference) else None
         measured = {} if reference is None or callable(reference) else reference
-        with warnings_once() as self.warnings_, single_blas_thread():
+        with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
             clean = clean_frequencies(self.fem, list(scenarios.values()), T, n_repeats)
-            truth = reference if callable(reference) else None
             trial = Trial(self.fem, self.detector_, view, list(scenarios.values()), T, clean, self.noise, truth)
-            tables = {(name, source): table for name, source, table in trial.tables(0, seeds[0])}
-            rows = dict.fromkeys(tables, T)
-            for name, records in measured.items():
-                tables[name, TRUE] = view.reference(records, T, name)
-                rows[name, TRUE] = (
-                    records if isinstance(records, pd.DataFrame) or _num_samples(records) != _num_samples(T) else T
-                )
+            tables, rows = trial.first(measured, seeds[0])
             decisions = {key: [judge(self.detector_, table)] for key, table in tables.items()}
             self.indices_ = {key: damage_index(self.detector_, tables[key], rows[key]) for key in tables}
         for repeat in trial.repeated(seeds, self.n_jobs):

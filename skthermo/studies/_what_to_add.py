@@ -15,12 +15,12 @@ from skthermo._arrays import Array, as_floats, as_random_state, positive_integer
 from skthermo._frames import check_same_rows, column_names
 from skthermo._threads import single_blas_thread
 from skthermo._warnings import warn_user
+from skthermo._warnings_once import warnings_once, without_warnings
 from skthermo.fem import check_noise
 from skthermo.studies._candidate import Arrangement, longer
 from skthermo.studies._scenario import Scenario
 from skthermo.studies._study import DetectabilityStudy
 from skthermo.studies._unknown_modes import warn_of_unknown_modes
-from skthermo.studies._warnings_once import warnings_once, without_warnings
 from skthermo.studies._world import LARGEST_SEED, Ladder, World, mode_name
 
 RUNGS = np.linspace(0.3, 1.5, 13)
@@ -158,7 +158,7 @@ def what_to_add(
         LARGEST_SEED, size=positive_integer(study.n_repeats, "n_repeats")
     )
     rows: list[dict[str, Any]] = []
-    with warnings_once():
+    with warnings_once("in the simulations of this study"):
         if ranks:
             warn_of_unknown_modes(fem, ranks)
         trials = [Trials(world, present, candidates)] if candidates else []

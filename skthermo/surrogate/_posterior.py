@@ -36,9 +36,13 @@ class Prior:
 
     @classmethod
     def of_box(cls, bounds: Array, width: Array | None = None) -> "Prior":
-        """The prior of a box: the mean and, without a width, the variance of ln theta spread evenly over it."""
+        """The prior of a box: about its middle and, without a width, with the variance of ln theta spread over it.
+
+        The middle is that of theta, which is 1 where bounds are a half-width: rows that tell nothing about a parameter
+        then have its nominal value.
+        """
         lowest, highest = np.log(bounds).T
-        mean, half = (lowest + highest) / 2, (highest - lowest) / 2
+        mean, half = np.log(bounds.mean(axis=1)), (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
     def information(self, sensitivity: Array, noise: Array) -> Array:

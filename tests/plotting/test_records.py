@@ -1,5 +1,8 @@
 """Frequencies and parameters over temperature and time: what is drawn is what was given."""
 
+import copy
+from io import BytesIO
+
 import matplotlib.dates as mdates
 import matplotlib.pyplot as plt
 import numpy as np
@@ -151,6 +154,17 @@ def test_predictions_with_intervals_in_time(fem, later):
         PredictionDisplay.from_estimator(LinearRegression().fit(T, F), T, F, confidence=0.8)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"), [(lambda T: T * np.nan, "none of 365 rows can be predicted"), (lambda T: T + 60, "far outside")]
+)
+def test_doubts_about_the_weather_are_said_once(fem, later, change, said):
+    with pytest.warns(UserWarning, match=said) as caught:
+        display = PredictionDisplay.from_estimator(fem, change(later.temperatures), later.frequencies)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert len(display.bands_) == 6
+
+
 def test_bands_break_where_an_end_is_unknown():
     lowest, highest = np.full(10, 0.0), np.full(10, 2.0)
     highest[4] = np.nan
@@ -199,3 +213,16 @@ def test_the_report_of_a_fit(fem):
         np.testing.assert_allclose([bar.get_width() for bar in display.bars_[name]], values)
     with pytest.raises(ValueError, match="has no report_; expected a fitted DataInformedFEM"):
         FitReportDisplay.from_estimator(type(fem)(fem.model))
+
+
+@pytest.mark.parametrize("name", ["f{}", "frequency of the mode number {} of the deck above the river"])
+def test_titles_of_a_report_lie_within_the_figure(fem, name):
+    report = copy.deepcopy(fem.report_)
+    for table in (report.errors, report.offsets, report.deviations, report.outside):
+        table.index = [name.format(number) for number in range(len(table))]
+    figure = FitReportDisplay(report).plot().figure_
+    figure.savefig(BytesIO(), format="png")
+    for ax in figure.axes:
+        title = ax.title.get_window_extent()
+        assert figure.bbox.x0 <= title.x0
+        assert title.x1 <= figure.bbox.x1

@@ -8,15 +8,9 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
 from skthermo.studies._summary import band_of
-from skthermo.surrogate import DataInformedFEM
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
-
-
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
 
 
 def study(fem, scenarios, **options):
@@ -62,11 +56,23 @@ def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
 
 
 def test_errors_name_the_family_with_damage_and_strengthening(fem):
-    mixed = study(fem, sweep(fem, (-0.1, 0.2), ["bottom"]))
+    mixed = study(fem, [Scenario(f"bottom {severity}", {"bottom": severity}) for severity in (-0.1, 0.2)])
     mixed.run(WEATHER)
     for ask in (mixed.minimum_detectable_damage, lambda: mixed.pod_curve("bottom")):
         with pytest.raises(ValueError, match=r"family 'bottom': severities are \[-0.1, 0.2\]"):
             ask()
+
+
+def test_a_sweep_of_damage_and_strengthening_has_a_curve_for_each(fem):
+    both = study(fem, sweep(fem, (-0.3, -0.2, -0.1, 0.1, 0.2, 0.3), ["bottom"]))
+    both.run(WEATHER)
+    alone = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom"]))
+    alone.run(WEATHER)
+    for method in ("grid", "curve"):
+        found = both.minimum_detectable_damage(method=method)["mdd"].droplevel("source")
+        assert found.index.tolist() == ["bottom strengthened", "bottom"]
+        assert -0.4 < found["bottom strengthened"] < 0 < found["bottom"] < 0.4
+        assert found["bottom"] == pytest.approx(alone.minimum_detectable_damage(method=method)["mdd"].iloc[0])
 
 
 def test_what_is_no_chain_or_no_detector_is_named(fem):

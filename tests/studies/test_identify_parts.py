@@ -13,17 +13,11 @@ from skthermo.studies._groups import read_groups
 from skthermo.studies._separability import confused_groups, cosines, errors_alone, merge_confused
 from skthermo.studies._shape_effects import ShapeEffects
 from skthermo.studies._shift import covariance_of_record, measured_shift
-from skthermo.surrogate import DataInformedFEM
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::12]
 GROUPS = ["bottom", "top", "diagonal"]
 AT = np.array([0.1, 0.35, 0.0])
-
-
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
 
 
 def differences(function, at, step=1e-4):
@@ -34,7 +28,7 @@ def differences(function, at, step=1e-4):
 def test_effects_are_the_changes_of_simulated_records(fem):
     F = fem.simulate(WEATHER).to_numpy(copy=True)
     F[::2, 1], F[:, 4] = np.nan, np.nan
-    effects = FrequencyEffects.of(fem, WEATHER, F, GROUPS)
+    effects = FrequencyEffects.of(fem, fem.predict_parameters(WEATHER).to_numpy(), F, GROUPS)
     change, slopes = effects(AT)
     damaged = fem.simulate(WEATHER, damage=dict(zip(GROUPS, AT, strict=True))).to_numpy()
     ratios = np.log(damaged / fem.simulate(WEATHER).to_numpy())
@@ -204,18 +198,19 @@ def test_shift_of_known_records(fem):
     residuals, number = fem.expected_residuals(WEATHER, return_number=True)
     F = (fem.predict(WEATHER) * (1 + residuals) * np.linspace(0.97, 1.02, 6)).to_numpy(copy=True)
     F[::2, 3] = np.nan
-    shift = measured_shift(fem, WEATHER, F, "fitted")
+    theta = fem.predict_parameters(WEATHER).to_numpy()
+    shift = measured_shift(fem, WEATHER, theta, F, "fitted")
     np.testing.assert_allclose(shift.mean, np.log(np.linspace(0.97, 1.02, 6)), atol=1e-12)
-    stated = measured_shift(fem, WEATHER, F, 0.02)
+    stated = measured_shift(fem, WEATHER, theta, F, 0.02)
     counts = (~np.isnan(F)).sum(axis=0)
     np.testing.assert_allclose(np.diag(stated.covariance), 0.02**2 * (1 / counts + 1 / number))
     assert (number > 0).all()
     assert (number <= len(YEAR.frequencies)).all()
     assert shift.n_records.tolist() == counts.tolist()
-    few = measured_shift(fem, WEATHER[:3], F[:3], "fitted")
+    few = measured_shift(fem, WEATHER[:3], theta[:3], F[:3], "fitted")
     assert (np.diag(few.covariance) > np.diag(shift.covariance)).all()
     with pytest.raises(ValueError, match="noise is 'gaussian'; expected \"fitted\""):
-        measured_shift(fem, WEATHER, F, "gaussian")
+        measured_shift(fem, WEATHER, theta, F, "gaussian")
 
 
 def test_as_many_records_as_the_weights_say(fem):

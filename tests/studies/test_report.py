@@ -224,7 +224,7 @@ def luminance(colour):
 
 
 def test_families_of_damage_and_strengthening_are_named(chain, tmp_path):
-    study = run_study(*chain[:2], sweep(chain[0], (-0.1, 0.2), [HOSTILE]))
+    study = run_study(*chain[:2], [Scenario(f"part {severity}", {HOSTILE: severity}) for severity in (-0.1, 0.2)])
     text = Page(report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
     assert f"{HOSTILE}: of damage and strengthening together" in text
     assert "No damage group was tested" not in text

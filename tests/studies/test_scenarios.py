@@ -116,7 +116,10 @@ def test_a_sweep_holds_every_group_at_every_severity():
     scenarios = sweep(make_truss(), (0.05, -0.15), groups=["top", "bottom"])
     assert [s.name for s in scenarios] == ["healthy", "top 5 %", "top -15 %", "bottom 5 %", "bottom -15 %"]
     assert [s.damage for s in scenarios[1:3]] == [{"top": 0.05}, {"top": -0.15}]
+    assert [s.family for s in scenarios] == [None, "top", "top strengthened", "bottom", "bottom strengthened"]
     assert len(sweep(make_truss())) == 1 + 4 * 5
+    assert {s.family for s in sweep(make_truss(), (-0.1, -0.2), ["top"])[1:]} == {"top"}
+    assert len(sweep(make_truss(), ())) == 1
 
 
 @pytest.mark.parametrize(

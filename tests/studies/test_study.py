@@ -22,11 +22,6 @@ SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
 MODES = list(YEAR.frequencies)
 
 
-@pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
-
-
 def compensated(last=None):
     return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
 
@@ -103,10 +98,8 @@ def test_a_detector_may_see_some_of_the_modes(fem):
     assert list(study.detector_.feature_names_in_) == MODES
 
 
-def test_arrays_give_the_rates_of_frames(fem):
+def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
     scenarios = sweep(fem, (0.1, 0.2), ["top"])
-    twin = DataInformedFEM(make_truss(), random_state=0)
-    twin.fit(YEAR.temperatures.to_numpy(), YEAR.frequencies.to_numpy())
     for detector, baseline in (
         (MahalanobisDetector(), YEAR.frequencies),
         (
@@ -116,7 +109,7 @@ def test_arrays_give_the_rates_of_frames(fem):
             SIDE_BY_SIDE,
         ),
     ):
-        arrays = DetectabilityStudy(twin, detector, scenarios, n_repeats=2, random_state=0)
+        arrays = DetectabilityStudy(fem_of_arrays, detector, scenarios, n_repeats=2, random_state=0)
         expected = DetectabilityStudy(fem, clone(detector), scenarios, n_repeats=2, random_state=0)
         if isinstance(detector, MahalanobisDetector):
             frames = expected.run(WEATHER, baseline)

@@ -21,11 +21,6 @@ MODES = list(YEAR.frequencies)
 
 
 @pytest.fixture(scope="module")
-def fem():
-    return DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
-
-
-@pytest.fixture(scope="module")
 def study(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
     study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01, random_state=0)
@@ -91,15 +86,13 @@ def test_same_bits_whatever_the_jobs(study):
     pd.testing.assert_frame_equal(what_to_add(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
 
 
-def test_arrays_and_compensated_detectors_by_name_or_position(fem):
+def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays):
     by_name, by_position = (
         make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
         for targets in (MODES, list(range(3, 9)))
     )
-    T, F = YEAR.temperatures.to_numpy(), YEAR.frequencies.to_numpy()
-    arrays = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
     tables = []
-    for chain, detector, weather in ((fem, by_name, WEATHER), (arrays, by_position, WEATHER.to_numpy())):
+    for chain, detector, weather in ((fem, by_name, WEATHER), (fem_of_arrays, by_position, WEATHER.to_numpy())):
         scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
         study = DetectabilityStudy(chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0)
         study.run(weather)

@@ -51,6 +51,13 @@ def _read_key(key, what: str) -> Key:
 
 
 def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
+    """A copy of a matrix, (n_dof, n_dof), dense or sparse as given, which is exactly symmetric.
+
+    Raises
+    ------
+    ValueError
+        If it is not square, of another size, complex, not finite, or not symmetric within 1e-8 of its largest entry.
+    """
     array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else real_array(matrix, what)
     if np.iscomplexobj(array):
         raise ValueError(f"{what} is complex; expected real numbers")

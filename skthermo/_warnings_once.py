@@ -1,4 +1,4 @@
-"""Warnings of many simulations, given once."""
+"""Warnings that several steps repeat, given once."""
 
 import re
 import threading
@@ -10,8 +10,14 @@ from skthermo._warnings import warn_user
 
 
 @contextmanager
-def warnings_once() -> Iterator[list[str]]:
-    """Give warnings that differ only in their numbers once, with their count, when the context ends.
+def warnings_once(where: str = "") -> Iterator[list[str]]:
+    """Give warnings that differ only in their numbers once, when the context ends.
+
+    Parameters
+    ----------
+    where : str, default=""
+        Said of the repetitions with their number, such as "in the simulations of this study"; by default they are not
+        mentioned.
 
     Yields
     ------
@@ -26,10 +32,10 @@ def warnings_once() -> Iterator[list[str]]:
     for warning in caught:
         alike.setdefault(re.sub(r"[\d.]+", "0", str(warning.message)), []).append(warning)
     for first, *others in alike.values():
-        again = f" (and {len(others)} times more in the simulations of this study)" if others else ""
+        again = f" (and {len(others)} times more {where})" if others and where else ""
         texts.append(f"{first.message}{again}")
         if first.category is UserWarning:
-            warn_user(f"{first.message}{again}", f"study: {first.message}")
+            warn_user(f"{first.message}{again}", f"once: {first.message}")
         else:
             warnings.warn_explicit(first.message, first.category, first.filename, first.lineno)
 

@@ -1,0 +1,88 @@
+"""Reads the reference modes that poles are assigned to."""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import real_array
+from skthermo._warnings import warn_user
+from skthermo.preprocessing._assignment import shape_agreement
+
+
+class ReferenceModes(NamedTuple):
+    """Frequencies (n_modes,), shapes (n_sensors, n_modes) or None, names of modes, names of sensors or None."""
+
+    frequencies: NDArray[np.float64]
+    shapes: NDArray | None
+    names: list[str]
+    sensors: list | None
+
+
+def read_reference(reference: Any) -> ReferenceModes:
+    """The reference modes, checked.
+
+    Raises
+    ------
+    ValueError
+        If frequencies or shapes are missing, not finite, not positive or do not fit each other.
+    """
+    if isinstance(reference, Mapping):
+        missing = [name for name in ("frequencies", "shapes") if name not in reference]
+        if missing:
+            raise ValueError(f"reference has the fields {list(reference)}; expected also {missing}")
+        given, shapes, sensors = reference["frequencies"], reference["shapes"], reference.get("sensors")
+    elif len(reference) == 2:
+        (given, shapes), sensors = reference, None
+    else:
+        raise ValueError(f"reference has {len(reference)} parts; expected two, frequencies and shapes")
+    frequencies = real_array(given, "reference frequencies")
+    if frequencies.ndim != 1 or not frequencies.size:
+        raise ValueError(f"reference frequencies have shape {frequencies.shape}; expected (n_modes,)")
+    if not (np.isfinite(frequencies) & (frequencies > 0)).all():
+        raise ValueError(f"reference frequencies are {frequencies}; expected positive values in Hz")
+    n_modes = len(frequencies)
+    names = [f"f{mode + 1}" for mode in range(n_modes)]
+    if isinstance(given, pd.Series) and not isinstance(given.index, pd.RangeIndex):
+        names = [str(name) for name in given.index]
+    if len(set(names)) < n_modes:
+        raise ValueError(f"reference modes are named {names}; expected different names")
+    if shapes is not None:
+        shapes = _read_shapes(shapes, n_modes)
+        if sensors is not None and len(sensors) != len(shapes):
+            raise ValueError(f"reference names {len(sensors)} sensors; expected {len(shapes)}, as its shapes have")
+    return ReferenceModes(frequencies, shapes, names, None if sensors is None else list(sensors))
+
+
+def _read_shapes(shapes: Any, n_modes: int) -> NDArray:
+    shapes = np.array(shapes, dtype=complex) if np.iscomplexobj(shapes) else real_array(shapes, "reference shapes")
+    if shapes.ndim != 2 or shapes.shape[1] != n_modes:
+        hint = ": transpose them" if shapes.ndim == 2 and shapes.shape[0] == n_modes else ""
+        raise ValueError(f"reference shapes have shape {shapes.shape}; expected (n_sensors, {n_modes}){hint}")
+    norms = np.linalg.norm(shapes, axis=0)
+    if not (np.isfinite(norms) & (norms > 0)).all():
+        mode = np.flatnonzero(~(np.isfinite(norms) & (norms > 0)))[0]
+        raise ValueError(f"shape {mode} of the reference is zero at all sensors, or not finite; expected other values")
+    return shapes
+
+
+def warn_of_alike(modes: ReferenceModes, max_shift: float, min_mac: float) -> None:
+    """Warn of reference modes that neither their frequencies nor their shapes can tell apart."""
+    pairs = np.array(list(combinations(range(len(modes.names)), 2)), dtype=int).reshape(-1, 2)
+    low, high = np.sort(modes.frequencies[pairs], axis=1).T
+    alike = (1 - max_shift) * high <= (1 + max_shift) * low
+    if modes.shapes is not None:
+        mac, _ = shape_agreement(modes.shapes.T, modes.shapes, [])
+        alike &= mac[pairs[:, 0], pairs[:, 1]] >= min_mac
+    if alike.any():
+        first = "/".join(modes.names[mode] for mode in pairs[alike][0])
+        by = "no shapes are given" if modes.shapes is None else f"their shapes at the sensors have a MAC of {min_mac:g}"
+        warn_user(
+            f"{alike.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
+            f"frequency can lie within max_shift={max_shift:g} of both, and {by}"
+            f"{'' if modes.shapes is None else ' or more'}; expected a smaller max_shift, or more sensors",
+            "modes that can be confused",
+        )

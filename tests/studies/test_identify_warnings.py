@@ -1,0 +1,87 @@
+"""What an identification says about its inputs: each doubt once, each error in plain words."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import ConvergenceWarning, NotFittedError
+from sklearn.neural_network import MLPRegressor
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.studies import identify_damage
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+
+YEAR = make_truss_campaign(random_state=0)
+LATER = make_truss_campaign(random_state=1)
+T, F = LATER.temperatures[::10], LATER.frequencies[::10]
+GROUPS = ["bottom", "top", "diagonal"]
+FOREIGN, UNNAMED, UNEXPLAINED = "far outside those of the training records", "feature names", "does not explain"
+
+
+def warned(fem, T, F):
+    """Severities, and the texts of all warnings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = identify_damage(fem, T, F, GROUPS, random_state=0)
+    return found.severities, [str(warning.message) for warning in caught], [warning.filename for warning in caught]
+
+
+def assert_each_once(texts, kinds):
+    assert len(texts) == len(kinds), texts
+    for text, kind in zip(texts, kinds, strict=True):
+        assert kind in text
+
+
+@pytest.mark.parametrize(
+    ("make_T", "kinds"),
+    [
+        (lambda: T, []),
+        (lambda: T + 60, [FOREIGN, UNEXPLAINED]),
+        (lambda: T.to_numpy(), [UNNAMED]),
+        (lambda: T.set_axis(range(3), axis=1), [UNNAMED]),
+        (lambda: T.to_numpy() + 60, [UNNAMED, FOREIGN, UNEXPLAINED]),
+    ],
+    ids=["as in fit", "foreign weather", "arrays", "numbered columns", "foreign arrays"],
+)
+def test_each_kind_of_warning_comes_once(fem, make_T, kinds):
+    found, texts, files = warned(fem, make_T(), F)
+    assert_each_once(texts, kinds)
+    assert set(files) <= {__file__}
+    if FOREIGN not in kinds:
+        pd.testing.assert_series_equal(found, warned(fem, T, F)[0])
+
+
+def test_frames_for_a_chain_without_names(fem, fem_of_arrays):
+    found, texts, _ = warned(fem_of_arrays, T, F.to_numpy())
+    assert_each_once(texts, ["but the chain was fitted without feature names; the columns are taken in the order"])
+    np.testing.assert_allclose(found, warned(fem, T, F)[0], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_networks_of_all_folds_warn_together():
+    network = MLPRegressor(hidden_layer_sizes=(5,), max_iter=5, random_state=0)
+    fem = DataInformedFEM(make_truss(), mapper=TemperatureMapper(network), random_state=0)
+    fem.fit(YEAR.temperatures[::4], YEAR.frequencies[::4])
+    with pytest.warns(ConvergenceWarning) as caught:
+        identify_damage(fem, T, F, GROUPS, random_state=0)
+    assert sum(warning.category is ConvergenceWarning for warning in caught) == 1
+
+
+def test_foreign_weather_of_a_reduced_model(reduced_fem):
+    assert_each_once(warned(reduced_fem, T + 60, F)[1], [FOREIGN, "outside the box of the reduced model", UNEXPLAINED])
+
+
+def test_what_is_no_fitted_chain_is_named():
+    with pytest.raises(ValueError, match=r"fem is AffineModel.*expected a fitted DataInformedFEM"):
+        identify_damage(make_truss(), T, F)
+    with pytest.raises(NotFittedError):
+        identify_damage(DataInformedFEM(make_truss()), T, F)
+
+
+@pytest.mark.filterwarnings("ignore:.*feature names")
+def test_temperatures_of_other_sensors_are_errors(fem):
+    with pytest.raises(ValueError, match="X has 2 features, but DataInformedFEM is expecting 3"):
+        identify_damage(fem, T.to_numpy()[:, :2], F)
+    with pytest.raises(ValueError, match="feature names should match"):
+        identify_damage(fem, T.set_axis(list("abc"), axis=1), F)
