@@ -80,7 +80,7 @@ def test_estimates_are_what_an_independent_optimiser_finds():
     for i in range(3):
         u = shapes[i] / np.linalg.norm(shapes[i], axis=1, keepdims=True)
         best = least_squares(residuals, np.zeros(4), args=(F[i], u), xtol=1e-12, ftol=1e-12)
-        np.testing.assert_allclose(np.log(found.theta[i]), best.x, atol=1e-3 * found.std[i].max())
+        np.testing.assert_allclose(np.log(found.theta[i]), best.x, atol=3e-3 * found.std[i].max())
         expected = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
         np.testing.assert_allclose(found.std[i] / found.theta[i], expected, rtol=0.01)
 
