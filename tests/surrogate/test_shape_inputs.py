@@ -9,10 +9,11 @@ from scipy.optimize import least_squares
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
 
-from skthermo.datasets import make_kw51, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, evaluate_modes, sample, shape_components
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from skthermo.updating import identifiability
+from tests.fem.frames import portal
 from tests.surrogate.chains import TRUSS
 
 DOFS = [1, 3, 5, 7]
@@ -176,8 +177,8 @@ def test_models_without_derivatives_are_refined_on_request():
 
 
 def test_reduced_models_and_stored_simulations_give_the_same(tmp_path):
-    model = make_kw51(["E_arc", "E_bot"], n_modes=3)
-    dofs = [94, 95, 1029, 1071]
+    model = portal(n_modes=3, track=True).with_parameters(["columns", "beams"])
+    dofs = [40, 100, 160, 220]
     theta = drawn(5, 0.1, model=model)
     X = columns(*measured(theta, model, dofs))
     options = {"bounds": 0.1, "n_samples": 20, "dofs": dofs}
