@@ -83,7 +83,9 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
     samples_ : Bunch
         ``theta``, ``frequencies`` and, with ``dofs``, ``shapes`` of the training samples, before noise.
     shape_inputs_ : ShapeInputs or None
-        With ``dofs``: how columns of shapes are read.
+        With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
+    scores_ : ShapeScores
+        With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
