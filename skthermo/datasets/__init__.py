@@ -2,6 +2,7 @@
 
 from skthermo.datasets._campaign import make_truss_campaign, steel_modulus
 from skthermo.datasets._kw51 import make_kw51
+from skthermo.datasets._kw51_campaign import make_kw51_campaign
 from skthermo.datasets._kw51_file import load_kw51
 from skthermo.datasets._kw51_sensors import kw51_sensors
 from skthermo.datasets._kw51_structure import kw51_structure
@@ -15,6 +16,7 @@ __all__ = [
     "load_kw51",
     "load_z24",
     "make_kw51",
+    "make_kw51_campaign",
     "make_truss",
     "make_truss_campaign",
     "make_z24",

@@ -1,0 +1,252 @@
+"""The synthetic campaign of KW51: its laws, and what it was tuned to."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from pandas.testing import assert_frame_equal
+
+from skthermo.datasets import kw51_structure, make_kw51, make_kw51_campaign
+from skthermo.datasets._kw51_monitoring import missing_modes, missing_temperatures
+from skthermo.datasets._kw51_truth import BOX, thermal_multipliers
+from skthermo.datasets._kw51_weather import N_HOURS, draw_weather, memory, smooth_noise
+from skthermo.fem import mac
+from skthermo.studies import Scenario
+
+SHIFTS = np.array([-1.13, -0.58, -1.18, -0.34, 2.07])  # %, modes 2 to 6
+COVERAGE = np.array([0.344, 0.950, 0.503, 0.879, 0.965])
+CORRELATIONS = np.array([-0.428, -0.553, -0.310, -0.644])  # modes 2 to 5
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return make_kw51_campaign(random_state=0)
+
+
+@pytest.fixture(scope="module")
+def unchanged():
+    return make_kw51_campaign(retrofit=False, random_state=0)
+
+
+def test_records_are_those_of_the_bridge(campaign):
+    index = pd.date_range("2018-10-01", periods=11328, freq="h", name="time")
+    for name, columns in {
+        "temperatures": ["tBD31A"],
+        "frequencies": [f"f{i}" for i in range(1, 7)],
+        "clean_frequencies": [f"f{i}" for i in range(1, 7)],
+        "damping": [f"xi{i}" for i in range(1, 7)],
+        "theta": list(campaign.model.parameter_names),
+    }.items():
+        pd.testing.assert_index_equal(campaign[name].index, index)
+        assert list(campaign[name]) == columns
+    assert campaign.state.value_counts().to_dict() == {"before": 5424, "during": 3241, "after": 2663}
+    assert campaign.state.index[campaign.state == "after"][0] == pd.Timestamp("2019-09-27 01:00")
+    assert_array_equal(campaign.damping.isna(), campaign.frequencies.isna())
+    assert campaign.damping.stack().dropna().between(0.001, 0.04).all()
+    assert len(campaign.sensors) == 12
+    assert "shapes" not in campaign
+
+
+def test_one_seed_gives_one_campaign(campaign, unchanged):
+    again = make_kw51_campaign(n_hours=2000, random_state=0)
+    changed = make_kw51_campaign(n_hours=2000, noise=0.0, damage={"pipes": 0.1}, random_state=0)
+    for name in ("temperatures", "frequencies", "damping", "theta", "clean_frequencies"):
+        assert_frame_equal(again[name], campaign[name][:2000], check_exact=True)
+    for other in (changed, unchanged):
+        for name in ("temperatures", "damping", "theta"):
+            assert_frame_equal(other[name][:2000], campaign[name][:2000], check_exact=True)
+        assert_array_equal(other.frequencies[:2000].isna(), campaign.frequencies[:2000].isna())
+    noise, other_noise = (c.frequencies / c.clean_frequencies - 1 for c in (campaign, unchanged))
+    assert_allclose(noise, other_noise, atol=1e-12)
+    assert not make_kw51_campaign(n_hours=10, random_state=1).theta.equals(campaign.theta[:10])
+
+
+def test_longer_weather_begins_as_a_shorter_one():
+    weather = [draw_weather(n_hours, np.random.RandomState(4)) for n_hours in (100, N_HOURS, N_HOURS + 500)]
+    assert_frame_equal(weather[0], weather[1][:100], check_exact=True)
+    assert_frame_equal(weather[1], weather[2][:N_HOURS], check_exact=True)
+    missing = [missing_modes(n_hours, np.random.RandomState(4)) for n_hours in (50, 70)]
+    assert_array_equal(missing[0], missing[1][:50])
+
+
+def test_truth_model_reproduces_the_clean_frequencies(campaign):
+    """Before, after and in the course of the retrofit, by the full model."""
+    model, rows = campaign.model, np.random.RandomState(0).choice(5424, 20)
+    clean, theta = campaign.clean_frequencies, campaign.theta
+    assert_allclose(model.frequencies(theta.iloc[rows]), clean.iloc[rows], rtol=1e-5)
+    damage, mass = campaign.retrofit["damage"], campaign.retrofit["mass"]
+    strengthened = model.damaged(damage).with_added(mass=mass)
+    assert_allclose(strengthened.frequencies(theta.iloc[-20:]), clean.iloc[-20:], rtol=1e-5)
+    half = model.damaged({group: s / 2 for group, s in damage.items()}).with_added(mass=mass / 2)
+    august = slice("2019-08-01 00:00", "2019-08-01 12:00")
+    assert_allclose(half.frequencies(theta[august]), clean[august], rtol=1e-5)
+
+
+def test_retrofit_shifts_are_the_measured_ones(campaign, unchanged):
+    after = campaign.state == "after"
+    shifts = 100 * (campaign.clean_frequencies / unchanged.clean_frequencies - 1)
+    assert_allclose(shifts[after].mean()[1:], SHIFTS, atol=0.02)
+    assert (shifts[campaign.state == "before"] == 0).all(axis=None)
+    assert shifts["f6"][campaign.state == "during"].between(-0.4, 2.2).all()
+    frequencies = campaign.frequencies
+    measured = 100 * (frequencies[after].mean() / frequencies[campaign.state == "before"].mean() - 1)
+    assert_allclose(measured[1:], SHIFTS, atol=0.1)
+    assert unchanged.state.unique().tolist() == ["before"]
+
+
+def test_retrofit_serves_the_models_of_the_bridge(campaign):
+    model = make_kw51(updated=True)
+    retrofitted = model.damaged(campaign.retrofit["damage"]).with_added(mass=campaign.retrofit["mass"])
+    shifts = 100 * (retrofitted.frequencies(np.ones((1, 5))) / model.frequencies(np.ones((1, 5))) - 1)
+    assert_allclose(shifts[0, 1:], SHIFTS, atol=0.05)
+    assert not Scenario("retrofit", **campaign.retrofit).is_healthy
+    assert campaign.retrofit["mass"].sum() == pytest.approx(3 * 32 * (353 + 837))
+
+
+def test_damage_begins_when_it_is_said_to(unchanged):
+    options = {"retrofit": False, "n_hours": 1500, "noise": 0.0, "gaps": False, "random_state": 0}
+    damaged = make_kw51_campaign(damage={"braces": 0.2}, damage_from="2018-11-20", **options)
+    onset = unchanged.theta.index.get_loc("2018-11-20 00:00")
+    change = damaged.clean_frequencies / unchanged.clean_frequencies[:1500] - 1
+    assert (change[:onset] == 0).all(axis=None)
+    assert (change[onset:].drop(columns="f1") < 0).all(axis=None)
+    assert change[onset:].mean().idxmin() == "f6"
+    expected = damaged.model.damaged({"braces": 0.2}).frequencies(damaged.theta.iloc[-5:])
+    assert_allclose(damaged.clean_frequencies[-5:], expected, rtol=1e-5)
+    assert_frame_equal(damaged.frequencies, damaged.clean_frequencies, check_exact=True)
+    options["n_hours"] = 24
+    from_the_start = make_kw51_campaign(damage={"braces": 0.2}, **options)
+    expected = damaged.model.damaged({"braces": 0.2}).frequencies(damaged.theta.iloc[:5])
+    assert_allclose(from_the_start.clean_frequencies[:5], expected, rtol=1e-5)
+
+
+def test_drift_and_damage_multiply():
+    rate, n_hours = 0.03, 700
+    campaign = make_kw51_campaign(
+        n_hours=n_hours, gaps=False, drift={"arch": rate}, damage={"arch": 0.1}, random_state=3
+    )
+    factor = (1 - rate * (n_hours - 1) / 8766) * 0.9
+    expected = campaign.model.damaged({"arch": 1 - factor}).frequencies(campaign.theta.iloc[[-1]])
+    assert_allclose(campaign.clean_frequencies.iloc[[-1]], expected, rtol=1e-5)
+
+
+def test_noise_is_relative(campaign):
+    ratio = make_kw51_campaign(n_hours=3000, noise=[0.0, *[0.01] * 5], gaps=False, random_state=5)
+    error = ratio.frequencies / ratio.clean_frequencies - 1
+    assert_allclose(error.std()[1:], 0.01, rtol=0.05)
+    assert (error["f1"].abs() < 1e-12).all()
+    stated = [0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015]
+    assert_allclose((campaign.frequencies / campaign.clean_frequencies - 1).std(), stated, rtol=0.05)
+
+
+def test_correlations_before_the_retrofit(campaign):
+    before = campaign.state == "before"
+    found = campaign.frequencies[before].corrwith(campaign.temperatures["tBD31A"][before])
+    assert_allclose(found[["f2", "f3", "f4", "f5"]], CORRELATIONS, atol=0.1)
+    assert found["f6"] < -0.5
+
+
+def test_frost_lifts_the_vertical_modes(unchanged):
+    """The coldest hours are above the line of the warmer ones, in mode 6 most."""
+    temperature, clean = unchanged.temperatures["tBD31A"], unchanged.clean_frequencies
+    warm, cold = temperature.between(4, 20), temperature.notna() & (unchanged.theta["I_33g"] > 1.5)
+    assert cold.sum() > 10
+    excess = {}
+    for mode in ("f2", "f6"):
+        line = np.polyfit(temperature[warm], clean[mode][warm], 1)
+        excess[mode] = (clean[mode][cold] / np.polyval(line, temperature[cold]) - 1).mean()
+    assert 0.005 < excess["f6"] < 0.02
+    assert abs(excess["f2"]) < 0.001
+
+
+def test_gaps_cover_as_on_the_bridge():
+    missing = np.array([missing_modes(N_HOURS, np.random.RandomState(seed)) for seed in range(8)])
+    assert_allclose(1 - missing.mean(axis=(0, 1))[1:], COVERAGE, atol=0.02)
+    assert (~missing).all(axis=2).mean() == pytest.approx(0.13, abs=0.02)
+    begins = (missing[:, 1:] & ~missing[:, :-1]).sum(axis=(0, 1))
+    assert (missing.sum(axis=(0, 1)) / begins > 3).all()  # hours in one block
+    index = pd.date_range("2018-10-01", periods=N_HOURS, freq="h")
+    hours = np.array([missing_temperatures(index, np.random.RandomState(seed)) for seed in range(8)])
+    assert 1 - hours.mean() == pytest.approx(0.88, abs=0.01)
+    assert hours[:, :4000].mean() == pytest.approx(0.31, abs=0.015)
+    assert hours[:, index < "2018-11-21"].all()
+
+
+def test_weather_is_that_of_the_region():
+    for seed in range(8):
+        weather = draw_weather(N_HOURS, np.random.RandomState(seed))
+        steel = weather["steel"]
+        assert steel["2019-01"].min() == pytest.approx(-2.9, abs=1.0)
+        assert -8 < steel.min() < -2
+        assert 28 < steel.max() < 45
+        assert weather["frost"]["2019-01"].max() > 0.5
+        assert (weather["frost"]["2019-06":"2019-08"] < 1e-3).all()
+        daily = steel.resample("D").agg(["min", "max"])
+        width = daily["max"] - daily["min"]
+        assert width["2019-06":"2019-08"].mean() > 2 * width["2018-12":"2019-01"].mean()
+
+
+def test_smooth_noise_has_its_closed_form():
+    noise = smooth_noise(1_000_000, 2, 10.0, np.random.RandomState(0))
+    assert abs(np.corrcoef(noise.T)[0, 1]) < 0.05
+    lags = np.arange(0, 40, 8)
+    found = [(noise[lag:] * noise[: len(noise) - lag]).mean(axis=0) for lag in lags]
+    expected = (1 + lags / 10) * np.exp(-lags / 10)
+    assert_allclose(found, np.column_stack([expected, expected]), atol=0.03)
+
+
+def test_memory_forgets_exponentially():
+    step = np.r_[np.full(5, 2.0), np.full(50, 3.0)]
+    assert_allclose(memory(step, 24.0)[5:], 3 - np.exp(-np.arange(1, 51) / 24))
+    assert_allclose(memory(step, 24.0)[:5], 2.0)
+
+
+def test_shapes_are_those_of_the_model():
+    campaign = make_kw51_campaign(n_hours=60, shapes=True, random_state=2)
+    assert campaign.shapes.shape == (60, 6, 12)
+    assert_array_equal(np.isnan(campaign.shapes).all(axis=2), campaign.frequencies.isna())
+    everything = make_kw51_campaign(n_hours=60, shapes=True, gaps=False, random_state=2)
+    assert_allclose(np.linalg.norm(everything.shapes, axis=2), 1.0)
+    dofs = [kw51_structure().dofs.index((("deck", 16, side), "z")) for side in (0, 4)]
+    places = [campaign.sensors.index(name) for name in ("aBD17Az", "aBD17Cz")]
+    expected = campaign.model.modes(everything.theta.iloc[[0]])[1][0][dofs]
+    for mode in (4, 5):
+        ratio = everything.shapes[0, mode, places[1]] / everything.shapes[0, mode, places[0]]
+        if abs(expected[0, mode]) > 0.1 * np.abs(expected).max():
+            assert_allclose(ratio, expected[1, mode] / expected[0, mode], atol=0.1)
+    again = np.diagonal(mac(everything.shapes[0].T, everything.shapes[-1].T))
+    assert (again > 0.999).all()
+    assert (again < 1).all()
+
+
+def test_weather_stays_within_the_bounds_of_reduction():
+    bounds = np.array([(1 - b, 1 + b) if isinstance(b, float) else b for b in BOX.values()])
+    for seed in range(20):
+        theta = thermal_multipliers(draw_weather(N_HOURS, np.random.RandomState(seed)))
+        theta = theta[list(BOX)]
+        assert (theta.min() > bounds[:, 0]).all()
+        assert (theta.max() < bounds[:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"n_hours": 0}, "n_hours is 0; expected a positive integer"),
+        ({"noise": [0.1, 0.2]}, "6 modes"),
+        ({"noise": -0.1}, "expected a relative standard deviation"),
+        ({"damage": {"brace": 0.1}}, "damage is .*'brace'.*expected a mapping whose keys are some of .*'braces'"),
+        ({"damage": ["braces"]}, "expected a mapping"),
+        ({"damage": {"braces": 1.0}}, "damage of group 'braces' takes away 1 of its stiffness"),
+        ({"damage": {"braces": "much"}}, "'much'; expected a finite number"),
+        ({"drift": {"E_bot": 0.1}}, "drift is .*expected a mapping whose keys"),
+        ({"drift": {"arch": np.nan}}, "nan; expected a finite number"),
+        ({"drift": {"arch": 1000.0}, "n_hours": 48}, "drift of group 'arch' takes away"),
+        ({"damage_from": "2018-09-30"}, "damage_from is '2018-09-30'; expected a time from 2018-10-01"),
+        ({"damage_from": "tomorrow morning"}, "damage_from is 'tomorrow morning'; expected a time"),
+        ({"damage_from": pd.Timestamp("2018-10-01 05:00", tz="UTC")}, "without time zone"),
+        ({"random_state": "seed"}, "random_state is 'seed'"),
+    ],
+)
+def test_impossible_campaigns_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        make_kw51_campaign(**({"n_hours": 24} | options))
