@@ -129,3 +129,10 @@ def test_errors_name_what_was_expected():
         shape_components(np.ones((2, 5, 6)), np.ones((5, 6)))
     with pytest.raises(ValueError, match="reference is zero at all sensors in mode 1"):
         shape_components(np.ones((2, 2, 3)), [[1.0, 0.0]] * 3)
+
+
+def test_repeated_frequencies_have_finite_derivatives():
+    """Two equal oscillators: the bordered equations are singular."""
+    model = AffineModel({("a",): np.diag([400.0, 0.0]), ("b",): np.diag([0.0, 400.0])}, np.eye(2), n_modes=2)
+    slopes = model.linearised_modes([[1.0, 1.0], [1.0, 1.2]], [0, 1])[3]
+    np.testing.assert_allclose(slopes, 0, atol=1e-9)
