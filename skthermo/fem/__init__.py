@@ -15,8 +15,8 @@ from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, load_affine, probe
-from skthermo.fem.modal import LocalModes, mac, match_modes, shape_jacobian, share_reordered
-from skthermo.fem.sampling import add_noise, check_noise, evaluate, linearise, sample
+from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
+from skthermo.fem.sampling import add_noise, check_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 
 __all__ = [
     "AffineModel",
@@ -43,12 +43,15 @@ __all__ = [
     "check_prior",
     "check_theta",
     "evaluate",
+    "evaluate_modes",
     "linearise",
+    "linearise_modes",
     "load_affine",
     "mac",
     "match_modes",
     "probe",
     "sample",
+    "shape_components",
     "shape_jacobian",
     "share_reordered",
 ]

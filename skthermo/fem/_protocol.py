@@ -35,6 +35,7 @@ class FEModel(Protocol):
     - ``track``, whether a column follows its mode (True) or its rank (False);
     - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box;
     - ``linearised(theta)``, frequencies and Jacobian from one solution;
+    - ``linearised_modes(theta, dofs)``, these and mode shapes with their derivatives at some degrees of freedom;
     - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;
     - ``with_added(stiffness, mass)``, a model with further stiffness and mass;
     - ``rescaled(theta)``, a model whose nominal state is this one's at theta.

@@ -12,6 +12,7 @@ from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo._weather import TrainingRange
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
+from skthermo.surrogate._chain_shapes import steps_without_prior, with_shapes
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper_inputs import last_step, mapper_inputs
 from skthermo.surrogate._refined_inverse import unconverged
@@ -106,9 +107,9 @@ class ChainSteps:
         values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
         return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
 
-    def _fit_inverse(self, F: Any) -> tuple[Array, Array | None, Array | None]:
+    def _fit_inverse(self, F: Any, shapes: ArrayLike | None) -> tuple[Array, Array | None, Array | None]:
         """Fit aligner and M1: parameters of the training data, residuals and weights where they are refined."""
-        aligned = self.aligner_.fit(F).transform(F)
+        aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
         self.inverse_.fit(aligned)
         last, self._n_unconverged = refining_step(self.inverse_), None
         if last is not None:
@@ -131,9 +132,14 @@ class ChainSteps:
         """
         last = refining_step(self.inverse_)
         if self.coordinates == "frequencies" and last is not None:
-            inverse = learn_frequencies(self.mapper_, last, np.count_nonzero(~np.isnan(theta).any(axis=1)))
+            n_rows = np.count_nonzero(~np.isnan(theta).any(axis=1))
+            inverse = learn_frequencies(self.mapper_, last, n_rows)
             if inverse is not None:
-                weighted = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0) / last.scatter_
-                theta = theta * np.exp(np.clip(weighted @ inverse.T, -FARTHEST, FARTHEST))
+                noise = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0)
+                if last.shape_inputs_ is None:
+                    steps = noise / last.scatter_ @ inverse.T
+                else:
+                    steps = np.where(noise.any(axis=1)[:, np.newaxis], steps_without_prior(last, theta, n_rows), 0.0)
+                theta = theta * np.exp(np.clip(steps, -FARTHEST, FARTHEST))
         self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
         return theta

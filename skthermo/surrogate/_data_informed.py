@@ -23,6 +23,7 @@ from skthermo._warnings import warn_each, warn_user
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._chain_parts import box_of, clone_parts, read_records
+from skthermo.surrogate._chain_shapes import shape_inputs_of, with_shapes
 from skthermo.surrogate._chain_simulation import ChainSimulation
 from skthermo.surrogate._chain_steps import ChainSteps
 from skthermo.surrogate._chain_uncertainty import ChainUncertainty
@@ -160,7 +161,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "DataInformedFEM":
+    def fit(self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None) -> "DataInformedFEM":
         """Learn how temperature moves the parameters.
 
         Parameters
@@ -169,6 +170,9 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
             Temperatures in degrees Celsius; NaN is allowed.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies of the healthy structure in Hz; NaN is allowed.
+        shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
+            Measured mode shapes, real or complex, of any scale, sign and phase, NaN where a mode is missing; for an
+            inverse with ``dofs``, whose order the sensors have.
 
         Returns
         -------
@@ -180,7 +184,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         ValueError
             If lengths or indices differ, the number of modes is not the model's, a temperature
             is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
-            was never measured.
+            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``.
 
         Warns
         -----
@@ -193,22 +197,27 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
+        if shapes is None and shape_inputs_of(self.inverse_) is not None:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes)")
         self.box_ = box_of(self.inverse_)
         warn_each(mode_warnings(self.model, F))
-        theta, residuals, weights = self._fit_inverse(self._completed(T, F))
+        theta, residuals, weights = self._fit_inverse(self._completed(T, F), shapes)
         self.parameters_ = frame_like(T, theta, self.parameter_names_)
         targets = self._fit_mapper(T, theta, residuals, weights)
         self._records, self._residuals = (T, F, targets, weights), None
         self._report(T, F, theta)
         return self
 
-    def estimate_parameters(self, F: ArrayLike) -> Table:
+    def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> Table:
         """Parameters behind measured frequencies, eq. (5).
 
         Parameters
         ----------
         F : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz; NaN is allowed.
+        shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
+            Measured mode shapes, as in `fit`. Without them, an inverse with ``dofs`` that refines estimates parameters
+            from frequencies alone.
 
         Returns
         -------
@@ -223,7 +232,8 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         """
         check_is_fitted(self)
         measured = frame_like(F, check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
-        theta = as_floats(self.inverse_.transform(self.aligner_.transform(measured)))
+        inputs = with_shapes(self.inverse_, self.aligner_.transform(measured), shapes)
+        theta = as_floats(self.inverse_.transform(inputs))
         return frame_like(F, theta, self.parameter_names_)
 
     def predict_parameters(self, X: ArrayLike) -> Table:

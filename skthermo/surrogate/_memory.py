@@ -6,6 +6,7 @@ from typing import Any
 
 import joblib
 from joblib import Memory
+from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
@@ -17,7 +18,15 @@ ORDER_CHECKS = 256
 
 
 def remembered_simulations(
-    memory: str | Memory | None, model: FEModel, bounds: Bounds, n_samples: int, tol: float | None, *, n_jobs, seed
+    memory: str | Memory | None,
+    model: FEModel,
+    bounds: Bounds,
+    n_samples: int,
+    tol: float | None,
+    *,
+    dofs: ArrayLike | None = None,
+    n_jobs: int | None,
+    seed: int,
 ) -> tuple[Bunch, float, Any]:
     """`simulations`, read from the memory if stored there; of several processes only one makes them.
 
@@ -32,7 +41,7 @@ def remembered_simulations(
     except OSError as error:
         raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
     if memory.location is None:
-        return simulations("", model, bounds, n_samples, tol, n_jobs, seed)
+        return simulations("", model, bounds, n_samples, tol, dofs, n_jobs, seed)
     try:
         identity = joblib.hash(model, coerce_mmap=True)
     except PicklingError as error:
@@ -45,15 +54,22 @@ def remembered_simulations(
     with open(folder / f"{identity}.lock", "w") as file:
         lock(file)
         remembered = memory.cache(simulations, ignore=["model", "n_jobs"])
-        return remembered(identity, model, bounds, n_samples, tol, n_jobs, seed)
+        return remembered(identity, model, bounds, n_samples, tol, dofs, n_jobs, seed)
 
 
 def simulations(
-    identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, n_jobs: int | None, seed: int
+    identity: str,
+    model: Any,
+    bounds: Any,
+    n_samples: int,
+    tol: float | None,
+    dofs: ArrayLike | None,
+    n_jobs: int | None,
+    seed: int,
 ) -> tuple[Bunch, float, Any]:
     """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None."""
     reduced = None if tol is None else model.reduced(bounds, tol=tol, random_state=seed)
     model = reduced or model
-    drawn = sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
+    drawn = sample(model, bounds, n_samples, dofs=dofs, n_jobs=n_jobs, random_state=seed)
     sorts = not getattr(model, "track", True) and hasattr(model, "modes")
     return drawn, share_reordered(model, drawn.theta[:ORDER_CHECKS]) if sorts else 0.0, reduced

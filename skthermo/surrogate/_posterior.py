@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo.surrogate._shape_misfit import MeasuredShapes
 
-Linearise = Callable[[Array], tuple[Array, Array]]
-"""Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters) at theta."""
+Linearise = Callable[[Array], tuple[Array, ...]]
+"""Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters) at theta; where shapes are
+measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d theta."""
 
 REACH = 3.0
 """Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
@@ -44,7 +46,7 @@ class Prior:
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
     def information(self, sensitivity: Array, noise: Array) -> Array:
-        """Precision of ln theta given d ln f / d ln theta and the noise, which is infinite where a mode is missing."""
+        """Precision of ln theta given derivatives of the observations and the noise, infinite where one is missing."""
         scaled = sensitivity / noise[:, :, np.newaxis]
         return scaled.swapaxes(1, 2) @ scaled + np.diag(self.width**-2.0)
 
@@ -55,7 +57,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class Objective:
-    """Half of the squared misfits of ln f and of ln theta, in standard deviations of the noise and of the prior.
+    """Half of the squared misfits of ln f, of shapes and of ln theta, in standard deviations of noise and prior.
 
     Attributes
     ----------
@@ -63,24 +65,37 @@ class Objective:
         Frequencies and derivatives.
     log_measured : ndarray of shape (n_samples, n_modes)
         ln f, NaN where a mode is missing.
-    noise : ndarray of shape (n_samples, n_modes)
-        Standard deviations of ln f.
+    noise : ndarray of shape (n_samples, n_observations)
+        Standard deviations of ln f and, mode by mode, of the components of shapes of unit length.
     prior : Prior
         Of ln theta.
+    shapes : MeasuredShapes, optional
+        Where shapes are measured too.
     """
 
     linearise: Linearise
     log_measured: Array
     noise: Array
     prior: Prior
+    shapes: MeasuredShapes | None = None
+
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Which observations are missing, (n_samples, n_observations)."""
+        missing = np.isnan(self.log_measured)
+        return missing if self.shapes is None else np.hstack([missing, self.shapes.missing])
 
     def at(self, x: Array) -> "Local":
         """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
         theta = np.exp(x)
-        frequencies, jacobian = self.linearise(theta)
-        missing = np.isnan(self.log_measured)
+        (frequencies, jacobian, *modes), missing = self.linearise(theta), self.missing
         sensitivity = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
-        residual = np.where(missing, 0.0, self.log_measured - np.log(frequencies))
+        residual = self.log_measured - np.log(frequencies)
+        if self.shapes is not None:
+            shapes, slopes = modes
+            misfit, change = self.shapes.misfit(shapes, slopes * theta[:, np.newaxis, np.newaxis])
+            residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
+        residual = np.where(missing, 0.0, residual)
         distance = (x - self.prior.mean) / self.prior.width
         value = 0.5 * (((residual / self.noise) ** 2).sum(axis=1) + (distance**2).sum(axis=1))
         gradient = -np.einsum("smp,sm->sp", sensitivity, residual / self.noise**2) + distance / self.prior.width
@@ -89,16 +104,26 @@ class Objective:
 
     def of(self, rows: NDArray) -> "Objective":
         """The objective of some rows."""
-        return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior)
+        shapes = None if self.shapes is None else self.shapes.of(rows)
+        return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior, shapes)
+
+    def without_shapes(self) -> "Objective":
+        """The objective of frequencies alone."""
+        noise = self.noise[:, : self.log_measured.shape[1]]
+        return Objective(self.linearise, self.log_measured, noise, self.prior)
 
     def with_modes(self, order: NDArray) -> "Objective":
         """The objective with the measured modes in another order."""
-        return Objective(self.linearise, self.log_measured[:, order], self.noise[:, order], self.prior)
+        shapes = None if self.shapes is None else self.shapes.with_modes(order)
+        n_modes, n_observations = self.log_measured.shape[1], self.noise.shape[1]
+        later = np.arange(n_modes, n_observations).reshape(n_modes, -1)[order]
+        noise = self.noise[:, np.append(order, later)]
+        return Objective(self.linearise, self.log_measured[:, order], noise, self.prior, shapes)
 
 
 @dataclass
 class Local:
-    """An `Objective` at ln theta = x, row by row, with residuals and derivatives of ln f."""
+    """An `Objective` at ln theta = x, row by row, with residuals and derivatives of the observations."""
 
     x: Array
     value: Array

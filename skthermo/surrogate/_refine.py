@@ -32,9 +32,10 @@ def refine(
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start; rows that have converged, and stalled.
 
     Other rows have only run out of steps. The frequencies of a model that sorts its modes have kinks where modes cross,
-    and rows may stall there; such rows are started again beyond the kink.
+    and rows may stall there; such rows are started again beyond the kink. Where two modes exchange their shapes, steps
+    may end among the wrong ones; rows with a large misfit start again at what frequencies alone say.
     """
-    found, converged, stalled = minimise(objective, start, n_steps)
+    found, converged, stalled = minimise(objective, start.copy(), n_steps)
 
     def again(rows: NDArray[np.intp], beyond: Array) -> None:
         part = objective.of(rows)
@@ -52,6 +53,10 @@ def refine(
         rows = np.flatnonzero(~converged | (normalised_misfit(objective, found) > LARGE_MISFIT))
         if rows.size:
             again(rows, np.tile(objective.prior.mean, (len(rows), 1)))
+    if objective.shapes is not None:
+        rows = np.flatnonzero(~converged | (normalised_misfit(objective, found) > LARGE_MISFIT))
+        if rows.size:
+            again(rows, minimise(objective.of(rows).without_shapes(), start[rows], n_steps)[0].x)
     return found, converged, stalled
 
 
@@ -83,13 +88,13 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
 
 def normalised_misfit(objective: Objective, found: Local) -> Array:
     """Root mean square of the residuals in standard deviations of the noise."""
-    n_measured = np.maximum((~np.isnan(objective.log_measured)).sum(axis=1), 1)
+    n_measured = np.maximum((~objective.missing).sum(axis=1), 1)
     return np.sqrt(((found.residual / objective.noise) ** 2).sum(axis=1) / n_measured)
 
 
 def gap(objective: Objective, found: Local, lower: int) -> Array:
     """Difference of ln f between two neighbouring modes of the model; NaN where one of them is missing."""
-    fitted = (objective.log_measured - found.residual)[:, lower : lower + 2]
+    fitted = (objective.log_measured - found.residual[:, : objective.log_measured.shape[1]])[:, lower : lower + 2]
     return fitted[:, 1] - fitted[:, 0]
 
 

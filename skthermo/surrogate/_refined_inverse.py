@@ -27,6 +27,7 @@ class RefinedInverse(MultiplierRegressor):
     """Methods of `InverseSurrogate` that refine estimates, and their private steps."""
 
     model: Any
+    dofs: ArrayLike | None
     refine: int | None
     box_: Box | None
     n_steps_: int
@@ -38,8 +39,8 @@ class RefinedInverse(MultiplierRegressor):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz; NaN is allowed.
+        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+            Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
 
         Returns
         -------
@@ -77,8 +78,8 @@ class RefinedInverse(MultiplierRegressor):
             raise ValueError(
                 f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
             )
-        frequencies = self._read_inputs(X)
-        found = self.refinement_.refined(frequencies, self._estimate(frequencies)[0], self.scatter_)
+        inputs = self._read_inputs(X)
+        found = self.refinement_.refined(inputs, self._estimate(inputs)[0], self.scatter_)
         names = self.get_feature_names_out()
         found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
         return found
@@ -106,6 +107,11 @@ class RefinedInverse(MultiplierRegressor):
         if message:
             warn_user(message, "outside the bounds")
 
+    def _scatter(self, X: ArrayLike | None) -> Array:
+        """Relative standard deviations of the frequencies, given or estimated from the records that `fit` saw."""
+        measured = np.ones((0, self.n_features_in_)) if X is None else self._read_inputs(X)
+        return self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+
     def _n_steps(self) -> int:
         """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
         if self.model is None:
@@ -113,6 +119,8 @@ class RefinedInverse(MultiplierRegressor):
                 raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
             return 0
         is_differentiable = hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")
+        if self.dofs is not None:
+            is_differentiable = hasattr(self.model, "linearised_modes")
         return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[NDArray, NDArray]:

@@ -12,6 +12,8 @@ from skthermo._arrays import Array
 from skthermo.fem import check_bounds, check_noise, check_prior
 from skthermo.surrogate._posterior import Objective, Prior
 from skthermo.surrogate._refine import refine
+from skthermo.surrogate._shape_inputs import ShapeInputs
+from skthermo.surrogate._shape_misfit import MeasuredShapes
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate._spread_rows import spread_rows
 
@@ -47,6 +49,8 @@ class Refinement:
         Largest number of steps for each row.
     n_jobs : int or None
         Number of parallel jobs.
+    shapes : ShapeInputs or None
+        Columns of mode shapes, where inputs have them beside frequencies.
     """
 
     simulator: Simulator
@@ -54,6 +58,7 @@ class Refinement:
     prior: Prior
     n_steps: int
     n_jobs: int | None
+    shapes: ShapeInputs | None = None
 
     @classmethod
     def of(cls, inverse: Any) -> "Refinement":
@@ -62,11 +67,12 @@ class Refinement:
         width = None if inverse.prior is None else check_prior(inverse.prior, names)
         prior = Prior.of_box(check_bounds(inverse.bounds, names), width)
         noise = check_noise(inverse.noise, inverse.model.n_modes)
-        return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs)
+        return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_)
 
-    def refined(self, frequencies: Array, guess: Array, scatter: Array) -> Bunch:
-        """What `InverseSurrogate.invert` gives, for rows of frequencies and the regressor's guess."""
-        some, gaps = ~np.isnan(frequencies).all(axis=1), np.isnan(frequencies).any(axis=1)
+    def refined(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:
+        """What `InverseSurrogate.invert` gives, for rows of inputs and the regressor's guess."""
+        frequencies = inputs[:, : len(self.noise)]
+        some, gaps = ~np.isnan(inputs).all(axis=1), np.isnan(frequencies).any(axis=1)
         result = Bunch(
             theta=np.full_like(guess, np.nan),
             std=np.full_like(guess, np.nan),
@@ -80,21 +86,36 @@ class Refinement:
         prior, measured, guess = self.prior, np.log(frequencies[some]), guess[some]
         noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
         start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
-        objective = Objective(partial(self.simulator.linearise, n_jobs=self.n_jobs), measured, noise, prior)
+        objective = self._objective(inputs[some], measured, noise)
         sorts = not getattr(self.simulator.model, "track", False)
         found, converged, stalled = refine(objective, start, self.n_steps, sorts=sorts)
-        lost, complete = stalled[:, np.newaxis], np.maximum(noise, scatter)
+        lost, complete = stalled[:, np.newaxis], self._with_shapes(np.maximum(noise, scatter))
         deviations, at_best = (
             prior.deviations(np.nan_to_num(found.sensitivity), spread)
-            for spread in (np.where(np.isnan(measured), np.inf, complete), complete)
+            for spread in (np.where(objective.missing, np.inf, complete), complete)
         )
         result.theta[some] = np.where(lost, guess, np.exp(found.x))
         result.std[some] = np.where(lost, prior.width, deviations) * result.theta[some]
-        result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, found.residual)
+        residuals = found.residual[:, : len(self.noise)]
+        result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, residuals)
         result.weight[some] = ((at_best / deviations) ** 2).mean(axis=1)
         result.converged[some] = converged
         result.outside[some] = self._contradicts(found.x, deviations)
         return result
+
+    def _objective(self, inputs: Array, log_measured: Array, noise: Array) -> Objective:
+        linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs)
+        if self.shapes is None:
+            return Objective(linearise, log_measured, noise, self.prior)
+        measured = MeasuredShapes(self.shapes.unit_shapes(inputs))
+        linearise = partial(linearise, dofs=self.shapes.dofs)
+        return Objective(linearise, log_measured, self._with_shapes(noise), self.prior, measured)
+
+    def _with_shapes(self, noise: Array) -> Array:
+        """Standard deviations of all observations, (n_samples, n_observations), given those of ln f."""
+        if self.shapes is None:
+            return noise
+        return np.hstack([noise, np.tile(self.shapes.deviations, (len(noise), 1))])
 
     def _contradicts(self, x: Array, deviations: Array) -> NDArray[np.bool_]:
         """Whether ln theta is farther from the prior's mean than data from the prior can bring it.
@@ -106,7 +127,7 @@ class Refinement:
         expected = self.prior.width * (np.sqrt(explained) if self.noise.all() else 1 / np.sqrt(explained))
         return np.abs(x - self.prior.mean) > FAR * expected
 
-    def estimated_scatter(self, frequencies: Array, guess: Array) -> Array:
+    def estimated_scatter(self, inputs: Array, guess: Array) -> Array:
         """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
 
         Records can tell only if there are more modes than parameters, and are not exact themselves.
@@ -114,10 +135,10 @@ class Refinement:
         n_modes, n_parameters = len(self.noise), guess.shape[1]
         if self.noise.all():
             return self.noise
-        rows = spread_rows(~np.isnan(frequencies).any(axis=1))
+        rows = spread_rows(~np.isnan(inputs).any(axis=1))
         scatter = ASSUMED
         if n_modes > n_parameters and rows.size:
-            residuals = self.refined(frequencies[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
+            residuals = self.refined(inputs[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
             residuals = residuals[~np.isnan(residuals).any(axis=1)]
             if len(residuals) > n_parameters:
                 estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))

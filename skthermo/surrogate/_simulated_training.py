@@ -7,10 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array
 from skthermo._models import check_model
-from skthermo._validation import check_is_fitted, validate_data
+from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
-from skthermo.fem import add_noise, check_bounds, check_noise, evaluate
+from skthermo.fem import check_bounds, check_noise, evaluate
 from skthermo.surrogate._box import Box
+from skthermo.surrogate._inverse_inputs import InverseInputs
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
 from skthermo.surrogate._refined_inverse import RefinedInverse
 from skthermo.surrogate._simulator import Simulator, tolerance
@@ -35,7 +36,7 @@ def narrower(bounds: Array, theta: Array) -> Array:
     return np.column_stack([np.maximum(middle - half, bounds[:, 0]), np.minimum(middle + half, bounds[:, 1])])
 
 
-class SimulatedTraining(RefinedInverse):
+class SimulatedTraining(InverseInputs, RefinedInverse):
     """The part of `InverseSurrogate` that draws its samples, and checks what it has learned from them."""
 
     narrow_bounds: bool
@@ -69,20 +70,17 @@ class SimulatedTraining(RefinedInverse):
         if self.model is None:
             raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
         state = np.ones((1, self.n_parameters_))
-        nominal = evaluate(self.model, state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
+        nominal = self._of_parameters(state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
         theta = self._estimate(nominal)[0]
         if self.n_steps_:
             theta = self.refinement_.refined(nominal, theta, self.scatter_).theta
-        return (evaluate(self.model, theta) / nominal - 1)[0]
+        return (evaluate(self.model, theta) / nominal[:, : self.model.n_modes] - 1)[0]
 
     def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         check_model(self.model)
         model = self.model
-        names_only = np.ones((1, model.n_modes)) if X is None else X
-        n_modes = validate_data(self, names_only, ensure_all_finite="allow-nan").shape[1]
-        if n_modes != model.n_modes:
-            raise ValueError(f"X has {n_modes} columns; expected the {model.n_modes} modes of {model!r}")
-        check_noise(self.noise, n_modes)
+        self._check_columns(X)
+        check_noise(self.noise, model.n_modes)
         n_parameters = len(model.parameter_names)
         if n_parameters > model.n_modes:
             warn_user(
@@ -95,7 +93,7 @@ class SimulatedTraining(RefinedInverse):
         seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
         tol = tolerance(self.model, self.reduce)
         drawn, share_reordered, reduced = remembered_simulations(
-            self.memory, model, self.bounds, self.n_samples, tol, n_jobs=self.n_jobs, seed=seed
+            self.memory, model, self.bounds, self.n_samples, tol, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
         )
         if share_reordered > MANY_REORDERED:
             warn_user(
@@ -107,7 +105,7 @@ class SimulatedTraining(RefinedInverse):
         self.simulator_ = Simulator(model, reduced, self.box_.bounds)
         self.parameter_names_ = list(model.parameter_names)
         self.y_is_vector_ = False
-        return add_noise(drawn.frequencies, self.noise, random_state=random), drawn.theta
+        return self._noisy(drawn, random), drawn.theta
 
     def _simulate_narrower(self, X: ArrayLike | None, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
         """Samples from the part of the box where the records have their parameters."""
@@ -124,6 +122,6 @@ class SimulatedTraining(RefinedInverse):
         seed = 1 if is_remembered else random.randint(np.iinfo(np.int32).max)
         model = self.simulator_.reduced or self.model
         self.samples_ = remembered_simulations(
-            self.memory, model, self.box_.bounds, self.n_samples, None, n_jobs=self.n_jobs, seed=seed
+            self.memory, model, self.box_.bounds, self.n_samples, None, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
         )[0]
-        return add_noise(self.samples_.frequencies, self.noise, random_state=random), self.samples_.theta
+        return self._noisy(self.samples_, random), self.samples_.theta

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo._warnings import warn_user
-from skthermo.fem import FEModel, evaluate, linearise
+from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
 MANY_ROWS = 2000
 """Number of rows from which a full sparse model takes minutes."""
@@ -100,16 +100,26 @@ class Simulator:
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
         return frequencies
 
-    def linearise(self, theta: Array, n_jobs: int | None = None) -> tuple[Array, Array]:
-        """Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters), without warnings."""
+    def linearise(
+        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None
+    ) -> tuple[Array, ...]:
+        """Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters), without warnings.
+
+        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta.
+        """
         outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
-        frequencies = np.full((len(theta), self.model.n_modes), np.nan)
-        jacobian = np.full((*frequencies.shape, theta.shape[1]), np.nan)
+        results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if rows.any():
                 quiet = model.quiet() if hasattr(model, "quiet") else model
-                frequencies[rows], jacobian[rows] = linearise(quiet, theta[rows], n_jobs=n_jobs)
-        return frequencies, jacobian
+                if dofs is None:
+                    solved: tuple[Array, ...] = linearise(quiet, theta[rows], n_jobs=n_jobs)
+                else:
+                    solved = linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs)
+                results = results or [np.full((len(theta), *array.shape[1:]), np.nan) for array in solved]
+                for result, array in zip(results, solved, strict=True):
+                    result[rows] = array
+        return tuple(results)
 
     def _outside(self, theta: Array) -> NDArray[np.bool_]:
         lowest, highest = self.box.T

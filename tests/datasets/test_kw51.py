@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from skthermo.datasets import kw51_structure, make_kw51
+from skthermo.datasets import kw51_sensors, kw51_structure, make_kw51
 from skthermo.fem import Membrane
 from skthermo.updating import sensitivity
 
@@ -174,3 +174,18 @@ def test_parts_are_where_the_appendix_puts_them(structure):
     assert len(structure.groups["connections"]) == 2 * len(structure.groups["braces"])
     shells = {name for name, member in structure.members.items() if isinstance(member, Membrane)}
     assert shells == structure.groups["plate"] | structure.groups["ballast"]
+
+
+def test_sensors_are_where_their_labels_say(structure):
+    sensors = kw51_sensors()
+    assert len(sensors) == len(set(sensors.values())) == 12
+    for label, dof in sensors.items():
+        node, direction = structure.dofs[dof]
+        x, y, z = structure.nodes[node]
+        side, axis = label[-2:]
+        assert (direction, y) == (axis, -6.2 if side == "A" else 6.2)
+        assert (z > 5) == label.startswith("aAR")
+        if z == 0:
+            assert x == pytest.approx(115 / 32 * (int(label[3:5]) - 1))
+    above = {label[3:5]: structure.nodes[structure.dofs[dof][0]][0] for label, dof in sensors.items()}
+    assert (above["09"], above["15"], above["21"]) == (above["11"], above["17"], above["23"])

@@ -15,12 +15,13 @@ from skthermo.fem._theta import check_theta, warn_of_failures
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._interventions import Interventions
 from skthermo.fem.affine._read_terms import check_different, check_modes
+from skthermo.fem.affine._shape_slopes import ShapeSlopes
 from skthermo.fem.modal import LocalModes
 
 Model = TypeVar("Model", bound="AffineBase")
 
 
-class AffineBase(Interventions, ABC):
+class AffineBase(Interventions, ShapeSlopes, ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
     A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and

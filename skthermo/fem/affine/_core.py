@@ -187,11 +187,15 @@ class AffineCore:
     def linearised(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and d f / d theta, (n_samples, n_modes, n_parameters)."""
         frequencies, shapes = self.modes(theta)
+        return frequencies, self.frequency_slopes(theta, frequencies, shapes)
+
+    def frequency_slopes(self, theta: Array, frequencies: Array, shapes: Array) -> Array:
+        """d f / d theta of modes of unit modal mass, (n_samples, n_modes, n_parameters)."""
         gradient = self.stiffness.gradients(theta, shapes)
         if not self.mass.is_constant:
             eigenvalues = (2 * np.pi * frequencies) ** 2
             gradient -= eigenvalues[:, :, np.newaxis] * self.mass.gradients(theta, shapes)
-        return frequencies, gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis])
+        return gradient / (8 * np.pi**2 * frequencies[:, :, np.newaxis])
 
     def nominal_mac(self, shapes: Array) -> Array:
         """Mass-weighted MAC of the nominal modes with shapes, (n_samples, n_modes, n_candidates)."""

@@ -138,6 +138,11 @@ class DenseTerms(AffineTerms):
     def weighted_sum(self, weights: Array) -> Array:
         return np.tensordot(weights, self.matrices, axes=1)
 
+    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n, n_vectors, n_parameters)."""
+        products = np.stack([matrix @ vectors for matrix in self.matrices], axis=3)
+        return products @ self.coefficient_gradients(theta)[:, np.newaxis]
+
     def quadratic_forms(self, shapes: Array) -> Array:
         forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
         return np.stack(forms, axis=2)

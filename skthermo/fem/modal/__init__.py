@@ -5,6 +5,8 @@ from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
 from skthermo.fem.modal._mac import mac
 from skthermo.fem.modal._matching import match_modes
 from skthermo.fem.modal._reordering import share_reordered
+from skthermo.fem.modal._shape_components import shape_components
+from skthermo.fem.modal._shape_derivatives import shape_derivatives
 from skthermo.fem.modal._shift_invert import ShiftInvertSolver, factorise
 from skthermo.fem.modal._stability import check_supported, count_modes
 from skthermo.fem.modal._tracking import may_be_missed, pair_modes, repeated_modes
@@ -23,6 +25,8 @@ __all__ = [
     "may_be_missed",
     "pair_modes",
     "repeated_modes",
+    "shape_components",
+    "shape_derivatives",
     "shape_jacobian",
     "share_reordered",
 ]

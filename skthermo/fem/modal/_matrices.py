@@ -29,3 +29,10 @@ class ParametrisedMatrix(Protocol):
 
     def projected(self, basis: Array) -> Any:
         """The dense matrix basis' A basis."""
+
+
+class DenseMatrix(ParametrisedMatrix, Protocol):
+    """A dense matrix as a function of theta."""
+
+    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n_dof, n_vectors, n_parameters)."""

@@ -85,13 +85,18 @@ def _in_jobs(model: Any, linearised: Callable[[Array], tuple[Array, Array]], row
     return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
+def check_step(step: float) -> None:
+    """Raise an error unless a relative step is between 0 and 1."""
+    if not isinstance(step, Real) or not 0 < step < 1:
+        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
+
+
 def central_differences(model: FEModel, theta: Array, step: float, n_jobs: int | None = None) -> Array:
     """d f / d theta by central differences of a relative step, (n_samples, n_modes, n_parameters).
 
     One-sided where one side has no frequencies.
     """
-    if not isinstance(step, Real) or not 0 < step < 1:
-        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
+    check_step(step)
     n_samples, n_parameters = theta.shape
     steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
     moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])

@@ -1,15 +1,17 @@
 """Monte Carlo sampling of FE models."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
 from skthermo._models import check_model
 from skthermo.fem._bounds import check_bounds
-from skthermo.fem._protocol import FEModel
+from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._evaluate import evaluate
+from skthermo.fem.sampling._evaluate_modes import evaluate_modes
 
 if TYPE_CHECKING:
     from sklearn.utils import Bunch
@@ -21,6 +23,7 @@ def sample(
     n_samples: int = 1000,
     *,
     method: Literal["uniform", "lhs", "sobol"] = "uniform",
+    dofs: ArrayLike | None = None,
     n_jobs: int | None = None,
     progress: bool | None = None,
     random_state: RandomState = None,
@@ -39,6 +42,8 @@ def sample(
     method : {"uniform", "lhs", "sobol"}, default="uniform"
         Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (balanced if ``n_samples`` is a
         power of 2).
+    dofs : array-like of int of shape (n_dofs,), optional
+        Degrees of freedom where mode shapes are wanted too; the model needs a method ``modes``.
     n_jobs : int, optional
         Number of parallel jobs (joblib); each takes chunks of rows.
     progress : bool, optional
@@ -49,13 +54,14 @@ def sample(
     Returns
     -------
     Bunch
-        ``theta`` (n_samples, n_parameters) and ``frequencies`` (n_samples, n_modes) in Hz.
+        ``theta`` (n_samples, n_parameters) and ``frequencies`` (n_samples, n_modes) in Hz; with ``dofs`` also
+        ``shapes`` (n_samples, n_dofs, n_modes), as `evaluate_modes` gives them.
 
     Raises
     ------
     ValueError
         If ``model`` is not an FE model, the bounds are infeasible, ``n_samples`` is not a positive integer, the method
-        is unknown, or ``random_state`` or ``n_jobs`` is invalid.
+        is unknown, or ``dofs``, ``random_state`` or ``n_jobs`` are invalid.
 
     Examples
     --------
@@ -73,6 +79,9 @@ def sample(
     theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
     theta *= highest - lowest
     theta += lowest
+    if dofs is not None:
+        frequencies, shapes = evaluate_modes(cast(ModalModel, model), theta, dofs, n_jobs=n_jobs)
+        return Bunch(theta=theta, frequencies=frequencies, shapes=shapes)
     return Bunch(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
 
 

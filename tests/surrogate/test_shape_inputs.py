@@ -1,0 +1,278 @@
+"""Mode shapes as inputs of the inverse surrogate: posterior modes of frequencies and shapes, gaps, the chain."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import least_squares
+from sklearn.base import clone
+from sklearn.linear_model import Ridge
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.fem import AffineModel, CallableModel, evaluate_modes, sample, shape_components
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.updating import identifiability
+from tests.fem.frames import portal
+from tests.surrogate.chains import TRUSS
+
+DOFS = [1, 3, 5, 7]
+NOISE, SHAPE_NOISE = 0.001, 0.01
+
+
+def surrogate(model=TRUSS, regressor=None, **options):
+    defaults = {"n_samples": 300, "noise": NOISE, "dofs": DOFS, "shape_noise": SHAPE_NOISE, "random_state": 0}
+    return InverseSurrogate(model, regressor or Ridge(), **(defaults | options)).fit()
+
+
+def measured(theta, model=TRUSS, dofs=DOFS, noise=NOISE, shape_noise=SHAPE_NOISE, seed=2):
+    """Noisy frequencies (n_samples, n_modes) and shapes (n_samples, n_modes, n_sensors)."""
+    rng = np.random.default_rng(seed)
+    frequencies, shapes = evaluate_modes(model, theta, dofs)
+    shapes = shapes.swapaxes(1, 2)
+    size = np.sqrt((shapes**2).mean(axis=2, keepdims=True))
+    frequencies = frequencies * (1 + noise * rng.standard_normal(frequencies.shape))
+    return frequencies, shapes + shape_noise * size * rng.standard_normal(shapes.shape)
+
+
+def columns(frequencies, shapes):
+    return np.hstack([frequencies, shapes.reshape(len(shapes), -1)])
+
+
+def drawn(n_rows, half_width=0.2, seed=1, model=TRUSS):
+    return sample(model, half_width, n_rows, random_state=seed).theta
+
+
+INVERSE = surrogate()
+THETA = drawn(400)
+MEASURED = measured(THETA)
+
+
+# The posterior mode
+
+
+def test_exact_rows_come_back_from_shapes_alone_and_from_both():
+    """Shapes tell everything but the common factor of all stiffnesses, which the fixed bars set here."""
+    theta = drawn(30)
+    exact = columns(*measured(theta, noise=0, shape_noise=0))
+    inverse = surrogate(noise=1e-6, shape_noise=1e-6)
+    for X in (exact, np.where(np.arange(exact.shape[1]) < 6, np.nan, exact)):
+        found = inverse.invert(X)
+        assert found.converged.all()
+        np.testing.assert_allclose(found.theta, theta, rtol=1e-3)
+
+
+def test_estimates_are_what_an_independent_optimiser_finds():
+    inverse, prior = INVERSE, INVERSE.refinement_.prior
+    F, shapes = MEASURED
+    found = inverse.invert(columns(F, shapes)[:3])
+
+    def residuals(x, f, u):
+        frequencies, phi = evaluate_modes(TRUSS, np.exp(x)[np.newaxis], DOFS)
+        v = phi[0].T / np.linalg.norm(phi[0].T, axis=1, keepdims=True)
+        v *= np.sign((u * v).sum(axis=1, keepdims=True))
+        parts = (
+            np.log(f / frequencies[0]) / NOISE,
+            2 * ((u - v) / SHAPE_NOISE).ravel(),
+            (x - prior.mean) / prior.width,
+        )
+        return np.concatenate(parts)
+
+    for i in range(3):
+        u = shapes[i] / np.linalg.norm(shapes[i], axis=1, keepdims=True)
+        best = least_squares(residuals, np.zeros(4), args=(F[i], u), xtol=1e-12, ftol=1e-12)
+        np.testing.assert_allclose(np.log(found.theta[i]), best.x, atol=3e-3 * found.std[i].max())
+        expected = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
+        np.testing.assert_allclose(found.std[i] / found.theta[i], expected, rtol=0.01)
+
+
+def test_errors_are_those_that_cramer_rao_allows():
+    """With a wide prior, posterior modes scatter as `identifiability` says, by far less than without shapes."""
+    theta = np.tile([1.0, 0.97, 1.02, 1.01], (300, 1))
+    found = surrogate(prior=1.0).invert(columns(*measured(theta)))
+    known = identifiability(TRUSS, theta[0], noise=NOISE, dofs=DOFS, shape_noise=SHAPE_NOISE).deviations
+    np.testing.assert_allclose(np.log(found.theta / theta).std(axis=0) / known, 1, atol=0.12)
+    alone = identifiability(TRUSS, theta[0], noise=NOISE).deviations
+    assert known["vertical"] < 0.6 * alone["vertical"]
+
+
+def test_intervals_hold_the_parameters_and_errors_are_smaller_than_without_shapes():
+    found = INVERSE.invert(columns(*MEASURED))
+    alone = surrogate(dofs=None).invert(MEASURED[0])
+    held = (np.abs(found.theta - THETA) < 1.645 * found.std).mean(axis=0)
+    assert ((held > 0.85) & (held < 0.95)).all()
+    errors, others = (np.abs(each.theta / THETA - 1).mean(axis=0) for each in (found, alone))
+    assert errors[3] < 0.75 * others[3]
+    assert (errors < others).all()
+
+
+def test_without_refining_shapes_help_too():
+    theta = drawn(300, 0.3)
+    X = columns(*measured(theta))
+    both, alone = surrogate(refine=0).predict(X), surrogate(refine=0, dofs=None).predict(X[:, :6])
+    errors, others = (np.abs(each / theta - 1).mean(axis=0) for each in (both, alone))
+    assert errors[3] < 0.85 * others[3]
+
+
+def test_rows_do_not_depend_on_other_rows_nor_on_scale_and_sign():
+    X = columns(*MEASURED)[:20]
+    whole = INVERSE.predict(X)
+    np.testing.assert_allclose(np.vstack([INVERSE.predict(row[np.newaxis]) for row in X]), whole, rtol=1e-7)
+    factors = np.random.default_rng(0).choice([-3.0, 0.2, 50.0], (20, 6))
+    turned = np.hstack([X[:, :6], X[:, 6:] * np.repeat(factors, len(DOFS), axis=1)])
+    np.testing.assert_allclose(INVERSE.predict(turned), whole, rtol=1e-7)
+
+
+def test_modes_that_exchange_their_shapes_are_found():
+    """Two coupled masses: where their frequencies meet, each mode turns into the other within a few percent."""
+    stiffness = {("a",): np.diag([400.0, 0.0]), ("b",): np.diag([0.0, 420.0]), (): 8.0 * np.array([[1, -1], [-1, 1]])}
+    model = AffineModel(stiffness, np.eye(2), n_modes=2, track=True)
+    theta = drawn(300, 0.3, model=model)
+    found = surrogate(model, dofs=[0, 1]).invert(columns(*measured(theta, model, [0, 1])))
+    assert found.converged.all()
+    assert (np.abs(np.log(found.theta / theta)) < 0.02).all()
+
+
+# Gaps
+
+
+def test_missing_modes_and_missing_shapes_are_left_out():
+    F, shapes = (array[:40].copy() for array in MEASURED)
+    complete = INVERSE.invert(columns(F, shapes))
+    no_shapes = INVERSE.invert(columns(F, np.full_like(shapes, np.nan)))
+    alone = surrogate(dofs=None).invert(F)
+    assert (np.abs(no_shapes.theta - alone.theta) < 2e-3 * alone.std).all()
+    np.testing.assert_allclose(no_shapes.std, alone.std, rtol=1e-3)
+    assert (no_shapes.weight < complete.weight).all()
+    np.testing.assert_allclose(complete.weight, 1)
+    shapes[:, 2, 1] = np.nan  # one sensor in one mode
+    some = INVERSE.invert(columns(F, shapes))
+    assert (complete.weight > some.weight).all()
+    assert (some.weight > no_shapes.weight).all()
+    F[0], shapes[0] = np.nan, np.nan
+    assert np.isnan(INVERSE.predict(columns(F, shapes))[0]).all()
+    assert not np.isnan(INVERSE.predict(columns(F, shapes))[1:]).any()
+
+
+# What models and parameters may be
+
+
+class OnlyModes:
+    """A third-party model that gives shapes, and no derivatives."""
+
+    parameter_names, n_modes = TRUSS.parameter_names, TRUSS.n_modes
+
+    def frequencies(self, theta):
+        return TRUSS.frequencies(theta)
+
+    def modes(self, theta):
+        return TRUSS.modes(theta)
+
+
+def test_models_without_derivatives_are_refined_on_request():
+    X = columns(*MEASURED)[:20]
+    assert surrogate(OnlyModes()).n_steps_ == 0
+    refined = surrogate(OnlyModes(), refine=20)
+    np.testing.assert_allclose(refined.predict(X), INVERSE.predict(X), rtol=1e-4)
+
+
+def test_reduced_models_and_stored_simulations_give_the_same(tmp_path):
+    model = portal(n_modes=3, track=True).with_parameters(["columns", "beams"])
+    dofs = [40, 100, 160, 220]
+    theta = drawn(5, 0.1, model=model)
+    X = columns(*measured(theta, model, dofs))
+    options = {"bounds": 0.1, "n_samples": 20, "dofs": dofs}
+    full = surrogate(model, **options).predict(X)
+    np.testing.assert_allclose(surrogate(model, reduce=1e-6, **options).predict(X), full, rtol=1e-4)
+    for _ in range(2):
+        stored = surrogate(model, reduce=1e-6, memory=str(tmp_path), random_state=None, **options)
+        assert stored.samples_.shapes.shape == (20, 4, 3)
+        np.testing.assert_allclose(stored.predict(X), full, rtol=1e-4)
+
+
+def test_given_rows_teach_the_same_as_simulated_ones():
+    theta = drawn(300, 0.3, seed=7)
+    taught = InverseSurrogate(TRUSS, Ridge(), noise=NOISE, dofs=DOFS, random_state=0).fit(
+        columns(*measured(theta)), theta
+    )
+    np.testing.assert_allclose(taught.predict(columns(*MEASURED)[:20]), INVERSE.predict(columns(*MEASURED)[:20]), 1e-4)
+
+
+def test_clones_pickles_and_names():
+    frame = pd.DataFrame(columns(*MEASURED)[:5]).add_prefix("x")
+    fitted = clone(INVERSE).fit(frame)
+    assert list(fitted.transform(frame)) == list(TRUSS.parameter_names)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(fitted)).transform(frame), fitted.transform(frame))
+    back = fitted.inverse_transform(pd.DataFrame(THETA[:5], columns=list(TRUSS.parameter_names)))
+    assert list(back) == list(frame)
+    clean = shape_components(measured(THETA[:5], shape_noise=0)[1], fitted.shape_inputs_.reference)
+    np.testing.assert_allclose(back.to_numpy()[:, 6:], clean, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "message"),
+    [
+        (TRUSS, {"dofs": [1, 99]}, "dofs holds 99; expected 0 to 22"),
+        (TRUSS, {"shape_noise": [0.01, 0.0]}, r"shape_noise is \[0.01 0.  \]; expected a standard deviation between"),
+        (
+            CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6),
+            {},
+            "has no method 'modes'; expected a model that",
+        ),
+        (None, {}, "dofs are given without a model"),
+    ],
+)
+def test_impossible_shapes_are_named(model, options, message):
+    with pytest.raises(ValueError, match=message):
+        surrogate(model, **options)
+
+
+def test_errors_name_numbers_of_columns_and_nodes():
+    with pytest.raises(ValueError, match=r"X has 6 columns; expected the 6 modes of .* at 4 sensors, 30 columns"):
+        clone(INVERSE).fit(MEASURED[0])
+    beam = AffineModel({("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 2.0])}, np.eye(2), n_modes=2)
+    with pytest.raises(ValueError, match=r"mode 1 does not move the degrees of freedom \[0\]"):
+        surrogate(beam, dofs=[0])
+
+
+# The chain
+
+
+YEAR = make_truss_campaign(random_state=0)
+WEATHER = YEAR.temperatures
+LAW = np.exp(-0.002 * (WEATHER.to_numpy()[:, [0, 1, 2, 1]] - 20))
+
+
+def test_the_chain_learns_weak_parameters_from_shapes():
+    F, shapes = measured(LAW, seed=3)
+    F = pd.DataFrame(F, index=WEATHER.index, columns=list(YEAR.frequencies))
+    rng = np.random.default_rng(4)
+    shapes = shapes * rng.uniform(0.1, 9, (len(F), 6, 1)) * np.exp(1j * rng.uniform(0, 6, (len(F), 6, 1)))
+    shapes[:20] = np.nan
+    alone = DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=NOISE), random_state=0).fit(WEATHER, F)
+    chain = DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=NOISE, dofs=DOFS), random_state=0)
+    chain.fit(WEATHER, F, shapes)
+    for name in ("parameters_", "predict_parameters"):
+        found, other = (
+            getattr(fem, name) if name.endswith("_") else getattr(fem, name)(WEATHER) for fem in (chain, alone)
+        )
+        errors, others = (np.abs(np.log(theta / LAW)).mean()["vertical"] for theta in (found, other))
+        assert errors < 0.8 * others
+    clean = TRUSS.frequencies(LAW)
+    errors, others = (np.abs(fem.predict(WEATHER) / clean - 1).to_numpy().mean() for fem in (chain, alone))
+    assert errors < 1.1 * others < 5e-4
+    pd.testing.assert_frame_equal(chain.estimate_parameters(F, shapes), chain.parameters_)
+    from_frequencies = np.log(chain.estimate_parameters(F) / alone.parameters_).abs().to_numpy()
+    assert from_frequencies.max() < 1e-4
+    assert len(chain.residuals_.values) == len(F)
+
+
+def test_the_chain_names_shapes_that_are_missing_or_not_wanted():
+    F, shapes = measured(LAW)
+    with pytest.raises(ValueError, match="the inverse has no dofs; expected InverseSurrogate"):
+        DataInformedFEM(TRUSS).fit(WEATHER, F, shapes)
+    chain = DataInformedFEM(TRUSS, inverse=InverseSurrogate(dofs=DOFS, n_samples=50))
+    with pytest.raises(ValueError, match=r"expected fit\(T, F, shapes\)"):
+        chain.fit(WEATHER, F)
+    with pytest.raises(ValueError, match="shapes have 9 rows and frequencies 365"):
+        chain.fit(WEATHER, F, shapes[:9])
