@@ -1,0 +1,189 @@
+"""Records of KW51, measured or synthetic, and chains by the paper's choices and others; for ``plot_kw51_study.py``."""
+
+import time
+import warnings
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import load_kw51, make_kw51, make_kw51_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.metrics import mape
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
+
+MODES = [f"f{mode}" for mode in range(1, 7)]
+PAIR = ["f2", "f4"]  # the modes that the paper's index sees
+BASELINE, TRAINED = 4000, 3200  # first records; the paper trains on four fifths of them
+LAGS = 24
+NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)  # relative, of the identified frequencies
+PAPER_RETROFIT = {"damage": {"connections": -0.15}}
+MODEL = make_kw51(updated=True).reduced(0.5, random_state=0)
+
+
+@dataclass
+class Records:
+    """Temperatures and the six lowest modes; what is known of their truth."""
+
+    title: str
+    temperatures: pd.DataFrame
+    frequencies: pd.DataFrame
+    state: pd.Series
+    retrofit: dict
+    clean: pd.DataFrame | None = None
+
+    @classmethod
+    def read(cls, path=None, seed=0):
+        """The published file or, without a path, a synthetic campaign."""
+        if path is None:
+            campaign = make_kw51_campaign(random_state=seed)
+            title = f"KW51, synthetic campaign (seed {seed})"
+            tables = campaign.temperatures, campaign.frequencies, campaign.state, campaign.retrofit
+            return cls(title, *tables, campaign.clean_frequencies)
+        data = load_kw51(path)
+        retrofit = make_kw51_campaign(n_hours=1).retrofit
+        return cls("KW51, measured", data.temperatures[["tBD31A"]], data.frequencies[MODES], data.state, retrofit)
+
+    @property
+    def after(self):
+        """Which records are from after the retrofit."""
+        return (self.state == "after").to_numpy()
+
+    def imputed(self):
+        """The records with all gaps filled from ten similar records, of each state by itself, as in the paper."""
+        both = pd.concat([self.temperatures, self.frequencies], axis=1)
+        filled = pd.concat([KNNGapImputer(n_neighbors=10).fit_transform(part) for _, part in both.groupby(self.state)])
+        filled = filled.loc[both.index]
+        return replace(self, temperatures=filled[self.temperatures.columns], frequencies=filled[MODES])
+
+
+def network_inverse(**settings):
+    """M1 as in the paper: the network of Table 4, neither noise nor refining."""
+    return InverseSurrogate(regressor=paper_network(4), refine=0, **settings)
+
+
+NETWORK = {"impute": True, "inverse": network_inverse(), "mapper": TemperatureMapper(paper_network(6))}
+REFINED = InverseSurrogate(noise=NOISE)
+RECIPES = {  # each but the last changes one more of the paper's choices
+    "the paper's": NETWORK,
+    "narrower bounds": NETWORK | {"inverse": network_inverse(narrow_bounds=True)},
+    "M1 refined": NETWORK | {"inverse": REFINED},
+    "broken lines as M2": NETWORK | {"inverse": REFINED, "mapper": TemperatureMapper()},
+    "nothing imputed": {"inverse": REFINED, "mapper": TemperatureMapper()},
+    "the paper's networks, nothing imputed": NETWORK | {"impute": False},
+}
+DEFAULT = "nothing imputed"
+EXPECTED_WARNINGS = (
+    "the inverse turns the model's nominal frequencies",
+    "the chain misses its own training frequencies",
+    r"only \d+ of \d+ rows trained",
+    r"\d+ of \d+ rows give parameters far outside",
+    r"\d+ of \d+ rows have temperatures far outside",
+    r"\d+ of \d+ rows have a missing",
+    r"\d+ of \d+ theta are outside the bounds for which",
+    "Got `batch_size` less than 1",
+)
+
+
+@contextmanager
+def quiet():
+    """Without the warnings that this study counts itself, or that belong to choices which it shows to be bad."""
+    with warnings.catch_warnings():
+        for message in EXPECTED_WARNINGS:
+            warnings.filterwarnings("ignore", message=message)
+        yield
+
+
+@dataclass
+class Fitted:
+    """A chain that has learned from the first records, and the records that it has seen."""
+
+    records: Records
+    fem: DataInformedFEM
+    seconds: float
+
+    @classmethod
+    def by(cls, records, recipe, seed=0):
+        """The chain of a recipe; with imputed records, where it asks for them."""
+        records = records.imputed() if recipe.get("impute") else records
+        fem = DataInformedFEM(
+            MODEL,
+            inverse=recipe["inverse"],
+            mapper=make_pipeline(LagFeatures(LAGS, freq="h"), recipe["mapper"]),
+            aligner=BiasAligner(MODEL),
+            random_state=seed,
+        )
+        began = time.perf_counter()
+        with quiet():
+            fem.fit(records.temperatures[:TRAINED], records.frequencies[:TRAINED])
+        return cls(records, fem, time.perf_counter() - began)
+
+    def test(self, table):
+        """The last fifth of the first records."""
+        return table[TRAINED:BASELINE]
+
+    def predicted(self):
+        """Predictions of the last fifth; lags reach back into the records before."""
+        with quiet():
+            return self.test(self.fem.predict(self.records.temperatures[:BASELINE]))
+
+    def errors(self, measured):
+        """MAPE of the predictions of the last fifth."""
+        return mape(self.test(measured), self.predicted())
+
+    def simulated(self, noise="fitted", retrofit=None, seed=0):
+        """Records of the last fifth and, with a retrofit, those after it, as the chain simulates them."""
+        options = {"noise": noise, "random_state": seed}
+        with quiet():
+            if retrofit is None:
+                return self.test(self.fem.simulate(self.records.temperatures[:BASELINE], **options))
+            T, after = self.records.temperatures, self.records.after
+            first = np.flatnonzero(after)[0] - LAGS
+            return self.fem.simulate(T[first:], **options, **retrofit)[after[first:]]
+
+    def detection(self, retrofit, noise="fitted", modes=PAIR, complete=True, seed=0):
+        """Table 9: rates of alarms in percent and damage indices, measured and simulated; and the threshold.
+
+        With ``complete`` an index needs all of its modes, as in the paper.
+        """
+        F, after = self.records.frequencies, self.records.after
+        tables = {
+            ("healthy", "measured"): self.test(F),
+            ("healthy", "data-informed"): self.simulated(noise, seed=seed),
+            ("retrofit", "measured"): F[after],
+            ("retrofit", "data-informed"): self.simulated(noise, retrofit, seed),
+        }
+        baseline = F[:TRAINED][modes]
+        detector = MahalanobisDetector(threshold="quantile").fit(baseline.dropna() if complete else baseline)
+        return {key: index(detector, table[modes], complete) for key, table in tables.items()}, detector.threshold_
+
+
+def index(detector, table, complete):
+    """Damage index of each record; with ``complete``, only where all modes are there."""
+    with quiet():
+        found = pd.Series(np.ravel(detector.damage_index(table)), table.index)
+    return found.where(table.notna().all(axis=1)) if complete else found
+
+
+def rates(indices, threshold):
+    """Alarms in percent, mean and standard deviation of the index, and the share of records that have one."""
+    rows = {}
+    for key, found in indices.items():
+        known = found.dropna()
+        rows[key] = {
+            "alarms, %": 100 * (known > threshold).mean(),
+            "mean index": known.mean(),
+            "deviation": known.std(),
+            "records with an index, %": 100 * len(known) / len(found),
+        }
+    return pd.DataFrame(rows).T
+
+
+def scaled(change, share):
+    """A share of the severities of groups, or of a matrix."""
+    return (
+        {group: share * severity for group, severity in change.items()} if isinstance(change, dict) else share * change
+    )

@@ -1,0 +1,297 @@
+"""
+KW51: the paper's bridge, end to end
+====================================
+
+Section 4 of Kamali, Ceravolo & Marzani (2026): gaps, lags, updating, the two surrogates, verification, retrofit and
+detection, with counterparts of Tables 4 to 9 and Figs. 11 to 18. A last table shows what each of the paper's choices
+costs.
+
+The measurements may not be part of this package. Without a file the study runs on a synthetic campaign with their
+statistics, :func:`~skthermo.datasets.make_kw51_campaign`, whose truth is known; every title says which it is. With
+``trackedmodes.zip`` of doi 10.5281/zenodo.3745914 it runs on the measurements:
+``python examples/plot_kw51_study.py trackedmodes.zip``. Figures go to the folder ``figures``.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from kw51_recipes import (
+    BASELINE,
+    DEFAULT,
+    MODEL,
+    MODES,
+    NETWORK,
+    PAIR,
+    PAPER_RETROFIT,
+    RECIPES,
+    TRAINED,
+    Fitted,
+    Records,
+    quiet,
+    rates,
+    scaled,
+)
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_kw51
+from skthermo.fem import sample
+from skthermo.metrics import mape
+from skthermo.plotting import DamageIndexDisplay, FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
+from skthermo.preprocessing import LagFeatures
+from skthermo.surrogate import TemperatureMapper
+from skthermo.updating import identifiability
+
+PARAMETERS = list(MODEL.parameter_names)
+MEASURED = [0.51, 1.24, 1.89, 2.45, 2.58, 2.92]  # Hz, to which the model was updated
+PAPER_5 = [0.0275, 0.0264, 0.0176, 0.0261, 0.0201]
+PAPER_7 = [0.2510, 0.2888, 0.2654, 0.2270, 0.2213]
+PAPER_8 = [0.1512, 0.1346, 0.3346, 0.1281, 0.4224, 0.1827]
+PAPER_9 = {
+    ("healthy", "measured"): [1.88, 0.945, 0.772],
+    ("healthy", "data-informed"): [5.88, 1.211, 1.129],
+    ("retrofit", "measured"): [100.0, 10.743, 0.895],
+    ("retrofit", "data-informed"): [100.0, 10.181, 0.817],
+}
+SETTINGS = {  # Tables 4 and 6
+    ("M1", "the paper's"): "256-128-64-32-16 ReLU, Adam 0.001, 1000 epochs of batches of 128, noise-free",
+    ("M1", "here"): "64 ReLU units as a first guess, then Levenberg-Marquardt steps on the FE model; noise of the measurement",
+    ("M2", "the paper's"): "256-128-64-32 ReLU, dropout 0.2 (here: L2 penalty 1), 1000 epochs of batches of 256",
+    ("M2", "here"): "broken lines with four knots a lag, ridge penalty chosen by leave-one-out",
+}
+
+
+def table_of_gaps(records, fitted):
+    """Missing records, and how far imputed values scatter around the chain's predictions beside measured ones."""
+    missing = records.frequencies[:BASELINE].isna()
+    with quiet():
+        predicted = fitted.fem.predict(records.temperatures[:BASELINE])
+    residuals = records.imputed().frequencies[:BASELINE] / predicted - 1
+    ratio = residuals.where(missing).std() / residuals.where(~missing).std()
+    columns = {"missing, %": 100 * missing.mean(), "scatter of imputed ones, % of measured ones": 100 * ratio}
+    table = pd.DataFrame(columns)
+    table.loc["temperature"] = [100 * records.temperatures[:BASELINE].isna().mean().iloc[0], np.nan]
+    table.loc["one of six modes at least"] = [100 * missing.any(axis=1).mean(), np.nan]
+    return table.round(1)
+
+
+def table_of_lags(records):
+    """MAPE of mode 6 in the last fifth, predicted straight from temperatures, by the number of hours that are seen."""
+    T, f6 = records.temperatures[:BASELINE], records.frequencies[["f6"]][:BASELINE]
+    found = {}
+    for hours in (1, 6, 12, 24, 48):
+        mapper = make_pipeline(LagFeatures(hours, freq="h"), TemperatureMapper()).fit(T[:TRAINED], f6[:TRAINED])
+        found[hours] = mape(f6[TRAINED:], mapper.predict(T)[TRAINED:])[0]
+    return pd.DataFrame({"MAPE of f6, %": found}).rename_axis("hours").round(4)
+
+
+def table_of_updating():
+    """The modes before and after updating, beside the measured ones; errors in percent."""
+    nominal = np.ones((1, len(PARAMETERS)))
+    solved = {
+        name: make_kw51(updated=updated).frequencies(nominal)[0]
+        for name, updated in (("before", False), ("after", True))
+    }
+    table = pd.DataFrame({"measured, Hz": MEASURED, **solved}, index=MODES)
+    return table.assign(**{f"error {name}, %": 100 * (table[name] / MEASURED - 1) for name in solved}).round(3)
+
+
+def table_5(model):
+    """MAPE of M1 on test samples: the paper's, its network here, and refined without and with noise."""
+    test = sample(model, 0.3, 200, random_state=1)
+    noise = np.array(RECIPES[DEFAULT]["inverse"].noise)
+    noisy = test.frequencies * (1 + noise * np.random.RandomState(0).standard_normal(test.frequencies.shape))
+    inverses = {"network here": (NETWORK["inverse"], test.frequencies), "refined": (RECIPES[DEFAULT]["inverse"], noisy)}
+    table = pd.DataFrame({"paper": PAPER_5}, index=PARAMETERS)
+    exact = clone(RECIPES[DEFAULT]["inverse"]).set_params(noise=0.0)
+    inverses["refined, noise-free"] = exact, test.frequencies
+    for name, (inverse, frequencies) in inverses.items():
+        fitted = clone(inverse).set_params(model=model, n_samples=800, random_state=0).fit()
+        table[name] = mape(test.theta, fitted.transform(frequencies))
+    return table.rename(columns={"refined": "refined, noisy frequencies"}).round(4)
+
+
+def table_7(chains):
+    """MAPE of the parameters that M2 predicts for the last fifth, beside those that M1 finds there."""
+    table = pd.DataFrame({"paper": PAPER_7}, index=PARAMETERS)
+    for name, fitted in chains.items():
+        T, F = fitted.records.temperatures[:BASELINE], fitted.test(fitted.records.frequencies)
+        with quiet():
+            predicted = fitted.test(fitted.fem.predict_parameters(T))
+            table[name] = mape(fitted.fem.estimate_parameters(F), predicted)
+    return table.round(3)
+
+
+def table_8(records, chains):
+    """MAPE of predicted frequencies of the last fifth, beside measured and, where they are known, true ones."""
+    table = pd.DataFrame({"paper": PAPER_8}, index=MODES)
+    for name, fitted in chains.items():
+        table[f"{name}, measured"] = fitted.errors(fitted.records.frequencies)
+        if records.clean is not None:
+            table[f"{name}, true"] = fitted.errors(records.clean)
+    return table.round(3)
+
+
+def table_9(chains):
+    """Alarms and damage indices by modes 2 and 4, with the retrofit that explains the shifts."""
+    paper = pd.DataFrame(PAPER_9, index=["alarms, %", "mean index", "deviation"]).T
+    found = {"paper": paper}
+    for name, (fitted, noise) in chains.items():
+        found[name] = rates(*fitted.detection(fitted.records.retrofit, noise))[paper.columns]
+    return pd.concat(found, axis=1).round(2)
+
+
+def table_of_retrofits(records, fitted):
+    """Shifts of the modes in percent: measured less the weather's part, and simulated by two retrofits."""
+    T, after = records.temperatures[records.after], records.after
+    with quiet():
+        weather = fitted.fem.predict(records.temperatures)
+        healthy = fitted.fem.simulate(T)
+        shifts = {
+            "measured": records.frequencies[after] / weather[after],
+            "retrofit that explains them": fitted.fem.simulate(T, **records.retrofit) / healthy,
+            "paper's: connections + 15 %": fitted.fem.simulate(T, **PAPER_RETROFIT) / healthy,
+        }
+    return pd.DataFrame({name: 100 * (ratio.mean() - 1) for name, ratio in shifts.items()}).round(2)
+
+
+def table_of_choices(records, fits, n_jobs):
+    """What each of the paper's choices costs."""
+    rows = Parallel(n_jobs=n_jobs)(delayed(choice)(records, fitted) for fitted in fits.values())
+    return pd.DataFrame(rows, index=list(fits)).round(2)
+
+
+def choice(records, fitted):
+    """A row of that table."""
+    found = {noise: rates(*fitted.detection(records.retrofit, noise)) for noise in (0.0, "fitted")}
+    alarms, index = ({noise: table[column] for noise, table in found.items()} for column in ("alarms, %", "mean index"))
+    measured = fitted.records.frequencies if records.clean is None else records.clean
+    return {
+        "records that train": fitted.fem.report_.n_trained,
+        "round trip, %": fitted.fem.report_.round_trip.abs().max(),
+        f"MAPE, {'measured' if records.clean is None else 'true'}, %": fitted.errors(measured).mean(),
+        "false alarms measured, %": alarms[0.0]["healthy", "measured"],
+        "simulated": alarms[0.0]["healthy", "data-informed"],
+        "with noise": alarms["fitted"]["healthy", "data-informed"],
+        "index after retrofit, measured": index[0.0]["retrofit", "measured"],
+        "simulated with noise": index["fitted"]["retrofit", "data-informed"],
+        "found, %": alarms["fitted"]["retrofit", "data-informed"],
+        "fit, s": fitted.seconds,
+    }
+
+
+def table_of_gaps_in_detection(records, fitted):
+    """Records that get an index, and alarms in percent, if all modes of an index are needed or only some."""
+    third = {key: scaled(value, 0.3) for key, value in records.retrofit.items()}
+    detectors = {"f2 and f4, both": (PAIR, True), "f2 and f4, either": (PAIR, False), "six modes, any": (MODES, False)}
+    rows = {}
+    for name, (modes, complete) in detectors.items():
+        whole, part = (rates(*fitted.detection(r, "fitted", modes, complete)) for r in (records.retrofit, third))
+        rows[name] = {
+            "records with an index": whole.loc[("healthy", "measured"), "records with an index, %"],
+            "false alarms": whole.loc[("healthy", "measured"), "alarms, %"],
+            "retrofit found": whole.loc[("retrofit", "measured"), "alarms, %"],
+            "simulated": whole.loc[("retrofit", "data-informed"), "alarms, %"],
+            "30 % of it, simulated": part.loc[("retrofit", "data-informed"), "alarms, %"],
+        }
+    return pd.DataFrame(rows).T.round(2)
+
+
+def figures(records, fits):
+    """Counterparts of Figs. 11 to 18 by name; the paper's own choices in Figs. 13 to 16, then nothing imputed."""
+    paper, best = fits["the paper's"], fits[DEFAULT]
+    filled = paper.records
+    both = {
+        name: pd.concat([r.temperatures.add_suffix(" (°C)"), r.frequencies.add_suffix(" (Hz)")], axis=1)[:BASELINE]
+        for name, r in (("measured", records), ("imputed", filled))
+    }
+    both["imputed"] = both["imputed"].where(both["measured"].isna())
+    test = sample(MODEL, 0.3, 200, random_state=1)
+    T, after = records.temperatures, records.after
+    true, found = (
+        pd.DataFrame(t, columns=PARAMETERS) for t in (test.theta, paper.fem.inverse_.transform(test.frequencies))
+    )
+    F, F_filled = (r.frequencies[:TRAINED] for r in (records, filled))
+    simulated = best.simulated(0.0, records.retrofit)
+    with quiet():
+        at_test = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
+        estimated = paper.fem.estimate_parameters(paper.test(filled.frequencies))
+        fig12 = FrequencyTemperatureDisplay.from_predictions(T[:TRAINED]["tBD31A"], F, best.fem.predict(T[:TRAINED]))
+    parameters = {"unit": "", "n_columns": 1}
+    indices, threshold = best.detection(records.retrofit)
+    panels = {"before the retrofit": "healthy", "after the retrofit": "retrofit"}
+    by_panel = {
+        title: {label: indices[key, label].dropna() for label in ("measured", "data-informed")}
+        for title, key in panels.items()
+    }
+    return {
+        "fig11_records": HistoryDisplay.from_predictions(both, unit="", kind="points").figure_,
+        "fig12_over_temperature": fig12.figure_,
+        "fig13_inverse": PredictionDisplay.from_predictions(
+            true, found, labels=("true", "by M1"), kind="scatter", unit=""
+        ).figure_,
+        "fig14_parameters": HistoryDisplay.from_predictions(
+            {"from frequencies": paper.fem.estimate_parameters(F_filled)}, quantity="multiplier", **parameters
+        ).figure_,
+        "fig15_mapper": PredictionDisplay.from_predictions(
+            estimated, at_test, labels=("from frequencies", "from temperatures"), **parameters
+        ).figure_,
+        "fig16_verification": PredictionDisplay.from_predictions(
+            best.test(records.frequencies), best.predicted()
+        ).figure_,
+        "fig17_retrofit": PredictionDisplay.from_predictions(records.frequencies[after][PAIR], simulated[PAIR]).figure_,
+        "fig18_damage_index": DamageIndexDisplay.from_scenarios(by_panel, threshold).figure_,
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description="The KW51 study of Kamali et al. (2026), Section 4.")
+    parser.add_argument("file", type=Path, nargs="?", help="trackedmodes.zip or trackedmodes.mat; else a synthetic one")
+    parser.add_argument("--seed", type=int, default=0, help="of the synthetic campaign")
+    parser.add_argument("--jobs", type=int, default=2, help="chains that are fitted and judged side by side")
+    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
+    options = parser.parse_args()
+    began = time.perf_counter()
+
+    def show(title, table):
+        print(f"\n{title}\n{table.to_string(na_rep='')}", flush=True)
+
+    records = Records.read(options.file, options.seed)
+    print(f"{records.title}: {len(records.state)} hourly records; {TRAINED} teach, {BASELINE - TRAINED} more test.")
+    fits = dict(
+        zip(RECIPES, Parallel(options.jobs)(delayed(Fitted.by)(records, r) for r in RECIPES.values()), strict=True)
+    )
+    best, pair = fits[DEFAULT], {"the paper's here": fits["the paper's"], DEFAULT: fits[DEFAULT]}
+    show(f"Step 1, gaps in the first {BASELINE} records:", table_of_gaps(records, best))
+    show("Step 1, lags:", table_of_lags(records))
+    show("Step 2, updating (plot_kw51_updating.py has Tables A.3 to A.5):", table_of_updating())
+    known = identifiability(MODEL, noise=RECIPES[DEFAULT]["inverse"].noise)
+    print("\nFrozen to the five thermal parameters. One record tells them to, in percent of their values:")
+    print((100 * known.deviations).round(2).to_frame().T.to_string(index=False))
+    show("Tables 4 and 6, settings:", pd.Series(SETTINGS).unstack().T)
+    show("Table 5, MAPE of M1 on test samples, %:", table_5(MODEL))
+    show("Table 7, MAPE of M2 on the last fifth, %:", table_7(pair))
+    show("Table 8, MAPE of the frequencies of the last fifth, %:", table_8(records, pair))
+    show("Retrofit, shifts of modes in %:", table_of_retrofits(records, best))
+    noises = {"the paper's here": (fits["the paper's"], 0.0), DEFAULT: (best, "fitted")}
+    show("Table 9, detection by modes 2 and 4:", table_9(noises))
+    show("What each of the paper's choices costs:", table_of_choices(records, fits, options.jobs).T)
+    show("What an index does with gaps, in percent of the records:", table_of_gaps_in_detection(records, best))
+
+    options.figures.mkdir(parents=True, exist_ok=True)
+    print()
+    for name, figure in figures(records, fits).items():
+        figure.suptitle(records.title)
+        figure.savefig(options.figures / f"kw51_{name}.png", dpi=130)
+        plt.close(figure)
+        print(options.figures / f"kw51_{name}.png")
+    print(f"\n{time.perf_counter() - began:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
