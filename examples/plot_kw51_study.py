@@ -60,7 +60,10 @@ PAPER_9 = {
 }
 SETTINGS = {  # Tables 4 and 6
     ("M1", "the paper's"): "256-128-64-32-16 ReLU, Adam 0.001, 1000 epochs of batches of 128, noise-free",
-    ("M1", "here"): "64 ReLU units as a first guess, then Levenberg-Marquardt steps on the FE model; noise of the measurement",
+    (
+        "M1",
+        "here",
+    ): "64 ReLU units as a first guess, then steps on the FE model to the posterior mode; noise as measured",
     ("M2", "the paper's"): "256-128-64-32 ReLU, dropout 0.2 (here: L2 penalty 1), 1000 epochs of batches of 256",
     ("M2", "here"): "broken lines with four knots a lag, ridge penalty chosen by leave-one-out",
 }

@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._warnings import warn_user
 
 MOST_LABELS = 1000
 UNIX_EPOCH = 719529  # as a MATLAB date number
@@ -17,10 +18,6 @@ POSSIBLE = {
     "xi": (-1.0, 1.0),
     "tBD31A": (-60.0, 80.0),
     "tVL": (-60.0, 80.0),
-    "rhBD31A": (-50.0, 150.0),
-    "rhVL": (-50.0, 150.0),
-    "wsVL": (-50.0, 500.0),
-    "wdVL": (-360.0, 720.0),
 }
 STAND_FOR_MISSING = (-99, -999, -9999, -99999, 9999, 99999, 999999)
 
@@ -66,6 +63,19 @@ def check_shape(values: NDArray, shape: tuple[int, ...], what: str) -> None:
         )
 
 
+def check_finite(values: Array, columns: list[str], what: str) -> None:
+    """Raise an error for the first infinite value; warn of numbers that stand for missing ones, such as -999."""
+    _refuse(np.isinf(values), values, columns, dict.fromkeys(columns), what)
+    doubtful = np.isin(values, STAND_FOR_MISSING)
+    if doubtful.any():
+        row, column = np.argwhere(doubtful)[0]
+        warn_user(
+            f"{what} has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, column "
+            f"{columns[column]!r}: {values[row, column]:g}; expected measured values, or NaN",
+            kind="stand-ins",
+        )
+
+
 def check_possible(values: Array, columns: list[str], kinds: list[str], what: str) -> None:
     """Raise an error for the first value that cannot be measured; some kinds of columns have limits."""
     wrong = np.isinf(values) | np.isin(values, STAND_FOR_MISSING)
@@ -73,14 +83,17 @@ def check_possible(values: Array, columns: list[str], kinds: list[str], what: st
         if kind in POSSIBLE:
             lowest, highest = POSSIBLE[kind]
             wrong[:, column] |= (values[:, column] < lowest) | (values[:, column] > highest)
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        limits = POSSIBLE.get(kinds[column])
-        expected = f"{limits[0]:g} to {limits[1]:g}" if limits else "a measured value"
-        raise ValueError(
-            f"{what}, row {row}, column {columns[column]!r} is {values[row, column]:g}; expected {expected}, or NaN "
-            "where it is missing"
-        )
+    _refuse(wrong, values, columns, dict(zip(columns, map(POSSIBLE.get, kinds), strict=True)), what)
+
+
+def _refuse(wrong: NDArray[np.bool_], values: Array, columns: list[str], limits: dict[str, Any], what: str) -> None:
+    if not wrong.any():
+        return
+    row, column = np.argwhere(wrong)[0]
+    name = columns[column]
+    expected = "{:g} to {:g}".format(*limits[name]) if limits[name] else "a measured value"
+    place = f"{what}, row {row}, column {name!r}"
+    raise ValueError(f"{place} is {values[row, column]:g}; expected {expected}, or NaN where it is missing")
 
 
 def time_of(numbers: Array, what: str) -> pd.DatetimeIndex:

@@ -11,11 +11,19 @@ from sklearn.utils import Bunch
 
 from skthermo._io import MemoryLimit, read_matlab_values, read_only_member
 from skthermo._warnings import warn_user
-from skthermo.datasets._kw51_fields import check_possible, check_shape, labels_of, numbers_of, time_of
+from skthermo.datasets._kw51_fields import (
+    check_finite,
+    check_possible,
+    check_shape,
+    labels_of,
+    numbers_of,
+    time_of,
+)
 
 PUBLISHED_MD5 = "5cdb446519d1150228fab51b3a002239"
 LARGEST_FILE = 1_000_000_000  # bytes; the published zip file has 13 million
 MOST_MODES = 1000
+TEMPERATURES = ("tBD31A", "tVL")
 FIELDS = ["sdn", "f", "xi", "m", "labels_m", "env", "labels_env"]
 RETROFIT_BEGINS = pd.Timestamp("2019-05-15 00:00")
 AFTER_RETROFIT = pd.Timestamp("2019-09-27 01:00")
@@ -69,14 +77,14 @@ def load_kw51(path: str | PathLike) -> Bunch:
         If there is no file at the path.
     ValueError
         If the file is damaged, a field is missing or does not fit the others, a time stamp is repeated, or a value is
-        infinite, impossible (frequencies outside 0.1 to 100 Hz, damping ratios outside -1 to 1, temperatures outside
-        -60 to 80 C, humidity or wind far outside what is measured) or a number that stands for a missing one, such as
-        -999. The error names the file, field, row (counted from zero) and column.
+        impossible: frequencies outside 0.1 to 100 Hz, damping ratios outside -1 to 1, temperatures outside -60 to 80 C,
+        or a number in their place that stands for a missing one, such as -999. The error names the file, field, row
+        (counted from zero) and column.
 
     Warns
     -----
     UserWarning
-        If a zip file is not the published one.
+        If a zip file is not the published one, or another weather channel has numbers that stand for missing ones.
 
     See Also
     --------
@@ -138,7 +146,10 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
     f_names, xi_names = ([f"{name}{number}" for number in range(1, n_modes + 1)] for name in ("f", "xi"))
     check_possible(f, f_names, ["f"] * n_modes, f"{file}: field 'f'")
     check_possible(xi, xi_names, ["xi"] * n_modes, f"{file}: field 'xi'")
-    check_possible(env, channels, channels, f"{file}: field 'env'")
+    is_temperature = np.isin(channels, TEMPERATURES)
+    thermal, other = ([channels[i] for i in np.flatnonzero(chosen)] for chosen in (is_temperature, ~is_temperature))
+    check_possible(env[:, is_temperature], thermal, thermal, f"{file}: field 'env'")
+    check_finite(env[:, ~is_temperature], other, f"{file}: field 'env'")
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):

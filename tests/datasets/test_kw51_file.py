@@ -234,9 +234,7 @@ BAD = [
     (replaced("xi", (0, 1), 1.5), "field 'xi', row 0, column 'xi2' is 1.5; expected -1 to 1, or NaN"),
     (replaced("env", (4, 0), 85), "field 'env', row 4, column 'tBD31A' is 85; expected -60 to 80"),
     (replaced("env", (4, 2), -60.5), "field 'env', row 4, column 'tVL' is -60.5; expected -60 to 80"),
-    (replaced("env", (4, 5), -999), "field 'env', row 4, column 'grVL' is -999; expected a measured value"),
     (replaced("env", (4, 5), np.inf), "field 'env', row 4, column 'grVL' is inf; expected a measured value"),
-    (replaced("env", (4, 10), 999), "field 'env', row 4, column 'wdVL' is 999; expected -360 to 720"),
     (replaced("m", (4, 3, 1), 1j * np.inf), "field 'm', sensor 'aBD17Ay', row 4, column 'f4' is inf"),
     (replaced("m", (4, 3, 1), -9999), "field 'm', sensor 'aBD17Ay', row 4, column 'f4' is -9999"),
 ]
@@ -247,6 +245,13 @@ def test_bad_content_names_file_field_and_place(tmp_path, changes, message):
     fields = {name: value for name, value in (kw51_fields() | changes).items() if value is not None}
     with pytest.raises(ValueError, match=rf"broken\.mat: .*{message}"):
         load_kw51(write(tmp_path / "broken.mat", fields))
+
+
+def test_a_doubtful_weather_channel_does_not_hide_the_rest(tmp_path):
+    file = write(tmp_path / "modes.mat", kw51_fields() | replaced("env", (4, 5), -999))
+    with pytest.warns(UserWarning, match="field 'env' has 1 values that may stand .* row 4, column 'grVL': -999"):
+        data = load_kw51(file)
+    assert data.temperatures["grVL"].iloc[4] == -999
 
 
 def test_files_of_another_kind_are_refused(tmp_path, monkeypatch):
