@@ -27,14 +27,13 @@ from kw51_recipes import (
     MODES,
     NETWORK,
     PAIR,
-    PAPER_RETROFIT,
+    PART,
     RECIPES,
     TRAINED,
     Fitted,
     Records,
     quiet,
     rates,
-    scaled,
 )
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
@@ -72,9 +71,7 @@ SETTINGS = {  # Tables 4 and 6
 def table_of_gaps(records, fitted):
     """Missing records, and how far imputed values scatter around the chain's predictions beside measured ones."""
     missing = records.frequencies[:BASELINE].isna()
-    with quiet():
-        predicted = fitted.fem.predict(records.temperatures[:BASELINE])
-    residuals = records.imputed().frequencies[:BASELINE] / predicted - 1
+    residuals = records.imputed().frequencies[:BASELINE] / fitted.simulated()[:BASELINE] - 1
     ratio = residuals.where(missing).std() / residuals.where(~missing).std()
     columns = {"missing, %": 100 * missing.mean(), "scatter of imputed ones, % of measured ones": 100 * ratio}
     table = pd.DataFrame(columns)
@@ -109,14 +106,17 @@ def table_5(model):
     test = sample(model, 0.3, 200, random_state=1)
     noise = np.array(RECIPES[DEFAULT]["inverse"].noise)
     noisy = test.frequencies * (1 + noise * np.random.RandomState(0).standard_normal(test.frequencies.shape))
-    inverses = {"network here": (NETWORK["inverse"], test.frequencies), "refined": (RECIPES[DEFAULT]["inverse"], noisy)}
+    inverses = {
+        "network here, noise-free": (NETWORK["inverse"], test.frequencies),
+        "refined": (RECIPES[DEFAULT]["inverse"], noisy),
+    }
     table = pd.DataFrame({"paper": PAPER_5}, index=PARAMETERS)
     exact = clone(RECIPES[DEFAULT]["inverse"]).set_params(noise=0.0)
     inverses["refined, noise-free"] = exact, test.frequencies
     for name, (inverse, frequencies) in inverses.items():
         fitted = clone(inverse).set_params(model=model, n_samples=800, random_state=0).fit()
         table[name] = mape(test.theta, fitted.transform(frequencies))
-    return table.rename(columns={"refined": "refined, noisy frequencies"}).round(4)
+    return table.round(4)
 
 
 def table_7(chains):
@@ -145,22 +145,19 @@ def table_9(chains):
     paper = pd.DataFrame(PAPER_9, index=["alarms, %", "mean index", "deviation"]).T
     found = {"paper": paper}
     for name, (fitted, noise) in chains.items():
-        found[name] = rates(*fitted.detection(fitted.records.retrofit, noise))[paper.columns]
+        found[name] = rates(*fitted.detection(noise))[paper.columns]
     return pd.concat(found, axis=1).round(2)
 
 
 def table_of_retrofits(records, fitted):
     """Shifts of the modes in percent: measured less the weather's part, and simulated by two retrofits."""
-    T, after = records.temperatures[records.after], records.after
-    with quiet():
-        weather = fitted.fem.predict(records.temperatures)
-        healthy = fitted.fem.simulate(T)
-        shifts = {
-            "measured": records.frequencies[after] / weather[after],
-            "retrofit that explains them": fitted.fem.simulate(T, **records.retrofit) / healthy,
-            "paper's: connections + 15 %": fitted.fem.simulate(T, **PAPER_RETROFIT) / healthy,
-        }
-    return pd.DataFrame({name: 100 * (ratio.mean() - 1) for name, ratio in shifts.items()}).round(2)
+    healthy, after = fitted.simulated(), records.after
+    shifts = {
+        "measured": records.frequencies / healthy,
+        "retrofit that explains them": fitted.simulated("retrofit") / healthy,
+        "paper's: connections + 15 %": fitted.simulated("paper's") / healthy,
+    }
+    return pd.DataFrame({name: 100 * (ratio[after].mean() - 1) for name, ratio in shifts.items()}).round(2)
 
 
 def table_of_choices(records, fits, n_jobs):
@@ -171,7 +168,7 @@ def table_of_choices(records, fits, n_jobs):
 
 def choice(records, fitted):
     """A row of that table."""
-    found = {noise: rates(*fitted.detection(records.retrofit, noise)) for noise in (0.0, "fitted")}
+    found = {noise: rates(*fitted.detection(noise)) for noise in (0.0, "fitted")}
     alarms, index = ({noise: table[column] for noise, table in found.items()} for column in ("alarms, %", "mean index"))
     measured = fitted.records.frequencies if records.clean is None else records.clean
     return {
@@ -188,19 +185,18 @@ def choice(records, fitted):
     }
 
 
-def table_of_gaps_in_detection(records, fitted):
+def table_of_gaps_in_detection(fitted):
     """Records that get an index, and alarms in percent, if all modes of an index are needed or only some."""
-    third = {key: scaled(value, 0.3) for key, value in records.retrofit.items()}
     detectors = {"f2 and f4, both": (PAIR, True), "f2 and f4, either": (PAIR, False), "six modes, any": (MODES, False)}
     rows = {}
     for name, (modes, complete) in detectors.items():
-        whole, part = (rates(*fitted.detection(r, "fitted", modes, complete)) for r in (records.retrofit, third))
+        whole, part = (rates(*fitted.detection("fitted", modes, complete, change)) for change in ("retrofit", "part"))
         rows[name] = {
             "records with an index": whole.loc[("healthy", "measured"), "records with an index, %"],
             "false alarms": whole.loc[("healthy", "measured"), "alarms, %"],
             "retrofit found": whole.loc[("retrofit", "measured"), "alarms, %"],
             "simulated": whole.loc[("retrofit", "data-informed"), "alarms, %"],
-            "30 % of it, simulated": part.loc[("retrofit", "data-informed"), "alarms, %"],
+            f"{PART:.0%} of it, simulated": part.loc[("retrofit", "data-informed"), "alarms, %"],
         }
     return pd.DataFrame(rows).T.round(2)
 
@@ -217,16 +213,17 @@ def figures(records, fits):
     test = sample(MODEL, 0.3, 200, random_state=1)
     T, after = records.temperatures, records.after
     true, found = (
-        pd.DataFrame(t, columns=PARAMETERS) for t in (test.theta, paper.fem.inverse_.transform(test.frequencies))
+        pd.DataFrame(t, columns=PARAMETERS)
+        for t in (test.theta, paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES)))
     )
     F, F_filled = (r.frequencies[:TRAINED] for r in (records, filled))
-    simulated = best.simulated(0.0, records.retrofit)
+    simulated = best.simulated("retrofit")[after]
     with quiet():
         at_test = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
         estimated = paper.fem.estimate_parameters(paper.test(filled.frequencies))
-        fig12 = FrequencyTemperatureDisplay.from_predictions(T[:TRAINED]["tBD31A"], F, best.fem.predict(T[:TRAINED]))
+        fig12 = FrequencyTemperatureDisplay.from_predictions(T[:TRAINED]["tBD31A"], F, best.simulated()[:TRAINED])
     parameters = {"unit": "", "n_columns": 1}
-    indices, threshold = best.detection(records.retrofit)
+    indices, threshold = best.detection()
     panels = {"before the retrofit": "healthy", "after the retrofit": "retrofit"}
     by_panel = {
         title: {label: indices[key, label].dropna() for label in ("measured", "data-informed")}
@@ -284,7 +281,7 @@ def main():
     noises = {"the paper's here": (fits["the paper's"], 0.0), DEFAULT: (best, "fitted")}
     show("Table 9, detection by modes 2 and 4:", table_9(noises))
     show("What each of the paper's choices costs:", table_of_choices(records, fits, options.jobs).T)
-    show("What an index does with gaps, in percent of the records:", table_of_gaps_in_detection(records, best))
+    show("What an index does with gaps, in percent of the records:", table_of_gaps_in_detection(best))
 
     options.figures.mkdir(parents=True, exist_ok=True)
     print()

@@ -35,7 +35,7 @@ TARGETS = {
 
 def judged(records, fitted, draws):
     """The targets' figures of one campaign."""
-    tables = [rates(*fitted.detection(records.retrofit, "fitted", seed=seed)) for seed in range(draws)]
+    tables = [rates(*fitted.detection(seed=seed)) for seed in range(draws)]
     table = sum(tables) / draws
     healthy, after = (table.xs(key) for key in ("healthy", "retrofit"))
     shift = after[INDEX]["data-informed"] / after[INDEX]["measured"] - 1
