@@ -57,6 +57,7 @@ PAPER_9 = {
     ("retrofit", "measured"): [100.0, 10.743, 0.895],
     ("retrofit", "data-informed"): [100.0, 10.181, 0.817],
 }
+SOURCES = ("measured", "data-informed")
 SETTINGS = {  # Tables 4 and 6
     ("M1", "the paper's"): "256-128-64-32-16 ReLU, Adam 0.001, 1000 epochs of batches of 128, noise-free",
     (
@@ -202,50 +203,43 @@ def table_of_gaps_in_detection(fitted):
 
 
 def figures(records, fits):
-    """Counterparts of Figs. 11 to 18 by name; the paper's own choices in Figs. 13 to 16, then nothing imputed."""
+    """Counterparts of Figs. 11 to 18: what each shows beside the title of the records, and the figure, by name."""
     paper, best = fits["the paper's"], fits[DEFAULT]
-    filled = paper.records
+    filled, after = paper.records, records.after
     both = {
         name: pd.concat([r.temperatures.add_suffix(" (°C)"), r.frequencies.add_suffix(" (Hz)")], axis=1)[:BASELINE]
         for name, r in (("measured", records), ("imputed", filled))
     }
     both["imputed"] = both["imputed"].where(both["measured"].isna())
     test = sample(MODEL, 0.3, 200, random_state=1)
-    T, after = records.temperatures, records.after
-    true, found = (
-        pd.DataFrame(t, columns=PARAMETERS)
-        for t in (test.theta, paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES)))
-    )
-    F, F_filled = (r.frequencies[:TRAINED] for r in (records, filled))
-    simulated = best.simulated("retrofit")[after]
     with quiet():
-        at_test = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
-        estimated = paper.fem.estimate_parameters(paper.test(filled.frequencies))
-        fig12 = FrequencyTemperatureDisplay.from_predictions(T[:TRAINED]["tBD31A"], F, best.simulated()[:TRAINED])
-    parameters = {"unit": "", "n_columns": 1}
+        found = paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES))
+        history = paper.fem.estimate_parameters(filled.frequencies[:BASELINE])
+        mapped = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
+    true = pd.DataFrame(test.theta, columns=PARAMETERS)
+    predicted, simulated = best.simulated(), best.simulated("retrofit")
+    steel = records.temperatures["tBD31A"]
     indices, threshold = best.detection()
-    panels = {"before the retrofit": "healthy", "after the retrofit": "retrofit"}
-    by_panel = {
-        title: {label: indices[key, label].dropna() for label in ("measured", "data-informed")}
-        for title, key in panels.items()
-    }
+    by_label = {name: pd.concat([indices[k, name] for k in ("healthy", "retrofit")]) for name in SOURCES}
+    networks, chain = "the paper's choices", "the chain with nothing imputed"
+    histories, predictions = HistoryDisplay.from_predictions, PredictionDisplay.from_predictions
+    scatter = FrequencyTemperatureDisplay.from_predictions
+    sides, no_unit = ("from frequencies", "from temperatures"), {"unit": "", "n_columns": 1}
     return {
-        "fig11_records": HistoryDisplay.from_predictions(both, unit="", kind="points").figure_,
-        "fig12_over_temperature": fig12.figure_,
-        "fig13_inverse": PredictionDisplay.from_predictions(
-            true, found, labels=("true", "by M1"), kind="scatter", unit=""
-        ).figure_,
-        "fig14_parameters": HistoryDisplay.from_predictions(
-            {"from frequencies": paper.fem.estimate_parameters(F_filled)}, quantity="multiplier", **parameters
-        ).figure_,
-        "fig15_mapper": PredictionDisplay.from_predictions(
-            estimated, at_test, labels=("from frequencies", "from temperatures"), **parameters
-        ).figure_,
-        "fig16_verification": PredictionDisplay.from_predictions(
-            best.test(records.frequencies), best.predicted()
-        ).figure_,
-        "fig17_retrofit": PredictionDisplay.from_predictions(records.frequencies[after][PAIR], simulated[PAIR]).figure_,
-        "fig18_damage_index": DamageIndexDisplay.from_scenarios(by_panel, threshold).figure_,
+        "fig11_records": ("gaps", histories(both, unit="", kind="points")),
+        "fig12_over_temperature": (
+            chain,
+            scatter(steel[:TRAINED], records.frequencies[:TRAINED], predicted[:TRAINED]),
+        ),
+        "fig13_inverse": (networks, predictions(true, found, labels=("true", "by M1"), kind="scatter", unit="")),
+        "fig14_parameters": (networks, histories({sides[0]: history}, quantity="multiplier", **no_unit)),
+        "fig15_mapper": (networks, predictions(paper.test(history), mapped, labels=sides, **no_unit)),
+        "fig16_verification": (chain, predictions(best.test(records.frequencies), best.test(predicted))),
+        "fig17_retrofit": (chain, predictions(records.frequencies[after][PAIR], simulated[after][PAIR])),
+        "fig18_damage_index": (
+            f"{chain}; retrofit from May to September",
+            DamageIndexDisplay.from_predictions(by_label, threshold),
+        ),
     }
 
 
@@ -285,10 +279,11 @@ def main():
 
     options.figures.mkdir(parents=True, exist_ok=True)
     print()
-    for name, figure in figures(records, fits).items():
-        figure.suptitle(records.title)
-        figure.savefig(options.figures / f"kw51_{name}.png", dpi=130)
-        plt.close(figure)
+    for name, (what, display) in figures(records, fits).items():
+        height = display.figure_.get_figheight()
+        display.figure_.suptitle(f"{records.title}: {what}", y=1 + 0.25 / height)
+        display.figure_.savefig(options.figures / f"kw51_{name}.png", dpi=130, bbox_inches="tight")
+        plt.close(display.figure_)
         print(options.figures / f"kw51_{name}.png")
     print(f"\n{time.perf_counter() - began:.0f} s")
 
