@@ -243,6 +243,16 @@ def figures(records, fits):
     }
 
 
+def save(figure, title, path):
+    """Save a figure with a title, above its legend if it has one."""
+    if figure.legends:
+        figure.legends[0].set_title(title, prop={"size": "large"})
+    else:
+        figure.suptitle(title)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
 def main():
     parser = argparse.ArgumentParser(description="The KW51 study of Kamali et al. (2026), Section 4.")
     parser.add_argument("file", type=Path, nargs="?", help="trackedmodes.zip or trackedmodes.mat; else a synthetic one")
@@ -280,10 +290,7 @@ def main():
     options.figures.mkdir(parents=True, exist_ok=True)
     print()
     for name, (what, display) in figures(records, fits).items():
-        height = display.figure_.get_figheight()
-        display.figure_.suptitle(f"{records.title}: {what}", y=1 + 0.25 / height)
-        display.figure_.savefig(options.figures / f"kw51_{name}.png", dpi=130, bbox_inches="tight")
-        plt.close(display.figure_)
+        save(display.figure_, f"{records.title}: {what}", options.figures / f"kw51_{name}.png")
         print(options.figures / f"kw51_{name}.png")
     print(f"\n{time.perf_counter() - began:.0f} s")
 
