@@ -78,7 +78,7 @@ def test_damage_behind_an_aligner(method):
 
 
 def test_a_reduced_model_finds_the_same(fem, reduced_fem):
-    F = simulated(fem, {"top": 0.2, "bottom": 0.4})
+    F = simulated(fem, {"top": 0.2, "bottom": 0.4, "diagonal": 0.1})
     found, expected = (
         identify_damage(each, WEATHER, F, GROUPS, noise=0.001, random_state=0) for each in (reduced_fem, fem)
     )

@@ -1,0 +1,82 @@
+"""The KW51 study: its records from a file, and what its default chain must show."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.datasets import load_kw51, make_kw51_campaign
+from tests.datasets.kw51_file import write_kw51
+
+PATH = Path(__file__).parents[2] / "examples" / "kw51_recipes.py"
+SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
+study = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(study)
+INDEX = {"check_freq": False, "check_index_type": False}  # a file's time stamps have no frequency
+FOURTEEN = [f"f{mode}" for mode in range(1, 15)]
+
+
+@pytest.fixture(scope="module")
+def records():
+    return study.Records.read(seed=1)
+
+
+@pytest.fixture(scope="module")
+def fitted(records):
+    return study.Fitted.by(records, study.RECIPES[study.DEFAULT])
+
+
+def test_a_campaign_in_the_format_of_the_file_is_read_back_equal(tmp_path):
+    campaign = make_kw51_campaign(n_hours=200, shapes=True, random_state=0)
+    padded = [table.reindex(columns=[*table, *range(8)]) for table in (campaign.frequencies, campaign.damping)]
+    shapes = np.concatenate([campaign.shapes, np.full((200, 8, 12), np.nan)], axis=1)
+    file = tmp_path / "trackedmodes.mat"
+    write_kw51(file, *padded, shapes, campaign.temperatures, times=campaign.frequencies.index)
+    data = load_kw51(file)
+    pd.testing.assert_frame_equal(data.frequencies.iloc[:, :6], campaign.frequencies, **INDEX)
+    pd.testing.assert_frame_equal(data.damping.iloc[:, :6], campaign.damping, **INDEX)
+    pd.testing.assert_frame_equal(data.temperatures, campaign.temperatures, **INDEX)
+    np.testing.assert_array_equal(data.shapes[:, :6], campaign.shapes)
+    assert data.sensors == campaign.sensors
+    assert (data.state == campaign.state).all()
+    assert list(data.frequencies) == FOURTEEN
+    assert data.frequencies.iloc[:, 6:].isna().all(axis=None)
+    from_file = study.Records.read(file)
+    assert from_file.title == "KW51, measured"
+    pd.testing.assert_frame_equal(from_file.frequencies, campaign.frequencies, **INDEX)
+
+
+def test_the_chain_meets_its_targets(records, fitted):
+    assert fitted.errors(records.clean).max() < 0.10
+    assert fitted.fem.report_.round_trip.abs().max() < 0.1
+    assert fitted.fem.report_.n_trained > 1500
+    table = study.rates(*fitted.detection())
+    found = table.xs("retrofit")
+    assert found["alarms, %"].min() > 99.5
+    assert found["mean index"]["data-informed"] == pytest.approx(found["mean index"]["measured"], rel=0.1)
+
+
+def test_an_index_of_whatever_modes_there_are_finds_more(fitted):
+    share = "records with an index, %"
+    both, some = (
+        study.rates(*fitted.detection(modes=m, complete=c)) for m, c in ((study.PAIR, True), (study.MODES, False))
+    )
+    assert both.loc[("healthy", "measured"), share] < 30
+    assert some.loc[("healthy", "measured"), share] > 95
+
+
+def test_imputed_records_have_no_gaps_and_keep_what_was_measured(records):
+    filled = records.imputed()
+    assert filled.frequencies.notna().all(axis=None)
+    assert filled.temperatures.notna().all(axis=None)
+    pd.testing.assert_frame_equal(
+        filled.frequencies.where(records.frequencies.notna()), records.frequencies, check_freq=False
+    )
+
+
+def test_a_part_of_the_retrofit_is_a_part_of_each_change(records):
+    whole, part = records.changes["retrofit"], records.changes["part"]
+    assert part["damage"] == {group: pytest.approx(study.PART * s) for group, s in whole["damage"].items()}
+    np.testing.assert_allclose(part["mass"], study.PART * whole["mass"])
