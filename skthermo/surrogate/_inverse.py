@@ -192,7 +192,7 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_features_in_), optional
+        X : array-like or DataFrame of shape (n_samples, n_features), optional
             Frequencies in Hz and, with ``dofs``, components of shapes. Without y they give the columns, ``scatter_``
             and, with ``narrow_bounds``, the bounds.
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
@@ -245,7 +245,7 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+        X : array-like or DataFrame of shape (n_samples, n_features)
             Frequencies in Hz and, with ``dofs``, components of shapes.
         y : array-like of shape (n_samples, ...), optional
             Without a model, the multipliers of each row of X. With a model y is ignored, because the inverse learns
@@ -263,7 +263,7 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+        X : array-like or DataFrame of shape (n_samples, n_features)
             Frequencies in Hz and, with ``dofs``, components of shapes.
 
         Returns

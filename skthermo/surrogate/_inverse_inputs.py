@@ -35,7 +35,7 @@ class InverseInputs(MultiplierRegressor):
 
         Returns
         -------
-        ndarray or DataFrame of shape (n_samples, n_features_in_)
+        ndarray or DataFrame of shape (n_samples, n_features)
             Frequencies in Hz, followed by components of shapes with a root mean square of 1; NaN in rows with NaN. A
             frame, whose columns must be the model's parameters, gives a frame on its own index.
 

@@ -39,7 +39,7 @@ class RefinedInverse(MultiplierRegressor):
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_features_in_)
+        X : array-like or DataFrame of shape (n_samples, n_features)
             Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
 
         Returns
