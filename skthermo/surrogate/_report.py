@@ -211,13 +211,14 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
 def left_out(T: Any, F: Any, theta: Array, inputs: Array, trained: NDArray[np.bool_]) -> pd.Series:
     """Rows that do not train the mapper, by reason."""
     reasons = {}
-    for what, table, default in (("temperature", T, "T"), ("frequency", F, "f")):
-        missing = np.isnan(as_floats(table)[~trained]).sum(axis=0)
+    without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
+    for what, table, default, rows in (("temperature", T, "T", ~trained), ("frequency", F, "f", without_theta)):
+        missing = np.isnan(as_floats(table)[rows]).sum(axis=0)
         for name, count in zip(column_names(table, default), missing, strict=True):
             reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
     reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
-    reasons["no parameters were found"] = int((complete_F & np.isnan(theta).any(axis=1)).sum())
+    reasons["no parameters were found"] = int((complete_F & without_theta).sum())
     counts = pd.Series(reasons, dtype=int)
     return counts[counts > 0]
 

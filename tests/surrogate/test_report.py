@@ -66,7 +66,9 @@ class TestTheReport:
         air.iloc[5:8, 1] = np.nan
         measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
         lagged = make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))
-        assert chain(mapper=lagged).fit(air, measured).report_.n_trained == 365 - 3 - 1
+        refined = chain(mapper=lagged).fit(air, measured).report_
+        assert refined.n_trained == 365 - 3 - 1
+        assert refined.left_out.to_dict() == {"temperature 'T2' is missing": 3, "a lag reaches into a gap": 1}
         report = chain(inverse=InverseSurrogate(refine=0), mapper=lagged).fit(air, measured).report_
         assert report.left_out.to_dict() == {
             "temperature 'T2' is missing": 3,
