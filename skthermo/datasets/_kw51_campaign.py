@@ -12,14 +12,13 @@ from skthermo._arrays import as_random_state, positive_integer
 from skthermo.datasets._kw51_changes import stiffness_factors
 from skthermo.datasets._kw51_monitoring import (
     NOISE,
-    SENSORS,
     draw_damping,
     measured_shapes,
     missing_modes,
     missing_temperatures,
-    sensor_dofs,
 )
 from skthermo.datasets._kw51_retrofit import STIFFENED, progress_of, retrofit_mass, state_of
+from skthermo.datasets._kw51_sensors import kw51_sensors
 from skthermo.datasets._kw51_simulation import simulate
 from skthermo.datasets._kw51_truth import thermal_multipliers, truth_model
 from skthermo.datasets._kw51_weather import N_HOURS, draw_weather
@@ -196,12 +195,13 @@ def make_kw51_campaign(
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 
+    sensors = kw51_sensors()
     weather = draw_weather(n_hours, for_weather)
     index, theta = weather.index, thermal_multipliers(weather)
     progress = progress_of(index, retrofit)
     strengthened = {group: share * progress["stiffness"] for group, share in STIFFENED.items()}
     factors = stiffness_factors(index, strengthened, drift, damage, damage_from)
-    clean, clean_shapes = simulate(theta, progress["mass"], factors, sensor_dofs() if shapes else None)
+    clean, clean_shapes = simulate(theta, progress["mass"], factors, list(sensors.values()) if shapes else None)
 
     frequencies = clean * (1 + deviations * for_noise.standard_normal(clean.shape))
     damping = draw_damping(weather["steel"].to_numpy(), for_damping)
@@ -216,7 +216,7 @@ def make_kw51_campaign(
         temperatures=temperatures,
         frequencies=pd.DataFrame(frequencies, index, modes),
         damping=pd.DataFrame(damping, index, ratios),
-        sensors=list(SENSORS),
+        sensors=list(sensors),
         state=state_of(index, retrofit),
         clean_frequencies=pd.DataFrame(clean, index, modes),
         theta=theta,

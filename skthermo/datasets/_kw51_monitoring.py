@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from skthermo._arrays import Array
-from skthermo.datasets._kw51_structure import N_PANELS, kw51_structure
 from skthermo.datasets._kw51_weather import REFERENCE, smooth_noise
 
 NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
@@ -22,21 +21,6 @@ DAMPING = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004])
 DAMPING_BY_KELVIN, DAMPING_SCATTER = 0.006, 0.25
 
 SHAPE_NOISE = 0.01
-HALF = {"A": 0, "C": N_PANELS}
-SENSORS = {
-    "aBD11Az": ("deck", 10, "A", "z"),
-    "aBD17Ay": ("deck", 16, "A", "y"),
-    "aBD17Az": ("deck", 16, "A", "z"),
-    "aBD17Cz": ("deck", 16, "C", "z"),
-    "aBD23Ay": ("deck", 22, "A", "y"),
-    "aBD23Az": ("deck", 22, "A", "z"),
-    "aAR0910Ay": ("arch", 10, "A", "y"),
-    "aAR0910Cy": ("arch", 10, "C", "y"),
-    "aAR1516Ay": ("arch", 16, "A", "y"),
-    "aAR1516Cy": ("arch", 16, "C", "y"),
-    "aAR2122Ay": ("arch", 22, "A", "y"),
-    "aAR2122Cy": ("arch", 22, "C", "y"),
-}
 
 
 def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
@@ -57,17 +41,6 @@ def draw_damping(steel: Array, random: np.random.RandomState) -> Array:
     mean = DAMPING * (1 - DAMPING_BY_KELVIN * (steel[:, np.newaxis] - REFERENCE))
     scatter = DAMPING_SCATTER * random.standard_normal(mean.shape)
     return mean * np.exp(scatter - DAMPING_SCATTER**2 / 2)
-
-
-def sensor_dofs() -> NDArray[np.intp]:
-    """The degree of freedom of each sensor: that of the nearest node."""
-    bridge = kw51_structure()
-    position = {dof: number for number, dof in enumerate(bridge.dofs)}
-    found = []
-    for part, station, side, direction in SENSORS.values():
-        stations = sorted({s for p, s, *_ in bridge.nodes if p == part}, key=lambda s: (abs(s - station), s))
-        found.append(position[(part, stations[0], HALF[side]), direction])
-    return np.array(found)
 
 
 def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.complex128]:
