@@ -79,7 +79,8 @@ def minimise(objective: Objective, x: Array, n_steps: int) -> tuple[Local, NDArr
         there = objective.of(active).at(here.x + step)
         better = there.value < here.value
         found.put(active[better], there.of(better))
-        success = (here.value - there.value) / here.gain(step)
+        with np.errstate(invalid="ignore"):  # a row that cannot step is damped more
+            success = (here.value - there.value) / here.gain(step)
         harder, easier = np.maximum(FIRST_DAMPING, 4 * damping[active]), damping[active] / 10
         easier[easier < FIRST_DAMPING] = 0.0
         damping[active] = np.where(success > 0.75, easier, np.where(success > 0.25, damping[active], harder))

@@ -144,9 +144,13 @@ class WeatherResiduals:
     def _similar(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
         """For each mode, positions of the records with weather most like that of each row, (n_samples, n_similar)."""
         wanted, number = self.coordinates.transform(weather), max(COMPARED_WITH, int(SIMILAR * len(values)))
+        found: dict[bytes, NDArray[np.intp]] = {}  # modes that are there in the same records have the same neighbours
         for column in values.T:
             known = np.flatnonzero(rows & ~np.isnan(column))
-            yield known[nearest(self.places[known], wanted, number)[1]] if known.size else known
+            if known.tobytes() not in found:
+                near = known[nearest(self.places[known], wanted, number)[1]] if known.size else known
+                found[known.tobytes()] = near
+            yield found[known.tobytes()]
 
     def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """The spread that some of the records give, the wider the farther weather is beyond their range."""
