@@ -46,7 +46,7 @@ def make_kw51_campaign(
     Parameters
     ----------
     n_hours : int, default=11328
-        Number of hourly records from 2018-10-01 00:00 on.
+        Number of hourly records from 2018-10-01 00:00 on. With gaps, the first 1236 have no temperature.
     noise : float or array-like of shape (6,), default=(0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
         Relative standard deviation of the Gaussian noise on every frequency.
     gaps : bool, default=True
@@ -93,7 +93,7 @@ def make_kw51_campaign(
             (girders, transverse beams and stiffeners).
         retrofit : dict
             The complete retrofit as keyword arguments of `DataInformedFEM.simulate` and `Scenario`, for ``model`` and
-            all models of `make_kw51`.
+            all models of `make_kw51`; its effect was fitted with ``updated=True``.
 
         All frames have the same DatetimeIndex.
 

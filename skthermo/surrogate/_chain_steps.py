@@ -12,7 +12,7 @@ from skthermo._validation import check_is_fitted, validate_data
 from skthermo._warnings import warn_each, warn_user
 from skthermo._weather import TrainingRange
 from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
-from skthermo.surrogate._chain_shapes import steps_without_prior, with_shapes
+from skthermo.surrogate._chain_shapes import shape_warnings, steps_without_prior, with_shapes
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper_inputs import last_step, mapper_inputs
 from skthermo.surrogate._refined_inverse import unconverged
@@ -112,6 +112,8 @@ class ChainSteps:
         aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
         self.inverse_.fit(aligned)
         last, self._n_unconverged = refining_step(self.inverse_), None
+        if shapes is not None and last is not None:
+            warn_each(shape_warnings(last, aligned))
         if last is not None:
             found = last.invert(mapper_inputs(self.inverse_, aligned))
             last.warn_of(found)

@@ -40,7 +40,8 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         Number of simulations.
     narrow_bounds : bool, default=False
         Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
-        records that `fit` sees have their parameters. An inverse that is not refined becomes several times as accurate.
+        records that `fit` sees have their parameters, as far as the first regressor can tell. An inverse that is not
+        refined becomes more accurate there.
     noise : float or array-like of shape (n_modes,), default=0.0
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and

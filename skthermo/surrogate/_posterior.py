@@ -16,13 +16,18 @@ measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d theta."""
 REACH = 3.0
 """Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
 
+LEAST_DAMPING = 1e-14
+"""Share of the diagonal added to precision matrices, which rounding would else make singular far from any solution."""
+
 LONGEST_STEP = 0.5
 """Largest change of ln theta in one step."""
 
 
 def deviations(information: Array) -> Array:
     """Standard deviations, (n_samples, n_parameters), of Gaussians with these precision matrices."""
-    return np.sqrt(np.einsum("spp->sp", np.linalg.inv(information)))
+    diagonal = np.einsum("spp->sp", information)
+    regular = information + np.eye(diagonal.shape[1]) * (LEAST_DAMPING * diagonal)[:, np.newaxis]
+    return np.sqrt(np.abs(np.einsum("spp->sp", np.linalg.inv(regular))))
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,8 @@ class Local:
         held = ((self.x <= prior.lowest) & (self.gradient > 0)) | ((self.x >= prior.highest) & (self.gradient < 0))
         n_parameters = self.x.shape[1]
         diagonal = np.einsum("spp->sp", self.hessian)
-        damped = self.hessian + np.eye(n_parameters) * (damping[:, np.newaxis] * diagonal)[:, np.newaxis]
+        shares = np.maximum(damping, LEAST_DAMPING)[:, np.newaxis]
+        damped = self.hessian + np.eye(n_parameters) * (shares * diagonal)[:, np.newaxis]
         fixed, step = np.zeros_like(self.x), np.zeros_like(self.x)
         for _ in range(n_parameters):
             free = ~held

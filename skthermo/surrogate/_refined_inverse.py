@@ -104,6 +104,8 @@ class RefinedInverse(MultiplierRegressor):
 
     def _warn_of_box(self, theta: Array, far: NDArray[np.bool_]) -> None:
         message = "" if self.box_ is None else self.box_.warning(theta, far)
+        if message and getattr(self, "prior", None) is not None:
+            message += "; or a wider prior, which these rows contradict"
         if message:
             warn_user(message, "outside the bounds")
 

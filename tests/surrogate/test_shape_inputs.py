@@ -1,6 +1,8 @@
 """Mode shapes as inputs of the inverse surrogate: posterior modes of frequencies and shapes, gaps, the chain."""
 
 import pickle
+import re
+import warnings
 
 import numpy as np
 import pandas as pd
@@ -276,3 +278,49 @@ def test_the_chain_names_shapes_that_are_missing_or_not_wanted():
         chain.fit(WEATHER, F)
     with pytest.raises(ValueError, match="shapes have 9 rows and frequencies 365"):
         chain.fit(WEATHER, F, shapes[:9])
+
+
+# Doubtful shapes
+
+
+def chain_of(change):
+    """The chain fitted to measured shapes that are changed, and what it warns of."""
+    air = np.linspace(-5, 30, len(THETA))[:, np.newaxis]
+    frequencies, shapes = measured(1 - 0.003 * (air - 10) * [1.0, 0.7, 0.3, 1.3])
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=300, noise=NOISE, dofs=DOFS)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, frequencies, change(shapes))
+    return fem, [str(one.message) for one in caught]
+
+
+def test_right_shapes_of_any_scale_and_phase_give_no_warning():
+    turned = np.exp(1j * np.arange(len(THETA)))[:, np.newaxis, np.newaxis]
+    assert chain_of(lambda shapes: 3 * shapes * turned)[1] == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda shapes: shapes * np.array([1.0, 1.0, 1.5, 1.0]),
+        lambda shapes: shapes * np.array([1.0, -1.0, 1.0, 1.0]),
+        lambda shapes: shapes[:, :, [0, 1, 3, 2]],
+        lambda shapes: shapes[:, [1, 0, 2, 3, 4, 5]],
+    ],
+    ids=["gain", "sign", "sensors swapped", "modes swapped"],
+)
+def test_shapes_of_other_sensors_are_named(change):
+    assert re.search(r"measured shapes of 'f\d' are unlike those of the model .* order of dofs", chain_of(change)[1][0])
+
+
+def test_a_failed_sensor_is_counted():
+    message = chain_of(lambda shapes: np.where(np.arange(4) == 2, np.nan, shapes))[1][0]
+    assert message.startswith("0 of 2400 measured modes have a component of their shape at each of the 4 sensors")
+
+
+def test_modes_may_have_numbers_as_names():
+    frequencies, shapes = MEASURED
+    air = pd.DataFrame({"air": np.linspace(-5, 30, len(THETA))})
+    inverse = InverseSurrogate(regressor=Ridge(), n_samples=300, noise=NOISE, dofs=DOFS)
+    fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, pd.DataFrame(frequencies), shapes)
+    assert fem.estimate_parameters(pd.DataFrame(frequencies), shapes).notna().all(axis=None)
