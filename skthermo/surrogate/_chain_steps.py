@@ -29,6 +29,9 @@ FARTHEST = 5.0
 NOT_NOISE = 0.1
 """Relative residual of a frequency from which it is that of a wrong model or a wrong record."""
 
+SCARCE = 0.25
+"""Mean weight of records with gaps below which a warning is given: four of six modes missing in each, say."""
+
 POSSIBLE = (1e-6, 1e6)
 """Range of multipliers; outside it rounding errors swamp the model's matrices."""
 
@@ -117,6 +120,14 @@ class ChainSteps:
         if last is not None:
             found = last.invert(mapper_inputs(self.inverse_, aligned))
             last.warn_of(found)
+            weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
+            if weight < SCARCE:
+                warn_user(
+                    f"because of their gaps, records tell on average {weight:.0%} of what complete ones would tell "
+                    "about the parameters, and predictions are drawn towards the model's nominal state; expected more "
+                    "modes a record, imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
+                    "scarce modes",
+                )
             self._n_unconverged = int(unconverged(found).sum())
             return as_floats(found.theta), found.residuals, found.weight if self.weighted else None
         theta = as_floats(self.inverse_.transform(aligned))

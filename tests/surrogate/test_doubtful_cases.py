@@ -89,3 +89,9 @@ def test_labels_that_have_no_order():
     inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
     fem = DataInformedFEM(TRUSS, inverse=inverse, mapper=PLAIN, random_state=0)
     assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).residuals_.values) == 365
+
+
+def test_records_with_hardly_any_mode_are_named():
+    gaps = np.random.default_rng(0).random(F.shape) < 0.85
+    with pytest.warns(UserWarning, match=r"records tell on average \d+% of what complete ones would tell .* imputer="):
+        DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))
