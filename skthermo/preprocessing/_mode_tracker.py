@@ -17,7 +17,7 @@ from skthermo.preprocessing._poles import Poles, read_poles
 from skthermo.preprocessing._reference_modes import ReferenceModes, read_reference, warn_of_alike
 from skthermo.preprocessing._stamps import as_duration, as_stamps
 from skthermo.preprocessing._tracked_modes import tracked_modes
-from skthermo.preprocessing._tracking_warnings import warn_of_losses, warn_of_unknown_shapes
+from skthermo.preprocessing._tracking_warnings import warn_of_losses, warn_of_unknown_shapes, warn_of_unlike_shapes
 
 
 class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
@@ -210,7 +210,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         -----
         UserWarning
             If a mode is found in no record; if many records without a mode have poles of its shape at another
-            frequency; if poles have no shape.
+            frequency, or of other shapes at its frequency; if poles have no shape.
         """
         check_is_fitted(self)
         modes = ReferenceModes(self.frequencies_, self.shapes_, self.mode_names_, self.sensors_)
@@ -273,10 +273,13 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         return order, n_records
 
     def _warn(self, poles: Poles, pairs: Pairs, chosen: NDArray, followed: NDArray, found: NDArray) -> None:
-        left = pairs.at(~np.isin(pairs.pole, pairs.pole[chosen]))
+        is_free = ~np.isin(np.arange(len(poles.record)), pairs.pole[chosen])
+        left = pairs.at(is_free[pairs.pole])
         record = poles.record[left.pole]
         ratio = poles.frequencies[left.pole] / followed[record, left.mode]
         warn_of_losses(left, record, ratio, found, self.mode_names_)
+        if self.shapes_ is not None:
+            warn_of_unlike_shapes(poles, is_free, followed, found, self.shapes_, self.mode_names_)
         n_present = (~np.isnan(poles.shapes)).sum(axis=1)
         is_zero = ~np.nan_to_num(poles.shapes).any(axis=1)
         warn_of_unknown_shapes(int((is_zero | (n_present < min(2, len(self.shapes_)))).sum()), len(poles.record))

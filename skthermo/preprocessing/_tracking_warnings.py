@@ -4,9 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._warnings import warn_user
-from skthermo.preprocessing._assignment import Pairs
+from skthermo.preprocessing._assignment import Array, Pairs, shape_agreement
+from skthermo.preprocessing._poles import Poles
 
 FEW_RECORDS = 20  # too few for a warning that a mode is missing
+NEAR = 0.02  # relative difference in frequency of a pole that is probably the mode's own
 
 
 def warn_of_losses(
@@ -59,6 +61,32 @@ def warn_of_losses(
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
         warn_user("; ".join(problems[:3]) + more, "modes not found")
+
+
+def warn_of_unlike_shapes(
+    poles: Poles, is_free: NDArray[np.bool_], followed: Array, found: NDArray[np.bool_], reference: NDArray, names: list
+) -> None:
+    """One warning for modes that most records lack although they have a pole at the frequency: its shape differs."""
+    free = np.flatnonzero(is_free)
+    record = poles.record[free]
+    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < NEAR
+    problems = []
+    for j, name in enumerate(names):
+        near, n_missing = free[is_near[:, j] & ~found[record, j]], (~found[:, j]).sum()
+        n_near = len(np.unique(poles.record[near]))
+        mac = shape_agreement(poles.shapes[near], reference[:, [j]], [])[0]
+        if n_near >= FEW_RECORDS / 2 and n_near > n_missing / 2 and np.isfinite(mac).any():
+            problems.append(
+                f"{n_near} of {n_missing} records without {name!r} have a pole within {NEAR:.0%} of its frequency, "
+                f"whose MAC with the reference is about {np.nanmedian(mac):.2f}"
+            )
+    if problems:
+        more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
+        warn_user(
+            "; ".join(problems[:3]) + f"{more}: expected the sensors of the reference in their order, with their signs "
+            "and gains, or a lower min_mac for noisy shapes",
+            "modes of other shapes",
+        )
 
 
 def warn_of_unknown_shapes(n_without: int, n_poles: int) -> None:

@@ -85,7 +85,8 @@ class SimulatedTraining(InverseInputs, RefinedInverse):
         if n_parameters > model.n_modes:
             warn_user(
                 f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
-                "expected more modes, or the noise of the measurement, so that the prior decides between them",
+                f"expected more modes{'' if np.all(self.noise) else ', or the noise of the measurement'}: the prior "
+                "decides between them",
                 "few modes",
             )
         self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))

@@ -347,3 +347,22 @@ def test_wrong_time_constants_are_errors(follow):
 def test_a_duration_needs_stamps():
     with pytest.raises(ValueError, match="X has no DatetimeIndex"):
         ModeTracker((F0, PHI), follow="5D").fit_transform(GOOD)
+
+
+@pytest.mark.filterwarnings("ignore:the modes .* are found in none")
+@pytest.mark.parametrize("change", [np.flip, lambda S: S * np.array([1, 1, 1, -1, -1, 1])], ids=["order", "sign"])
+def test_modes_lost_by_their_shapes_are_named(change):
+    raw = padded()
+    raw.shapes = change(raw.shapes)
+    message = r"50 of 50 records without 'f\d' have a pole within 2% of its frequency, whose MAC .* is about 0\.\d+"
+    with pytest.warns(UserWarning, match=message):
+        ModeTracker((F0, PHI)).fit_transform(raw)
+
+
+def test_missing_modes_and_spurious_poles_are_no_wrong_shapes():
+    raw = padded(extra=6)
+    raw.frequencies[:, 6] = np.nan
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ModeTracker((F0, PHI)).fit_transform(raw)
+    assert not any("MAC with the reference" in str(one.message) for one in caught)
