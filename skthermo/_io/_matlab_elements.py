@@ -111,10 +111,12 @@ def _name(body: memoryview, order: str) -> str:
 
 
 def matrix_class(flags: memoryview, order: str) -> int:
+    """The number of a variable's class, from its flags."""
     return struct.unpack(order + "II", flags)[0] & 0xFF
 
 
 def numbers_of(part: Part, order: str) -> NDArray:
+    """The numbers that an element holds, of the type in which they are stored."""
     kind, content = part
     if kind not in STORED_AS:
         raise ValueError(f"values of type {kind}; expected numbers")
@@ -122,6 +124,7 @@ def numbers_of(part: Part, order: str) -> NDArray:
 
 
 def complex_numbers(real: NDArray, imaginary: NDArray) -> NDArray:
+    """Complex numbers from as many real and imaginary parts."""
     if real.size != imaginary.size:
         raise ValueError(f"{imaginary.size} imaginary parts; expected {real.size}")
     values = np.empty(real.size, dtype=complex)

@@ -29,6 +29,7 @@ class RefinedInverse(MultiplierRegressor):
     model: Any
     dofs: ArrayLike | None
     refine: int | None
+    prior: Any
     box_: Box | None
     n_steps_: int
     refinement_: Refinement
@@ -104,7 +105,7 @@ class RefinedInverse(MultiplierRegressor):
 
     def _warn_of_box(self, theta: Array, far: NDArray[np.bool_]) -> None:
         message = "" if self.box_ is None else self.box_.warning(theta, far)
-        if message and getattr(self, "prior", None) is not None:
+        if message and self.prior is not None:
             message += "; or a wider prior, which these rows contradict"
         if message:
             warn_user(message, "outside the bounds")
