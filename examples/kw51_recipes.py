@@ -46,7 +46,8 @@ class Records:
             return cls(title, *tables, campaign.clean_frequencies)
         data = load_kw51(path)
         retrofit = make_kw51_campaign(n_hours=1).retrofit
-        return cls("KW51, measured", data.temperatures[["tBD31A"]], data.frequencies[MODES], data.state, retrofit)
+        title = "KW51, measured" if data.is_published else f"KW51, {path.name}"  # only the published file is known
+        return cls(title, data.temperatures[["tBD31A"]], data.frequencies[MODES], data.state, retrofit)
 
     @property
     def changes(self):

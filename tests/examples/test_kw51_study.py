@@ -44,7 +44,7 @@ def test_a_campaign_in_the_format_of_the_file_is_read_back_equal(tmp_path):
     assert list(data.frequencies) == FOURTEEN
     assert data.frequencies.iloc[:, 6:].isna().all(axis=None)
     from_file = study.Records.read(file)
-    assert from_file.title == "KW51, measured"
+    assert from_file.title == "KW51, trackedmodes.mat"
     pd.testing.assert_frame_equal(from_file.frequencies, campaign.frequencies, **INDEX)
 
 
