@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.rst"))]
+BUILT = {"generated", "gallery", "_build"}
+PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 DETECTED, DEVIATION = 0.936, 0.029  # alarms among days with 20 % damage: mean and deviation of 40 true years
 
 
@@ -46,7 +47,7 @@ def test_the_guide_shows_code():
     "room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "studies", "plotting"]
 )
 def test_the_reference_lists_every_public_name(room):
-    index = (ROOT / "docs" / "api" / "index.rst").read_text()
+    index = (ROOT / "docs" / "reference" / "api" / "index.rst").read_text()
     listed = re.search(rf"currentmodule:: skthermo\.{room}\n.*?\n\n((?:   \w+\n)+)", index, flags=re.DOTALL)[1].split()
     assert listed == sorted(importlib.import_module(f"skthermo.{room}").__all__)
 

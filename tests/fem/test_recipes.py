@@ -9,7 +9,7 @@ import pytest
 
 from skthermo.fem import Beam, Structure
 
-GUIDE = Path(__file__).parents[2] / "docs" / "models.rst"
+GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "models.rst"
 THETA = np.random.default_rng(0).uniform(0.7, 1.3, (4, 2))
 
 

@@ -17,7 +17,7 @@ from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 pytestmark = pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::FutureWarning", r"ignore:\d+ of \d+ rows give parameters far outside"
 )
-PAGE = Path(__file__).parents[2] / "docs" / "regressors.rst"
+PAGE = Path(__file__).parents[2] / "docs" / "guide" / "regressors.rst"
 TRUSS = make_truss()
 YEAR = make_truss_campaign(noise=0.001, random_state=0)
 
