@@ -189,7 +189,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in `report_`: few rows, rows left out, modes that
+            One warning, with counts, for each kind of doubtful data in ``report_``: few rows, rows left out, modes that
             are far from the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
