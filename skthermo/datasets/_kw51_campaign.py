@@ -176,9 +176,9 @@ def make_kw51_campaign(
     References
     ----------
     Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001.
+    Engineering 26 (3) (2021) 04721001 [ML21]_.
 
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------

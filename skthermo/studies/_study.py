@@ -83,14 +83,15 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
     their number over the design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten
     correlation times in different repeats, to that of independent records. With it, Clopper-Pearson bounds are honest
-    also for rates of 0 and 1 (Korn & Graubard 1998). Measured records are one repeat only; their variance between
+    also for rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between
     blocks of time holds that of the weather, too.
 
     References
     ----------
-    Korn & Graubard, Survey Methodology 24 (1998) 193-201.
+    Korn & Graubard, Confidence intervals for proportions with small expected number of positive counts estimated from
+    survey data, Survey Methodology 24 (1998) 193-201 [KG98]_.
 
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -82,8 +82,9 @@ def identifiability(
 
     References
     ----------
-    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3.
-    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2.
+    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3 [Kay93]_.
+
+    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2 [GV13]_.
 
     Examples
     --------
