@@ -61,6 +61,13 @@ def test_the_reference_has_a_page_for_every_package():
     assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
 
 
+def test_sources_are_listed_and_cited():
+    citing = [*(ROOT / "skthermo").rglob("*.py"), *PAGES]
+    cited = {label for path in citing for label in re.findall(r"\[([A-Z]\w*\d\d)\]_", path.read_text())}
+    listed = re.findall(r"^\.\. \[(\w+)\] ", (ROOT / "docs/reference/bibliography.rst").read_text(), flags=re.MULTILINE)
+    assert sorted(cited) == sorted(listed)
+
+
 def test_images_of_readme_exist():
     images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
     assert images
