@@ -40,7 +40,10 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Seif et al., Temperature-dependent material modeling for structural steels: formulation and application, National
+    Institute of Standards and Technology, 2016 [SCG16]_, from which the paper has the law.
 
     Examples
     --------

@@ -92,8 +92,9 @@ def make_kw51_campaign(
             The bridge before its retrofit. Its groups are those of `make_kw51`, and ``bearings`` and ``deck_beams``
             (girders, transverse beams and stiffeners).
         retrofit : dict
-            The complete retrofit as keyword arguments of `DataInformedFEM.simulate` and `Scenario`, for ``model`` and
-            all models of `make_kw51`; its effect was fitted with ``updated=True``.
+            The complete retrofit as keyword arguments of `skthermo.surrogate.DataInformedFEM.simulate` and
+            `skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
+            ``updated=True``.
 
         All frames have the same DatetimeIndex.
 
@@ -175,9 +176,9 @@ def make_kw51_campaign(
     References
     ----------
     Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001.
+    Engineering 26 (3) (2021) 04721001 [ML21]_.
 
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------

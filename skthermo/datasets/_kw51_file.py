@@ -93,7 +93,10 @@ def load_kw51(path: str | PathLike) -> Bunch:
     References
     ----------
     Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (2021) 04721001.
+    Engineering 26 (3) (2021) 04721001 [ML21]_.
+
+    Maes & Lombaert, Monitoring data for railway bridge KW51 in Leuven, Belgium, before, during, and after retrofitting,
+    Zenodo, 2020 [ML20]_.
 
     Examples
     --------

@@ -64,7 +64,7 @@ def load_z24(path: str | PathLike) -> Bunch:
     References
     ----------
     Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171.
+    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
 
     Examples
     --------

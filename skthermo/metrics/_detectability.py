@@ -18,7 +18,7 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ----------
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the healthy structure that are not in the baseline; NaN is
-        ignored. `MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
+        ignored. `skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
         of that.
     threshold : float
         A damage index above it is an alarm.
@@ -96,6 +96,11 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     ValueError
         If lengths differ, a severity is not finite, is 1 or more or occurs twice, severities are not all positive
         or all negative, or a probability is not between 0 and 1.
+
+    References
+    ----------
+    Kamali, Quqa, Palermo & Marzani, An approach to define the minimum detectable damage and the alarm thresholds in
+    vibration-based SHM systems, Journal of Physics: Conference Series 2647 (2024) 182008 [KQP24]_.
 
     Examples
     --------

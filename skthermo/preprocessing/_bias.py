@@ -45,7 +45,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -81,7 +81,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
 
     References
     ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982.
+    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------

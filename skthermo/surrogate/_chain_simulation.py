@@ -71,6 +71,11 @@ class ChainSimulation:
         -----
         UserWarning
             If a factor is above 10, which may be meant in percent.
+
+        References
+        ----------
+        Politis & Romano, The stationary bootstrap, Journal of the American Statistical Association 89 (1994) 1303-1313
+        [PR94]_, for runs of consecutive residuals.
         """
         check_is_fitted(self)
         changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}

@@ -52,6 +52,11 @@ class ChainUncertainty:
         is held varies much more than that of independent records, and weather beyond the training range has no
         residuals to learn from: there the interval is widened by the distance (see `applicability`).
 
+        References
+        ----------
+        Lei, G'Sell, Rinaldo, Tibshirani & Wasserman, Distribution-free predictive inference for regression, Journal of
+        the American Statistical Association 113 (2018) 1094-1111 [LGR18]_.
+
         Examples
         --------
         >>> from skthermo.datasets import make_truss, make_truss_campaign

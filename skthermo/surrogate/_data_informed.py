@@ -105,7 +105,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------
@@ -189,7 +189,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in `report_`: few rows, rows left out, modes that
+            One warning, with counts, for each kind of doubtful data in ``report_``: few rows, rows left out, modes that
             are far from the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)

@@ -122,7 +122,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Kamali, Mariani, Hadianfard & Marzani, Inverse surrogate model for deterministic structural model updating based on
+    random forest regression, Mechanical Systems and Signal Processing 215 (2024) 111416 [KMH24]_.
 
     Examples
     --------

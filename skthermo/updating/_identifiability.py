@@ -44,7 +44,7 @@ def identifiability(
         sqrt(n).
     dofs : array-like of int of shape (n_dofs,), optional
         Degrees of freedom, the first being 0, where mode shapes are measured too. The model needs a method
-        ``local_modes``, as `AffineModel` has.
+        ``local_modes``, as `skthermo.fem.AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 
@@ -82,8 +82,9 @@ def identifiability(
 
     References
     ----------
-    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3.
-    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2.
+    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3 [Kay93]_.
+
+    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2 [GV13]_.
 
     Examples
     --------
