@@ -25,6 +25,14 @@ autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 
+# Inventories that come with the docs, so that no build needs a network (tools/write_inventories.py).
+intersphinx_mapping = {
+    "numpy": ("https://numpy.org/doc/stable/", "_inventories/numpy.inv"),
+    "scipy": ("https://docs.scipy.org/doc/scipy/", "_inventories/scipy.inv"),
+    "pandas": ("https://pandas.pydata.org/docs/", "_inventories/pandas.inv"),
+    "sklearn": ("https://scikit-learn.org/stable/", "_inventories/sklearn.inv"),
+}
+
 copybutton_prompt_text = ">>> |\\.\\.\\. |\\$ "
 copybutton_prompt_is_regexp = True
 
@@ -39,7 +47,12 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"skthermo {release}"
+html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_js_files = [("mathjax/settings.js", {"priority": 100})]
+mathjax_path = "mathjax/tex-svg.js"
+html_show_sourcelink = False
 html_theme_options = {
     "show_nav_level": 1,
     "navigation_with_keys": False,
