@@ -4,18 +4,12 @@ import ast
 import re
 import sys
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
-matplotlib = pytest.importorskip("matplotlib")
-matplotlib.use("Agg")
+from tests.examples.pages import EXAMPLES
 
-ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples"
 PAGES = sorted(EXAMPLES.glob("plot_*.py"))
-sys.path.append(str(EXAMPLES))  # which Python does itself for a file that it runs
-
 page_recipes = import_module("page_recipes")
 
 
@@ -34,7 +28,7 @@ def test_a_page_is_a_lesson_in_cells(page):
 def test_images_and_files_of_a_page_exist(page):
     text = page.read_text()
     for image in re.findall(r"image:: /(images/\S+)|sphinx_gallery_thumbnail_path = '(\S+)'", text):
-        file = ROOT / "docs" / "".join(image)
+        file = EXAMPLES.parent / "docs" / "".join(image)
         assert file.stat().st_size < 150_000
     for recipe in re.findall(r"^from (\w+_recipes) import", text, flags=re.MULTILINE):
         assert f":download:`{recipe}.py`" in text
