@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+ADDRESS = "https://raw.githubusercontent.com/skthermo/skthermo/main/"
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 DETECTED, DEVIATION = 0.936, 0.029  # alarms among days with 20 % damage: mean and deviation of 40 true years
@@ -55,4 +56,6 @@ def test_the_reference_lists_every_public_name(room):
 def test_images_of_readme_exist():
     images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
     assert images
-    assert all((ROOT / image).is_file() for image in images)
+    for image in images:
+        assert image.startswith(ADDRESS), "a package index shows README without the repository beside it"
+        assert (ROOT / image.removeprefix(ADDRESS)).is_file()
