@@ -12,6 +12,7 @@ import pytest
 import skthermo
 
 ROOT = Path(__file__).parents[1]
+ADDRESS = "https://raw.githubusercontent.com/skthermo/skthermo/main/"
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 API = ROOT / "docs" / "reference" / "api"
@@ -71,4 +72,6 @@ def test_sources_are_listed_and_cited():
 def test_images_of_readme_exist():
     images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
     assert images
-    assert all((ROOT / image).is_file() for image in images)
+    for image in images:
+        assert image.startswith(ADDRESS), "a package index shows README without the repository beside it"
+        assert (ROOT / image.removeprefix(ADDRESS)).is_file()

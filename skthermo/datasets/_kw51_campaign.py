@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.utils import Bunch
 
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo.datasets._kw51_changes import stiffness_factors
@@ -22,6 +21,7 @@ from skthermo.datasets._kw51_sensors import kw51_sensors
 from skthermo.datasets._kw51_simulation import simulate
 from skthermo.datasets._kw51_truth import thermal_multipliers, truth_model
 from skthermo.datasets._kw51_weather import N_HOURS, draw_weather
+from skthermo.datasets._results import KW51Campaign
 from skthermo.fem import check_noise
 
 
@@ -36,7 +36,7 @@ def make_kw51_campaign(
     damage_from: Any = None,
     shapes: bool = False,
     random_state: int | np.random.RandomState | None = None,
-) -> Bunch:
+) -> KW51Campaign:
     """Synthetic monitoring of the railway bridge KW51: hourly temperatures and modes, through its retrofit.
 
     The measurements themselves may not be part of this package. This campaign is synthetic. It has their length and
@@ -213,7 +213,7 @@ def make_kw51_campaign(
         missing = missing_modes(n_hours, for_gaps)
     frequencies[missing], damping[missing] = np.nan, np.nan
     modes, ratios = [[f"{letter}{mode + 1}" for mode in range(6)] for letter in ("f", "xi")]
-    campaign = Bunch(
+    campaign = KW51Campaign(
         temperatures=temperatures,
         frequencies=pd.DataFrame(frequencies, index, modes),
         damping=pd.DataFrame(damping, index, ratios),

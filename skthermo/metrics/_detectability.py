@@ -2,7 +2,7 @@
 
 import operator
 from numbers import Real
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -132,6 +132,10 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
+@overload
+def time_to_detection(damage_index: pd.Series, threshold: float, onset: Any = None) -> Any: ...
+@overload
+def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = None) -> float: ...
 def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = None) -> Any:
     """Time from the onset of damage to the first alarm.
 
@@ -177,7 +181,7 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     return float(alarms[0]) if alarms.size else float("nan")
 
 
-def _start(times: pd.Index, onset: Any) -> Any:
+def _start(times: Any, onset: Any) -> Any:
     """The onset as a time or a position, which is not after the last record."""
     is_time, is_number = isinstance(times, pd.DatetimeIndex), isinstance(onset, Real)
     try:

@@ -23,6 +23,17 @@ WELL_KNOWN = 0.1
 """Largest relative standard deviation of the estimates of a recommended subset."""
 
 
+class Identifiability(Bunch):
+    """What `identifiability` returns."""
+
+    sensitivity: pd.DataFrame
+    singular_values: Array
+    condition_number: float
+    deviations: pd.Series
+    collinear: list[list[str]]
+    recommended: list[str]
+
+
 def identifiability(
     model: FEModel,
     theta: ArrayLike | None = None,
@@ -30,7 +41,7 @@ def identifiability(
     noise: ArrayLike,
     dofs: ArrayLike | None = None,
     shape_noise: float | None = None,
-) -> Bunch:
+) -> Identifiability:
     """Which parameters measured modes can identify, and how accurately.
 
     Parameters
@@ -118,7 +129,7 @@ def identifiability(
     values = np.linalg.svd(rows, compute_uv=False)
     smallest = values[-1] if len(values) == len(names) else 0.0
     ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
-    return Bunch(
+    return Identifiability(
         sensitivity=S,
         singular_values=values,
         condition_number=float(values[0] / smallest) if smallest else np.inf,
