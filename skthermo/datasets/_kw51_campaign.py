@@ -92,8 +92,8 @@ def make_kw51_campaign(
             The bridge before its retrofit. Its groups are those of `make_kw51`, and ``bearings`` and ``deck_beams``
             (girders, transverse beams and stiffeners).
         retrofit : dict
-            The complete retrofit as keyword arguments of `skthermo.surrogate.DataInformedFEM.simulate` and
-            `skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
+            The complete retrofit as keyword arguments of `~skthermo.surrogate.DataInformedFEM.simulate` and
+            `~skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
             ``updated=True``.
 
         All frames have the same DatetimeIndex.

@@ -43,8 +43,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     ----------
     estimator : regressor
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
-        target is fitted once for each), a pipeline with `skthermo.preprocessing.LagFeatures`, or
-        `skthermo.surrogate.DataInformedFEM`.
+        target is fitted once for each), a pipeline with `~skthermo.preprocessing.LagFeatures`, or
+        `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.

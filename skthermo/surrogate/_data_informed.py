@@ -288,7 +288,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         -------
         float
             NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
-            `skthermo.metrics.frequency_scorer` always reports their share.
+            `~skthermo.metrics.frequency_scorer` always reports their share.
         """
         check_is_fitted(self)
         check_same_rows(X, y, ("temperatures", "frequencies"))
