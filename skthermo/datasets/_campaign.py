@@ -91,6 +91,8 @@ def make_truss_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 3)
             ``T1``..``T3`` in degrees Celsius.
         frequencies : DataFrame of shape (n_records, 6)

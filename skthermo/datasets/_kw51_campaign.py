@@ -69,6 +69,8 @@ def make_kw51_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_hours, 1)
             ``tBD31A``, temperature of the steel below the deck in degrees Celsius. It is missing until 2018-11-21
             and in a few blocks.

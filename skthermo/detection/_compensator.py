@@ -43,8 +43,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     ----------
     estimator : regressor
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
-        target is fitted once for each), a pipeline with `~skthermo.preprocessing.LagFeatures`, or
-        `~skthermo.surrogate.DataInformedFEM`.
+        target is fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.
@@ -115,14 +114,14 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
       that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
       the pipeline, and to the rows of X where the estimator is no such pipeline.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
-      estimator of its own, fitted on the rows that have it. Only an
-      estimator with an FE model (``DataInformedFEM``, also at the end of a pipeline or in a search) gets all
-      rows, because its lags need them; it leaves out incomplete rows itself.
-    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to
-      fit the estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
-    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold
-      takes the last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a
-      DatetimeIndex, the rows of another fold shift the lags.
+      estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
+      also at the end of a pipeline or in a search) gets all rows, because its lags need them; it leaves out incomplete
+      rows itself.
+    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to fit the
+      estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
+      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a DatetimeIndex,
+      the rows of another fold shift the lags.
 
     Examples
     --------
@@ -292,6 +291,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
+            Names of the targets.
         """
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]

@@ -116,6 +116,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Aligned frequencies in Hz.
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False)
@@ -134,6 +135,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Frequencies in the measured domain in Hz.
         """
         check_is_fitted(self)
         if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):

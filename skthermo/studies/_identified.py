@@ -126,6 +126,7 @@ class IdentifiedDamage:
         Returns
         -------
         UncertainDamage
+            A scenario whose severities are drawn from `draws`.
         """
         return UncertainDamage(name, self.draws)
 
