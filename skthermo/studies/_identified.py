@@ -126,7 +126,7 @@ class IdentifiedDamage:
         Returns
         -------
         UncertainDamage
-            A scenario whose severities are drawn from `draws`.
+            A scenario whose severities are drawn from ``draws``.
         """
         return UncertainDamage(name, self.draws)
 
