@@ -23,6 +23,7 @@ templates_path = ["_templates"]
 
 autosummary_generate = True
 autodoc_typehints = "none"
+toc_object_entries_show_parents = "hide"
 numpydoc_show_class_members = False
 
 nitpicky = True
@@ -43,6 +44,7 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = f"skthermo {release}"
 html_static_path = ["_static"]
+html_css_files = ["api.css"]
 html_theme_options = {
     "show_nav_level": 1,
     "navigation_with_keys": False,
