@@ -19,7 +19,7 @@ KELVIN = 150.0  # no structure gets this hot in degrees Celsius
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
-    """Multiplier of Young's modulus at a temperature, eq. (10).
+    """Multiplier of Young's modulus at a temperature, equation (10).
 
     E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
 

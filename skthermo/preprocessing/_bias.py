@@ -22,7 +22,7 @@ from skthermo._validation import (
 
 
 class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
-    """Move measured frequencies so that their means are the model's frequencies, eq. (22).
+    """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
     ----------

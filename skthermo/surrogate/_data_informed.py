@@ -209,7 +209,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         return self
 
     def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> Table:
-        """Parameters behind measured frequencies, eq. (5).
+        """Parameters behind measured frequencies, equation (5).
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         return frame_like(F, theta, self.parameter_names_)
 
     def predict_parameters(self, X: ArrayLike) -> Table:
-        """Parameters at given temperatures, eq. (7).
+        """Parameters at given temperatures, equation (7).
 
         Parameters
         ----------

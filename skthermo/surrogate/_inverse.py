@@ -21,7 +21,7 @@ from skthermo.surrogate._simulator import Simulator
 
 
 class InverseSurrogate(TransformerMixin, SimulatedTraining):
-    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; eqs. (3)-(4).
+    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
 

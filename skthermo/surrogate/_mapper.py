@@ -14,7 +14,7 @@ from skthermo.surrogate._regression import MultiplierRegressor
 
 
 class TemperatureMapper(MultiplierRegressor):
-    """Parameters of an FE model from temperatures, eq. (6).
+    """Parameters of an FE model from temperatures, equation (6).
 
     Parameters
     ----------
