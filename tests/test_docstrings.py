@@ -4,11 +4,12 @@ import functools
 import importlib
 import inspect
 import pkgutil
+import re
 import typing
 
 import pandas as pd
 import pytest
-from numpydoc.docscrape import FunctionDoc
+from numpydoc.docscrape import ClassDoc, FunctionDoc
 from numpydoc.validate import validate
 from sklearn.utils import Bunch
 
@@ -120,6 +121,17 @@ CLASSES = [d for d in DOCUMENTED if inspect.isclass(d[1])]
 def test_every_public_property_has_a_summary(name, thing):
     properties = [m for m in public_members(thing).values() if isinstance(m, property | functools.cached_property)]
     assert all((inspect.getdoc(member) or "").partition("\n")[0].endswith(".") for member in properties)
+
+
+ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
+
+
+@pytest.mark.parametrize(("name", "thing"), CLASSES, ids=[c[0] for c in CLASSES])
+def test_every_fitted_attribute_is_documented(name, thing):
+    ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
+    fitted = {attribute for base in ours for attribute in ASSIGNED.findall(inspect.getsource(base))}
+    documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
+    assert fitted <= documented
 
 
 DOCUMENTED_DEFAULTS = [c for c in CALLABLES if not is_contract_of_an_element(c[0]) and c[0] not in PROTOCOLS]

@@ -61,8 +61,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Attributes
     ----------
-    estimator_ : regressor
-        Clone of ``estimator``, fitted on all rows that it can take.
+    estimator_, regression_ : regressor
+        Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
     spread_ : object
         Covariance of the residuals by weather, if they are scaled. ``spread_.smoothing`` says over how many records of
         similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -82,17 +82,16 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Notes
     -----
-    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the
-    noise of the rows it was fitted on, so their residuals are smaller than those of new records, and a
-    threshold set on them gives too many false alarms. `fit_transform` predicts each row by a clone fitted
-    on the other folds, and also fits on all rows for the records to come. A pipeline calls `fit_transform`
-    in its own ``fit``, so ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its
-    threshold on out-of-fold residuals.
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
+    it was fitted on, so their residuals are smaller than those of new records, and a threshold set on them gives too
+    many false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows
+    for the records to come. A pipeline calls `fit_transform` in its own ``fit``, so
+    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its threshold on out-of-fold residuals.
 
-    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be
-    predicted by its neighbours in time, which are nearly the same record. If the baseline holds each season
-    only once, a fold is predicted from other seasons, and its residuals and the threshold become too large.
-    A baseline of several years, or more and shorter folds, avoids this.
+    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be predicted by its
+    neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
+    predicted from other seasons, and its residuals and the threshold become too large. A baseline of several years, or
+    more and shorter folds, avoids this.
 
     A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
     too; an array is passed as an array.

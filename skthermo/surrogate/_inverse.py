@@ -87,6 +87,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
     scores_ : ShapeScores
         With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
+    simulator_ : Simulator
+        If there is a model: it and, with ``reduce``, its reduced model.
+    refinement_ : Refinement
+        If estimates are refined: the model, the box and the prior of the steps.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
@@ -98,6 +102,8 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         Number of parameters.
     parameter_names_ : list of str or None
         Their names: the model's, or those of the frame that `fit` saw.
+    y_is_vector_ : bool
+        Whether `fit` saw one parameter as a vector.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
