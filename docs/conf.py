@@ -1,6 +1,11 @@
 """Sphinx configuration."""
 
+import sys
+from pathlib import Path
+
 import skthermo
+
+sys.path.append(str(Path(__file__).parent))  # for gallery_order
 
 project = "skthermo"
 author = "The skthermo developers"
@@ -33,16 +38,26 @@ intersphinx_mapping = {
     "sklearn": ("https://scikit-learn.org/stable/", "_inventories/sklearn.inv"),
 }
 
+nitpicky = True
+nitpick_ignore_regex = [(r"py:.*", r"(joblib|matplotlib|numpy|pandas|scipy|sklearn)\..*")]
+
 copybutton_prompt_text = ">>> |\\.\\.\\. |\\$ "
 copybutton_prompt_is_regexp = True
 
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "filename_pattern": "/plot_",
-    "ignore_pattern": r"/(__init__|\w+_recipes)\.py",
+    "filename_pattern": "/plot_(?!z24)",  # whose data may not be shipped
+    "ignore_pattern": r"(__init__|_recipes)\.py$",
+    "copyfile_regex": r"\w+_recipes\.py",  # beside the pages that import them
+    "within_subsection_order": "gallery_order.position",
+    "capture_repr": (),
+    "image_srcset": ["2x"],
+    "parallel": 2,
     "abort_on_example_error": True,
     "write_computation_times": False,
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("skthermo",),
 }
 
 html_theme = "pydata_sphinx_theme"

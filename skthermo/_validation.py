@@ -1,15 +1,16 @@
-"""Wrappers of scikit-learn's private functions, which are imported only here; FE models and seeds inside
-estimators."""
+"""Wrappers of scikit-learn's private functions, which are imported only here, and types of its public ones; FE models
+and seeds inside estimators."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 import numpy as np
 import pandas as pd
 import sklearn.utils
 import sklearn.utils.validation
-from sklearn.base import BaseEstimator, _fit_context, clone
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
 from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
@@ -21,12 +22,28 @@ from sklearn.utils.validation import _check_feature_names_in, _check_sample_weig
 from skthermo._arrays import without_mask, without_missing
 from skthermo._models import is_model
 
+if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
+    Method = TypeVar("Method", bound=Callable[..., Any])
+
+    def _fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[Method], Method]: ...
+
+    class TransformerMixin:
+        @overload
+        def fit_transform(self, X: pd.DataFrame, y: Any = None) -> pd.DataFrame: ...
+        @overload
+        def fit_transform(self, X: ArrayLike, y: Any = None) -> NDArray[np.float64]: ...
+        def fit_transform(self, X: Any, y: Any = None) -> Any: ...
+        def set_output(self, *, transform: Literal["default", "pandas", "polars"] | None = None) -> Self: ...
+else:
+    from sklearn.base import TransformerMixin, _fit_context
+
 __all__ = [
     "BaseSearchCV",
     "HasMethods",
     "Interval",
     "InvalidParameterError",
     "StrOptions",
+    "TransformerMixin",
     "_BaseComposition",
     "_BaseImputer",
     "_check_feature_names_in",

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from numpydoc.docscrape import FunctionDoc
 from numpydoc.validate import validate
-from sklearn.utils import Bunch
 
 import skthermo
 import skthermo.fem
+from skthermo.fem.sampling._samples import Samples
 
 ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
 
@@ -91,7 +91,7 @@ def test_documented_parameters_are_the_signatures(name, function, documented):
 def test_every_public_callable_is_typed(name, function, documented):
     if name in PROTOCOLS:
         return  # its members are properties and methods, which are checked on the classes that follow it
-    for_type_checkers = vars(skthermo.fem) | {"Bunch": Bunch, "pd": pd}
+    for_type_checkers = vars(skthermo.fem) | {"Samples": Samples, "pd": pd}
     hints = typing.get_type_hints(function, localns=for_type_checkers, include_extras=True)
     parameters = [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
     untyped = [p.name for p in parameters if p.name not in hints]

@@ -72,7 +72,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -193,7 +193,7 @@ def pod_curve(
 
     References
     ----------
-    MIL-HDBK-1823A, Nondestructive evaluation system reliability assessment, US Department of Defense, 2009.
+    MIL-HDBK-1823A, Nondestructive evaluation system reliability assessment, US Department of Defense, 2009 [MIL09]_.
 
     Examples
     --------

@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping
 from numbers import Integral, Real
+from typing import overload
 
 import numpy as np
 import pandas as pd
 from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
 from skthermo._arrays import Bounds
 from skthermo._frames import frame_like
-from skthermo._validation import HasMethods, Interval, _fit_context
+from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context
 from skthermo.fem import FEModel, check_theta
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._refinement import Refinement
@@ -122,7 +123,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Kamali, Mariani, Hadianfard & Marzani, Inverse surrogate model for deterministic structural model updating based on
+    random forest regression, Mechanical Systems and Signal Processing 215 (2024) 111416 [KMH24]_.
 
     Examples
     --------
@@ -241,6 +245,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
             self.scatter_ = self._scatter(X)
         return self
 
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: ArrayLike | None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]: ...
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
         """Fit, and return the parameters of the same records.
 
@@ -259,6 +267,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         """
         return self.fit(X, y if self.model is None else None).transform(X)
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Multipliers of the nominal parameters, as `predict` gives them.
 

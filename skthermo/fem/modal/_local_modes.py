@@ -202,7 +202,7 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
 
     References
     ----------
-    Nelson, Simplified calculation of eigenvector derivatives, AIAA Journal 14 (1976) 1201-1205.
+    Nelson, Simplified calculation of eigenvector derivatives, AIAA Journal 14 (1976) 1201-1205 [Nel76]_.
 
     Examples
     --------

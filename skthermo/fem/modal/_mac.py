@@ -30,7 +30,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
 
     References
     ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982.
+    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------
