@@ -68,7 +68,7 @@ def refuse_times(table: Any) -> None:
     ValueError
         Names the column.
     """
-    if not hasattr(table, "columns"):
+    if not (hasattr(table, "columns") and hasattr(table, "dtypes")):
         return
     for name, dtype in zip(table.columns, table.dtypes, strict=True):
         is_time = dtype.is_temporal() if hasattr(dtype, "is_temporal") else getattr(dtype, "kind", "") in ("M", "m")
