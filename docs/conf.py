@@ -51,6 +51,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"(__init__|_recipes)\.py$",
     "copyfile_regex": r"\w+_recipes\.py",  # beside the pages that import them
     "within_subsection_order": "gallery_order.position",
+    "download_all_examples": False,
     "capture_repr": (),
     "image_srcset": ["2x"],
     "parallel": 2,
