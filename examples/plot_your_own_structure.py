@@ -11,7 +11,7 @@ frequency alone.
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``. The log has the columns
 ``time``, ``T1``, ``T2`` (degrees Celsius) and ``f1`` to ``f7`` (Hz). Without a log it makes a synthetic one, which this
 page shows. It needs :download:`tower_recipes.py` and :download:`page_recipes.py` beside it;
-:doc:`/guide/your_own_structure` is the same way in more words.
+:doc:`/guide/five_steps` is the same way in more words.
 """
 
 import tempfile
