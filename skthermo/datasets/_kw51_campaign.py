@@ -69,6 +69,8 @@ def make_kw51_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_hours, 1)
             ``tBD31A``, temperature of the steel below the deck in degrees Celsius. It is missing until 2018-11-21
             and in a few blocks.
@@ -92,8 +94,8 @@ def make_kw51_campaign(
             The bridge before its retrofit. Its groups are those of `make_kw51`, and ``bearings`` and ``deck_beams``
             (girders, transverse beams and stiffeners).
         retrofit : dict
-            The complete retrofit as keyword arguments of `skthermo.surrogate.DataInformedFEM.simulate` and
-            `skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
+            The complete retrofit as keyword arguments of `~skthermo.surrogate.DataInformedFEM.simulate` and
+            `~skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
             ``updated=True``.
 
         All frames have the same DatetimeIndex.

@@ -46,6 +46,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 11)
             Temperature and weather, with the columns of ``labels_env``. Only ``tBD31A`` (steel below the deck) and
             ``tVL`` (air) are temperatures, in degrees Celsius, so that ``data.temperatures[["tBD31A"]]`` is what a

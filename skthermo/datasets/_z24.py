@@ -39,6 +39,8 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 7)
             In degrees Celsius: pavement (TP), web (TWN, TWC), deck (TDS, TDT), soffit (TS) and air.
         frequencies : DataFrame of shape (n_records, 4)

@@ -99,12 +99,3 @@ def test_oracle_recovers_parameters_that_exist():
     theta = np.array([[0.9, 1.1, 1.05, 1.0], [1.2, 0.9, 0.95, 1.0]])
     fitted = best_theta(model, model.frequencies(theta), steps=60)
     np.testing.assert_allclose(fitted[:, :3], theta[:, :3], rtol=0.01)
-
-
-def test_grid_search_example_has_a_truss_that_lags_behind_the_air():
-    example = load(ROOT / "examples" / "plot_grid_search.py")
-    T, F = example.monitoring(n_days=10)
-    assert T.index.equals(F.index)
-    assert len(T) == 240
-    lagged = T["T1"].ewm(halflife=8).mean()
-    assert abs(np.corrcoef(F["f1"], lagged)[0, 1]) > abs(np.corrcoef(F["f1"], T["T1"])[0, 1])
