@@ -22,10 +22,10 @@ from skthermo.preprocessing import ModeTracker
 os.environ |= {"PYOMA_LOG_LEVEL": "ERROR", "TQDM_DISABLE": "1"}
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
 
-from accelerations_recipes import DAMPING, RATE, ambient_vibration, modes_below  # noqa: E402
-from pyoma2.algorithms import SSI  # noqa: E402
-from pyoma2.algorithms.data.run_params import Clustering, Step1, Step2, Step3  # noqa: E402
-from pyoma2.setup import SingleSetup  # noqa: E402
+from accelerations_recipes import DAMPING, RATE, ambient_vibration, modes_below
+from pyoma2.algorithms import SSI
+from pyoma2.algorithms.data.run_params import Clustering, Step1, Step2, Step3
+from pyoma2.setup import SingleSetup
 
 SENSORS = np.linspace(0, 22, 8).astype(int)
 REFERENCES = [0, 3, 5, 7]
@@ -39,7 +39,6 @@ SETTINGS = {
     "all poles of order 30": {"order": 30},
     "hier_avg": {"quick": "hier_avg"},
     "2.5 minutes": {"minutes": 2.5},
-    "40 minutes": {"minutes": 40},
 }
 
 
