@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from sklearn.utils import Bunch
 
 from skthermo._arrays import Matrix
 from skthermo._io import MemoryLimit, read_matlab
+from skthermo.datasets._results import Z24Monitoring
 
 EPOCH = pd.Timestamp("1997-11-11")
 MODES = ["f1", "f2", "f3", "f4"]
@@ -21,7 +21,7 @@ BYTES_FOR_EACH_CHARACTER = 20  # of a table of short texts in memory
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
-def load_z24(path: str | PathLike) -> Bunch:
+def load_z24(path: str | PathLike) -> Z24Monitoring:
     """Read the monitoring of the Z24 highway bridge, with its progressive damage.
 
     Z24 in Switzerland was a post-tensioned concrete box girder of 14 + 30 + 14 m, monitored for a
@@ -39,6 +39,8 @@ def load_z24(path: str | PathLike) -> Bunch:
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 7)
             In degrees Celsius: pavement (TP), web (TWN, TWC), deck (TDS, TDT), soffit (TS) and air.
         frequencies : DataFrame of shape (n_records, 4)
@@ -64,7 +66,7 @@ def load_z24(path: str | PathLike) -> Bunch:
     References
     ----------
     Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171.
+    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
 
     Examples
     --------
@@ -92,7 +94,7 @@ def load_z24(path: str | PathLike) -> Bunch:
         row = np.flatnonzero(index.duplicated())[0]
         raise ValueError(f"{file}: field 'record', row {row} repeats {record[row]:.0f}; expected each hour once")
     table = table.set_index(index)
-    return Bunch(
+    return Z24Monitoring(
         temperatures=table[SENSORS], frequencies=table[MODES], state=pd.Series(state, index=index, name="state")
     )
 
