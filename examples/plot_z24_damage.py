@@ -108,8 +108,8 @@ fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", nco
 
 # %%
 # .. image:: /images/z24_changes.png
-#    :alt: Change of four parameters by day: on damaged days, piers and soil and the abutments fall far below the range of
-#          healthy days
+#    :alt: Change of four parameters by day: on damaged days, piers and soil and the abutments fall far below the range
+#          of healthy days
 #
 # What damage explains the shifts?
 # --------------------------------
