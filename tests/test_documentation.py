@@ -75,3 +75,7 @@ def test_images_of_readme_exist():
     for image in images:
         assert image.startswith(ADDRESS), "a package index shows README without the repository beside it"
         assert (ROOT / image.removeprefix(ADDRESS)).is_file()
+
+
+def test_the_citation_is_of_this_version():
+    assert f"\nversion: {skthermo.__version__}\n" in (ROOT / "CITATION.cff").read_text()

@@ -1,25 +1,15 @@
 """The truss study with two seeds: its tables, and the benchmark's targets."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.benchmarks.truss import NAMES, SingleRecords, best_theta, detectable, run, summary
+from tests.examples.pages import recipes
 
-ROOT = Path(__file__).parents[2]
 GROUPS = ["bottom", "top", "diagonal"]
 
 
-def load(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-EXAMPLE = load(ROOT / "examples" / "truss_recipes.py")
+EXAMPLE = recipes("truss")
 
 
 @pytest.fixture(scope="module")
