@@ -1,15 +1,16 @@
-"""Wrappers of scikit-learn's private functions, which are imported only here; FE models and seeds inside
-estimators."""
+"""Wrappers of scikit-learn's private functions, which are imported only here, and types of its public ones; FE models
+and seeds inside estimators."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 import numpy as np
 import pandas as pd
 import sklearn.utils
 import sklearn.utils.validation
-from sklearn.base import BaseEstimator, _fit_context, clone
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
 from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
@@ -21,12 +22,28 @@ from sklearn.utils.validation import _check_feature_names_in, _check_sample_weig
 from skthermo._arrays import without_mask, without_missing
 from skthermo._models import is_model
 
+if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
+    Method = TypeVar("Method", bound=Callable[..., Any])
+
+    def _fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[Method], Method]: ...
+
+    class TransformerMixin:
+        @overload
+        def fit_transform(self, X: pd.DataFrame, y: Any = None) -> pd.DataFrame: ...
+        @overload
+        def fit_transform(self, X: ArrayLike, y: Any = None) -> NDArray[np.float64]: ...
+        def fit_transform(self, X: Any, y: Any = None) -> Any: ...
+        def set_output(self, *, transform: Literal["default", "pandas", "polars"] | None = None) -> Self: ...
+else:
+    from sklearn.base import TransformerMixin, _fit_context
+
 __all__ = [
     "BaseSearchCV",
     "HasMethods",
     "Interval",
     "InvalidParameterError",
     "StrOptions",
+    "TransformerMixin",
     "_BaseComposition",
     "_BaseImputer",
     "_check_feature_names_in",
@@ -60,6 +77,25 @@ def check_array(values: Any, **options: Any) -> Any:
         return sklearn.utils.check_array(with_nan(values), **options)
 
 
+def refuse_times(table: Any) -> None:
+    """Raise an error for a column of times in a frame of pandas or Polars, which would count as numbers or fail later.
+
+    Raises
+    ------
+    ValueError
+        Names the column.
+    """
+    if not (hasattr(table, "columns") and hasattr(table, "dtypes")):
+        return
+    for name, dtype in zip(table.columns, table.dtypes, strict=True):
+        is_time = dtype.is_temporal() if hasattr(dtype, "is_temporal") else getattr(dtype, "kind", "") in ("M", "m")
+        if is_time:
+            raise ValueError(
+                f"column {name!r} holds times; expected numbers, and times as the index of a pandas frame, as by "
+                f"frame.set_index({name!r})"
+            )
+
+
 @contextmanager
 def numbers_expected() -> Iterator[None]:
     """Replace NumPy's conversion error by one that says that a table holds text or complex numbers."""
@@ -74,7 +110,11 @@ def numbers_expected() -> Iterator[None]:
 
 
 def with_nan(X: Any) -> Any:
-    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged."""
+    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
+
+    A column of times is an error.
+    """
+    refuse_times(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
     if isinstance(X, np.ndarray) and X.dtype == object:

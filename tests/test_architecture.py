@@ -1,6 +1,7 @@
 """Which room may import which, and what importing costs."""
 
 import ast
+import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import skthermo
 from skthermo._optional import import_optional
 
 PACKAGE = Path(skthermo.__file__).parent
+HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"
 MAY_IMPORT = {
     "fem": set(),
     "fem.elements": set(),
@@ -63,6 +65,13 @@ def test_arrows_point_one_way(path):
         is_front = path.name == "__init__.py" and package.startswith(room + ".")  # a room presents its sub-rooms
         shares_parent = room.startswith(package + ".") and module[-1].startswith("_")
         assert is_front or shares_parent or package in MAY_IMPORT[room], f"{room} may not import {'.'.join(module)}"
+
+
+def test_the_guide_for_contributors_shows_the_arrows():
+    table = HOUSE.read_text().partition(":widths: 15, 55, 30\n\n")[2].partition("\n\n")[0]
+    rows = csv.reader(table.splitlines(), skipinitialspace=True)
+    shown = {room: set(filter(None, imported.split(", "))) for room, _, imported in rows}
+    assert shown == {room: imported for room, imported in MAY_IMPORT.items() if "." not in room}
 
 
 @each_file

@@ -2,15 +2,21 @@
 
 import doctest
 import importlib
+import pkgutil
 import re
 import textwrap
 from pathlib import Path
 
 import pytest
 
+import skthermo
+
 ROOT = Path(__file__).parents[1]
+ADDRESS = "https://raw.githubusercontent.com/skthermo/skthermo/main/"
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
+API = ROOT / "docs" / "reference" / "api"
+ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if m.ispkg and not m.name.startswith("_")]
 DETECTED, DEVIATION = 0.936, 0.029  # alarms among days with 20 % damage: mean and deviation of 40 true years
 
 
@@ -43,16 +49,33 @@ def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
 
 
-@pytest.mark.parametrize(
-    "room", ["fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "studies", "plotting"]
-)
+@pytest.mark.parametrize("room", ROOMS)
 def test_the_reference_lists_every_public_name(room):
-    index = (ROOT / "docs" / "reference" / "api" / "index.rst").read_text()
-    listed = re.search(rf"currentmodule:: skthermo\.{room}\n.*?\n\n((?:   \w+\n)+)", index, flags=re.DOTALL)[1].split()
-    assert listed == sorted(importlib.import_module(f"skthermo.{room}").__all__)
+    page = (API / f"{room}.rst").read_text()
+    tables = re.findall(r"autosummary::\n(?:   :.*\n)+\n((?:   \w+\n)+)", page)
+    assert f"currentmodule:: skthermo.{room}\n" in page
+    assert sorted(" ".join(tables).split()) == sorted(importlib.import_module(f"skthermo.{room}").__all__)
+
+
+def test_the_reference_has_a_page_for_every_package():
+    toctree = re.search(r"toctree::\n   :hidden:\n\n((?:   \w+\n)+)", (API / "index.rst").read_text())[1].split()
+    assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
+
+
+def test_sources_are_listed_and_cited():
+    citing = [*(ROOT / "skthermo").rglob("*.py"), *PAGES]
+    cited = {label for path in citing for label in re.findall(r"\[([A-Z]\w*\d\d)\]_", path.read_text())}
+    listed = re.findall(r"^\.\. \[(\w+)\] ", (ROOT / "docs/reference/bibliography.rst").read_text(), flags=re.MULTILINE)
+    assert sorted(cited) == sorted(listed)
 
 
 def test_images_of_readme_exist():
     images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
     assert images
-    assert all((ROOT / image).is_file() for image in images)
+    for image in images:
+        assert image.startswith(ADDRESS), "a package index shows README without the repository beside it"
+        assert (ROOT / image.removeprefix(ADDRESS)).is_file()
+
+
+def test_the_citation_is_of_this_version():
+    assert f"\nversion: {skthermo.__version__}\n" in (ROOT / "CITATION.cff").read_text()

@@ -12,8 +12,10 @@ from skthermo._io._matlab import read_matlab
 from skthermo._io._matrix_market import read_matrix_market
 from skthermo._io._memory_limit import MemoryLimit
 from skthermo._io._npz import read_npz, read_sparse_npz
+from skthermo._io._triplets import HALF_SUFFIXES, read_half
 
-FORMATS = "a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of .mtx and .npz files"
+READERS = {".mtx": read_matrix_market, ".npz": read_sparse_npz} | dict.fromkeys(HALF_SUFFIXES, read_half)
+FORMATS = f"a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of files {', '.join(READERS)}"
 
 
 def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
@@ -43,22 +45,30 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str,
 
 
 def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
-    """One matrix for each file, in the order of their names, E_2 before E_10."""
-    found = [file for file in folder.iterdir() if file.suffix.lower() in (".mtx", ".npz")]
+    """One matrix for each file, in the order of their names, E_2 before E_10.
+
+    Files that state no size are taken to be of the largest of their sizes: the last rows of a mass may be zero.
+    """
+    found = [file for file in folder.iterdir() if file.suffix.lower() in READERS]
     files = sorted(found, key=lambda file: [int(s) if s.isdecimal() else s for s in re.split(r"(\d+)", file.name)])
     limit = MemoryLimit(sum(file.stat().st_size for file in files if is_used(file.stem)))
     matrices: dict[str, Matrix | None] = {}
+    suffixes: dict[str, str] = {}
     for file in files:
         if not is_used(file.stem):
             matrices[file.stem] = None
             continue
-        if file.stem in matrices:
-            raise ValueError(f"{folder} holds {file.stem!r} as .mtx and as .npz; expected one of them")
-        is_text = file.suffix.lower() == ".mtx"
-        matrix = read_matrix_market(file, limit) if is_text else read_sparse_npz(file, limit)
-        matrices[file.stem] = None if matrix is None else _matrix(matrix)
+        suffix = file.suffix.lower()
+        if file.stem in suffixes:
+            both = f"{suffixes[file.stem]} and as {suffix}"
+            raise ValueError(f"{folder} holds {file.stem!r} as {both}; expected one of them, or another name for one")
+        suffixes[file.stem] = suffix
+        matrices[file.stem] = _matrix(READERS[suffix](file, limit))
     if not matrices:
         raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
+    halves = [matrices[name] for name, suffix in suffixes.items() if suffix in HALF_SUFFIXES]
+    for half in halves:
+        half.resize([max(matrix.shape[0] for matrix in halves)] * 2)
     return matrices
 
 

@@ -5,7 +5,6 @@ the time, but ends the interpreter at some damaged sizes, and reads 1.0x as 1.0.
 """
 
 import re
-import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix
 from skthermo._io._memory_limit import MemoryLimit
+from skthermo._io._numbers import read_numbers
 
 COMMENTS = re.compile(rb"^[ \t]*%.*$", re.MULTILINE)
 MIRRORS = {"general": 0, "symmetric": 1, "hermitian": 1, "skew-symmetric": -1}
@@ -67,7 +67,9 @@ def _read(text: bytes, limit: MemoryLimit) -> Matrix:
         n_entries = size.n_values * (2 if size.mirror else 1)
         limit.take_sparse(size.n_rows, size.n_columns, n_entries, value_size)
     values = entries[:, -2] + 1j * entries[:, -1] if is_complex else entries[:, -1]
-    return _dense(values, size, is_hermitian) if layout == "array" else _sparse(entries, values, size, is_hermitian)
+    if layout == "array":
+        return _dense(values, size, is_hermitian)
+    return sparse_matrix(entries, values, size, is_hermitian)
 
 
 def _data_line(text: bytes, start: int, *, is_first: bool = False) -> tuple[str, int]:
@@ -96,24 +98,10 @@ def _numbers(text: bytes, count: int, width: int) -> Array:
     """A table of so many rows and columns."""
     if b"%" in text:
         text = COMMENTS.sub(b"", text)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # of older versions of NumPy, about what is no number
-        try:
-            numbers = np.fromstring(text, sep=" ") if text.strip() else np.empty(0)
-        except (DeprecationWarning, ValueError) as error:
-            raise ValueError(f"{_first_that_is_no_number(text)!r} is no number") from error
+    numbers = read_numbers(text)
     if numbers.size != count * width:
         raise ValueError(f"{numbers.size} numbers; expected {count}" + (f" times {width}" if width > 1 else ""))
     return numbers.reshape(count, width)
-
-
-def _first_that_is_no_number(text: bytes) -> str:
-    for match in re.finditer(rb"\S+", text):
-        try:
-            np.fromstring(match[0], sep=" ")
-        except (DeprecationWarning, ValueError):
-            return match[0][:30].decode("latin-1")
-    return ""
 
 
 def _dense(values: NDArray, size: Size, is_hermitian: bool) -> Matrix:
@@ -131,7 +119,7 @@ def _dense(values: NDArray, size: Size, is_hermitian: bool) -> Matrix:
     return matrix
 
 
-def _sparse(entries: Array, values: NDArray, size: Size, is_hermitian: bool) -> Matrix:
+def sparse_matrix(entries: Array, values: NDArray, size: Size, is_hermitian: bool) -> Matrix:
     """A sparse matrix from rows and columns (from 1) and values; a symmetric matrix has one side only."""
     shape = (size.n_rows, size.n_columns)
     places = entries[:, :2]

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.utils import Bunch
 
 from skthermo._arrays import as_random_state, positive_integer, real_array
+from skthermo.datasets._results import TrussCampaign
 from skthermo.datasets._truss import PARAMETERS, ZONES, truss_structure
 from skthermo.fem import add_noise
 
@@ -19,7 +19,7 @@ KELVIN = 150.0  # no structure gets this hot in degrees Celsius
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
-    """Multiplier of Young's modulus at a temperature, eq. (10).
+    """Multiplier of Young's modulus at a temperature, equation (10).
 
     E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
 
@@ -40,7 +40,10 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Seif et al., Temperature-dependent material modeling for structural steels: formulation and application, National
+    Institute of Standards and Technology, 2016 [SCG16]_, from which the paper has the law.
 
     Examples
     --------
@@ -62,7 +65,7 @@ def make_truss_campaign(
     noise: ArrayLike = 0.01,
     damage: Mapping[str, float] | None = None,
     random_state: int | np.random.RandomState | None = None,
-) -> Bunch:
+) -> TrussCampaign:
     """Synthetic monitoring of the 28-bar truss: temperatures, and frequencies by its thermo-mechanical law.
 
     The ground truth of Kamali et al. (2026), Section 3: the temperatures at three thermocouples vary with season, time
@@ -88,10 +91,12 @@ def make_truss_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 3)
-            ``T1``..``T3`` in degrees Celsius.
+            ``T1`` to ``T3`` in degrees Celsius.
         frequencies : DataFrame of shape (n_records, 6)
-            ``f1``..``f6`` in Hz, with noise and damage.
+            ``f1`` to ``f6`` in Hz, with noise and damage.
         clean_frequencies : DataFrame of shape (n_records, 6)
             Without noise.
         theta : DataFrame of shape (n_records, 3)
@@ -133,7 +138,7 @@ def make_truss_campaign(
     clean = model.damaged(damage or {}).frequencies(theta)
     noisy = add_noise(clean, noise, random_state=random)
     modes = [f"f{i + 1}" for i in range(model.n_modes)]
-    return Bunch(
+    return TrussCampaign(
         temperatures=temperatures,
         frequencies=pd.DataFrame(noisy, index=index, columns=modes),
         clean_frequencies=pd.DataFrame(clean, index=index, columns=modes),

@@ -146,9 +146,9 @@ def make_kw51(
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
-    Maes & Lombaert, Journal of Bridge Engineering 26 (3) (2021) 04721001.
+    Maes & Lombaert, Journal of Bridge Engineering 26 (3) (2021) 04721001 [ML21]_.
 
     Examples
     --------

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.utils import Bunch
 
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo.datasets._kw51_changes import stiffness_factors
@@ -22,6 +21,7 @@ from skthermo.datasets._kw51_sensors import kw51_sensors
 from skthermo.datasets._kw51_simulation import simulate
 from skthermo.datasets._kw51_truth import thermal_multipliers, truth_model
 from skthermo.datasets._kw51_weather import N_HOURS, draw_weather
+from skthermo.datasets._results import KW51Campaign
 from skthermo.fem import check_noise
 
 
@@ -36,7 +36,7 @@ def make_kw51_campaign(
     damage_from: Any = None,
     shapes: bool = False,
     random_state: int | np.random.RandomState | None = None,
-) -> Bunch:
+) -> KW51Campaign:
     """Synthetic monitoring of the railway bridge KW51: hourly temperatures and modes, through its retrofit.
 
     The measurements themselves may not be part of this package. This campaign is synthetic. It has their length and
@@ -69,13 +69,15 @@ def make_kw51_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_hours, 1)
             ``tBD31A``, temperature of the steel below the deck in degrees Celsius. It is missing until 2018-11-21
             and in a few blocks.
         frequencies : DataFrame of shape (n_hours, 6)
-            ``f1``..``f6`` in Hz, with noise; NaN where a mode was not identified.
+            ``f1`` to ``f6`` in Hz, with noise; NaN where a mode was not identified.
         damping : DataFrame of shape (n_hours, 6)
-            Damping ratios ``xi1``..``xi6``; NaN as the frequencies.
+            Damping ratios ``xi1`` to ``xi6``; NaN as the frequencies.
         shapes : ndarray of shape (n_hours, 6, 12)
             Only with ``shapes=True``: complex mode shapes at the sensors, of unit length and any phase, with noise
             of 1 % of their root mean square; NaN as the frequencies.
@@ -92,8 +94,9 @@ def make_kw51_campaign(
             The bridge before its retrofit. Its groups are those of `make_kw51`, and ``bearings`` and ``deck_beams``
             (girders, transverse beams and stiffeners).
         retrofit : dict
-            The complete retrofit as keyword arguments of `DataInformedFEM.simulate` and `Scenario`, for ``model`` and
-            all models of `make_kw51`; its effect was fitted with ``updated=True``.
+            The complete retrofit as keyword arguments of `~skthermo.surrogate.DataInformedFEM.simulate` and
+            `~skthermo.studies.Scenario`, for ``model`` and all models of `make_kw51`; its effect was fitted with
+            ``updated=True``.
 
         All frames have the same DatetimeIndex.
 
@@ -175,9 +178,9 @@ def make_kw51_campaign(
     References
     ----------
     Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001.
+    Engineering 26 (3) (2021) 04721001 [ML21]_.
 
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------
@@ -212,7 +215,7 @@ def make_kw51_campaign(
         missing = missing_modes(n_hours, for_gaps)
     frequencies[missing], damping[missing] = np.nan, np.nan
     modes, ratios = [[f"{letter}{mode + 1}" for mode in range(6)] for letter in ("f", "xi")]
-    campaign = Bunch(
+    campaign = KW51Campaign(
         temperatures=temperatures,
         frequencies=pd.DataFrame(frequencies, index, modes),
         damping=pd.DataFrame(damping, index, ratios),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.utils import Bunch
 
 from skthermo._io import MemoryLimit, read_matlab_values, read_only_member
 from skthermo._warnings import warn_user
@@ -19,6 +18,7 @@ from skthermo.datasets._kw51_fields import (
     numbers_of,
     time_of,
 )
+from skthermo.datasets._results import KW51Monitoring
 
 PUBLISHED_MD5 = "5cdb446519d1150228fab51b3a002239"
 LARGEST_FILE = 1_000_000_000  # bytes; the published zip file has 13 million
@@ -29,7 +29,7 @@ RETROFIT_BEGINS = pd.Timestamp("2019-05-15 00:00")
 AFTER_RETROFIT = pd.Timestamp("2019-09-27 01:00")
 
 
-def load_kw51(path: str | PathLike) -> Bunch:
+def load_kw51(path: str | PathLike) -> KW51Monitoring:
     """Read the monitoring of the railway bridge KW51 before, during and after its retrofit.
 
     KW51 in Leuven is a steel bowstring bridge of 115 m. KU Leuven tracked its modes every hour from October 2018 to
@@ -46,6 +46,8 @@ def load_kw51(path: str | PathLike) -> Bunch:
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 11)
             Temperature and weather, with the columns of ``labels_env``. Only ``tBD31A`` (steel below the deck) and
             ``tVL`` (air) are temperatures, in degrees Celsius, so that ``data.temperatures[["tBD31A"]]`` is what a
@@ -54,9 +56,9 @@ def load_kw51(path: str | PathLike) -> Bunch:
             direct normal radiation (``grVL``, ``drVL``, ``dnrVL``), rain (``raVL``), and speed and direction of the
             wind (``wsVL``, ``wdVL``), in the units of the file, which it does not state.
         frequencies : DataFrame of shape (n_records, 14)
-            ``f1``..``f14`` in Hz, NaN where a mode was not identified.
+            ``f1`` to ``f14`` in Hz, NaN where a mode was not identified.
         damping : DataFrame of shape (n_records, 14)
-            ``xi1``..``xi14``, damping ratios as fractions of critical damping.
+            ``xi1`` to ``xi14``, damping ratios as fractions of critical damping.
         shapes : complex ndarray of shape (n_records, 14, 12)
             Mode shapes at the sensors.
         sensors : list of str
@@ -93,7 +95,10 @@ def load_kw51(path: str | PathLike) -> Bunch:
     References
     ----------
     Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (2021) 04721001.
+    Engineering 26 (3) (2021) 04721001 [ML21]_.
+
+    Maes & Lombaert, Monitoring data for railway bridge KW51 in Leuven, Belgium, before, during, and after retrofitting,
+    Zenodo, 2020 [ML20]_.
 
     Examples
     --------
@@ -113,7 +118,7 @@ def load_kw51(path: str | PathLike) -> Bunch:
     content = read_only_member(stored, ".mat", str(file), limit) if is_zip else stored
     data = _data(read_matlab_values(content, str(file), limit), file)
     if not is_zip:
-        return Bunch(**data, is_published=None)
+        return KW51Monitoring(**data, is_published=None)
     md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
     if md5 != PUBLISHED_MD5:
         warn_user(
@@ -121,7 +126,7 @@ def load_kw51(path: str | PathLike) -> Bunch:
             "content may differ from what was published",
             kind="another KW51 file",
         )
-    return Bunch(**data, is_published=md5 == PUBLISHED_MD5)
+    return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
 
 
 def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:

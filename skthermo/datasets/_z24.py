@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from sklearn.utils import Bunch
 
 from skthermo._arrays import Matrix
 from skthermo._io import MemoryLimit, read_matlab
+from skthermo.datasets._results import Z24Monitoring
 
 EPOCH = pd.Timestamp("1997-11-11")
 MODES = ["f1", "f2", "f3", "f4"]
@@ -21,7 +21,7 @@ BYTES_FOR_EACH_CHARACTER = 20  # of a table of short texts in memory
 POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
 
 
-def load_z24(path: str | PathLike) -> Bunch:
+def load_z24(path: str | PathLike) -> Z24Monitoring:
     """Read the monitoring of the Z24 highway bridge, with its progressive damage.
 
     Z24 in Switzerland was a post-tensioned concrete box girder of 14 + 30 + 14 m, monitored for a
@@ -31,7 +31,7 @@ def load_z24(path: str | PathLike) -> Bunch:
     Parameters
     ----------
     path : str or path-like
-        A CSV file with the columns ``record``, ``f1``..``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
+        A CSV file with the columns ``record``, ``f1`` to ``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
         ``TS``, ``Tair`` and ``state`` ("undamaged" or "damaged"), or the MATLAB v5 file in which the data are usually
         shared: ``data`` (n x 4), ``Z24_TP``, ``Z24_TWN``, ... (n x 1) and, optionally, ``idx`` (mask over the hours)
         and ``nc`` (number of undamaged rows).
@@ -39,10 +39,12 @@ def load_z24(path: str | PathLike) -> Bunch:
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 7)
             In degrees Celsius: pavement (TP), web (TWN, TWC), deck (TDS, TDT), soffit (TS) and air.
         frequencies : DataFrame of shape (n_records, 4)
-            ``f1``..``f4`` in Hz.
+            ``f1`` to ``f4`` in Hz.
         state : Series of shape (n_records,)
             "undamaged", "damaged", or "unknown" where a MATLAB file has no ``nc``.
 
@@ -64,7 +66,7 @@ def load_z24(path: str | PathLike) -> Bunch:
     References
     ----------
     Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171.
+    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
 
     Examples
     --------
@@ -92,7 +94,7 @@ def load_z24(path: str | PathLike) -> Bunch:
         row = np.flatnonzero(index.duplicated())[0]
         raise ValueError(f"{file}: field 'record', row {row} repeats {record[row]:.0f}; expected each hour once")
     table = table.set_index(index)
-    return Bunch(
+    return Z24Monitoring(
         temperatures=table[SENSORS], frequencies=table[MODES], state=pd.Series(state, index=index, name="state")
     )
 

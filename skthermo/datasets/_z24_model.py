@@ -61,10 +61,10 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     ================  ==========  =======  =================================================================
     quantity          value       unit     reason
     ================  ==========  =======  =================================================================
-    spans             14, 30, 14  m        [1]_; straight, without the bridge's skew, alike at both ends
+    spans             14, 30, 14  m        [PD01]_; straight, without the bridge's skew, alike at both ends
     pier height       5.5         m        from the girder's axis to the footing; assumed
     element length    1           m        at most; halving it moves no frequency by 0.1 %
-    girder E          37.5e9      Pa       concrete, where FE models of this bridge begin [2]_
+    girder E          37.5e9      Pa       concrete, where FE models of this bridge begin [TD04]_
     girder G          16e9        Pa       likewise
     girder density    2700        kg/m3    concrete, and the pavement smeared over its section
     girder A          4.4         m2       box girder, constant along the bridge; assumed
@@ -90,7 +90,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     abutment rx       3e9         N m/rad  z spread over the 8.6 m: 8.6**2 / 12 times as much; ry, rz free
     ================  ==========  =======  =================================================================
 
-    ``tools/fit_z24_constants.py`` found the four fitted constants by `skthermo.updating.ModelUpdater`, with a
+    ``tools/fit_z24_constants.py`` found the four fitted constants by `~skthermo.updating.ModelUpdater`, with a
     weak prior centred on the start values, from the mean frequencies of the healthy records in which all seven
     sensors are above 5 C, so that nothing is frozen.
 
@@ -100,10 +100,11 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
 
     References
     ----------
-    .. [1] Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage
-       events, Earthquake Engineering and Structural Dynamics 30 (2001) 149-171.
-    .. [2] Teughels & De Roeck, Structural damage identification of the highway bridge Z24 by FE model
-       updating, Journal of Sound and Vibration 278 (2004) 589-610.
+    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
+    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
+
+    Teughels & De Roeck, Structural damage identification of the highway bridge Z24 by FE model updating, Journal of
+    Sound and Vibration 278 (2004) 589-610 [TD04]_.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from numbers import Real
-from typing import Any, Self
+from typing import Any, Self, overload
 
 import numpy as np
 import pandas as pd
@@ -78,6 +78,10 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
         self.offset_ = -self.threshold_
         return self
 
+    @overload
+    def damage_index(self, X: pd.DataFrame) -> pd.Series: ...
+    @overload
+    def damage_index(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def damage_index(self, X: ArrayLike) -> NDArray[np.float64] | pd.Series:
         """Damage index of every record: higher is more damaged.
 

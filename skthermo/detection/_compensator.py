@@ -1,26 +1,20 @@
 """Removes the effect of temperature from frequencies by regression."""
 
-from collections.abc import Iterable, Sequence
-from typing import Any, Literal
+from collections.abc import Hashable, Iterable, Sequence
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
-from skthermo._frames import (
-    check_columns,
-    check_temperatures,
-    frame_like,
-    warn_of_absurd,
-    warn_of_disorder,
-    warn_of_markers,
-)
+from skthermo._frames import check_columns, frame_like, warn_of_absurd, warn_of_disorder
 from skthermo._validation import (
     HasMethods,
     StrOptions,
+    TransformerMixin,
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
@@ -30,7 +24,7 @@ from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange
 from skthermo.detection._complete_rows import CompleteRowsRegressor
 from skthermo.detection._folds import folds_of
-from skthermo.detection._targets import check_positions_are_names, positions_of
+from skthermo.detection._targets import check_positions_are_names, positions_of, split_columns
 from skthermo.detection._whitening import Spread
 
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
@@ -43,7 +37,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     ----------
     estimator : regressor
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
-        target is fitted once for each), a pipeline with `LagFeatures`, or `DataInformedFEM`.
+        target is fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.
@@ -61,8 +55,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Attributes
     ----------
-    estimator_ : regressor
-        Clone of ``estimator``, fitted on all rows that it can take.
+    estimator_, regression_ : regressor
+        Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
     spread_ : object
         Covariance of the residuals by weather, if they are scaled. ``spread_.smoothing`` says over how many records of
         similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -82,17 +76,16 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Notes
     -----
-    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the
-    noise of the rows it was fitted on, so their residuals are smaller than those of new records, and a
-    threshold set on them gives too many false alarms. `fit_transform` predicts each row by a clone fitted
-    on the other folds, and also fits on all rows for the records to come. A pipeline calls `fit_transform`
-    in its own ``fit``, so ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its
-    threshold on out-of-fold residuals.
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
+    it was fitted on, so their residuals are smaller than those of new records, and a threshold set on them gives too
+    many false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows
+    for the records to come. A pipeline calls `fit_transform` in its own ``fit``, so
+    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its threshold on out-of-fold residuals.
 
-    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be
-    predicted by its neighbours in time, which are nearly the same record. If the baseline holds each season
-    only once, a fold is predicted from other seasons, and its residuals and the threshold become too large.
-    A baseline of several years, or more and shorter folds, avoids this.
+    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be predicted by its
+    neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
+    predicted from other seasons, and its residuals and the threshold become too large. A baseline of several years, or
+    more and shorter folds, avoids this.
 
     A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
     too; an array is passed as an array.
@@ -114,14 +107,14 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
       that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
       the pipeline, and to the rows of X where the estimator is no such pipeline.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
-      estimator of its own, fitted on the rows that have it. Only an
-      estimator with an FE model (`DataInformedFEM`, also at the end of a pipeline or in a search) gets all
-      rows, because its lags need them; it leaves out incomplete rows itself.
-    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to
-      fit the estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
-    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold
-      takes the last record before it, or NaN if that is older than the tolerance of `LagFeatures`. Without a
-      DatetimeIndex, the rows of another fold shift the lags.
+      estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
+      also at the end of a pipeline or in a search) gets all rows, because its lags need them; it leaves out incomplete
+      rows itself.
+    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to fit the
+      estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
+      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a DatetimeIndex,
+      the rows of another fold shift the lags.
 
     Examples
     --------
@@ -155,7 +148,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self,
         estimator: BaseEstimator,
         *,
-        targets: Sequence[str] | Sequence[int],
+        targets: Sequence[Hashable],
         cv: int | BaseCrossValidator | Iterable | None = None,
         scale: Literal["global", "local"] | None = None,
     ):
@@ -200,6 +193,10 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
             self._out_of_fold(temperatures, frequencies)
         return self
 
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
     @_fit_context(prefer_skip_nested_validation=False)
     def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
         """Fit on all rows of a baseline, and give its out-of-fold residuals.
@@ -229,6 +226,10 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         temperatures, frequencies = self._read_baseline(X)
         return frame_like(frequencies, self._out_of_fold(temperatures, frequencies))
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Residuals of new records.
 
@@ -254,7 +255,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
             As in `fit`, and if temperatures are far outside those of `fit`.
         """
         check_is_fitted(self)
-        temperatures, frequencies = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
+        temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         weather = as_floats(temperatures)
         known = ~np.isnan(weather).any(axis=1)
         message = self.training_range_.warning(weather) if known.any() else ""
@@ -263,6 +264,10 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
         return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
 
+    @overload
+    def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def applicability(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def applicability(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """How far the temperatures of records lie outside those of the baseline.
 
@@ -277,7 +282,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
             In units of the range of each column in the baseline; 0 inside it, NaN where the value is missing.
         """
         check_is_fitted(self)
-        temperatures, _ = self._split(X, validate_data(self, X, **AS_FLOATS, reset=False))
+        temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         return frame_like(temperatures, self.training_range_.excess(temperatures))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -291,6 +296,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
+            Names of the targets.
         """
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]
@@ -303,7 +309,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
-        temperatures, frequencies = self._split(X, values)
+        temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
         warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
         return temperatures, frequencies
@@ -330,18 +336,6 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         size = np.fmax.reduce(np.abs(as_floats(frequencies)))
         self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
         return white
-
-    def _split(self, X: Any, values: NDArray) -> tuple[Any, Any]:
-        """The other columns and the targets, as frames if X is one."""
-        columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
-        others = np.delete(np.arange(len(columns)), self.targets_)
-        temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, self.targets_))
-        warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[self.targets_], axis=1))
-        try:
-            check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
-        except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error), "temperatures")
-        return temperatures, frequencies
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

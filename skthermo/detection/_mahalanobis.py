@@ -36,7 +36,7 @@ class MahalanobisDetector(DamageDetector):
     covariance : covariance estimator, optional
         Any of scikit-learn's, such as ``LedoitWolf()`` for few records or ``MinCovDet()``
         for a baseline with outliers; it is fitted on complete rows. By default the most likely covariance of all rows,
-        by expectation maximisation where modes are missing.
+        by accelerated expectation maximisation where modes are missing.
     threshold : {"conformal", "quantile", "chi2"}, default="conformal"
         How the threshold is set:
 
@@ -90,7 +90,13 @@ class MahalanobisDetector(DamageDetector):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Wilson & Hilferty, The distribution of chi-square, Proceedings of the National Academy of Sciences 17 (1931) 684-688
+    [WH31]_.
+
+    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm,
+    Scandinavian Journal of Statistics 35 (2008) 335-353 [VR08]_.
 
     Examples
     --------

@@ -4,7 +4,11 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
+
+from skthermo._frames import check_temperatures, frame_like, warn_of_markers
+from skthermo._warnings import warn_user
 
 
 def check_positions_are_names(targets: Any, columns: Any) -> None:
@@ -43,3 +47,16 @@ def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None
             "other column to predict them from"
         )
     return np.array(positions, dtype=np.intp)
+
+
+def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:
+    """The other columns and the targets, as frames if X is one."""
+    columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
+    others = np.delete(np.arange(len(columns)), targets)
+    temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, targets))
+    warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[targets], axis=1))
+    try:
+        check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
+    except ValueError as error:  # only a warning, as another column may be something else than a temperature
+        warn_user(str(error), "temperatures")
+    return temperatures, frequencies

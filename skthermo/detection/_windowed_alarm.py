@@ -86,6 +86,11 @@ class WindowedAlarm(DamageDetector):
     as unlikely in a full window of independent records, by the binomial law. The first windows of a series are
     shorter than the others: a call does not remember the records of the last one.
 
+    References
+    ----------
+    Crosier, Multivariate generalizations of cumulative sum quality-control schemes, Technometrics 30 (1988) 291-303
+    [Cro88]_, for "cusum".
+
     Examples
     --------
     >>> from skthermo.datasets import make_truss_campaign

@@ -14,7 +14,7 @@ from skthermo.fem._theta import check_theta
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
-from skthermo.fem.external import CallableModel, load_affine, probe
+from skthermo.fem.external import CallableModel, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
 from skthermo.fem.sampling import add_noise, check_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 
@@ -50,6 +50,7 @@ __all__ = [
     "mac",
     "match_modes",
     "probe",
+    "read_triplets",
     "sample",
     "shape_components",
     "shape_jacobian",

@@ -2,7 +2,7 @@
 
 import operator
 from numbers import Real
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ----------
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the healthy structure that are not in the baseline; NaN is
-        ignored. `MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
+        ignored. `~skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
         of that.
     threshold : float
         A damage index above it is an alarm.
@@ -97,6 +97,11 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
         If lengths differ, a severity is not finite, is 1 or more or occurs twice, severities are not all positive
         or all negative, or a probability is not between 0 and 1.
 
+    References
+    ----------
+    Kamali, Quqa, Palermo & Marzani, An approach to define the minimum detectable damage and the alarm thresholds in
+    vibration-based SHM systems, Journal of Physics: Conference Series 2647 (2024) 182008 [KQP24]_.
+
     Examples
     --------
     >>> from skthermo.metrics import minimum_detectable_damage
@@ -127,6 +132,10 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     return float(s[descending][reliable][-1]) if reliable.any() else float("nan")
 
 
+@overload
+def time_to_detection(damage_index: pd.Series, threshold: float, onset: Any = None) -> Any: ...
+@overload
+def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = None) -> float: ...
 def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = None) -> Any:
     """Time from the onset of damage to the first alarm.
 
@@ -172,7 +181,7 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     return float(alarms[0]) if alarms.size else float("nan")
 
 
-def _start(times: pd.Index, onset: Any) -> Any:
+def _start(times: Any, onset: Any) -> Any:
     """The onset as a time or a position, which is not after the last record."""
     is_time, is_number = isinstance(times, pd.DatetimeIndex), isinstance(onset, Real)
     try:

@@ -15,7 +15,7 @@ AVERAGE = "Average"
 
 
 def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
-    """Mean absolute percentage error of every mode, eq. (19).
+    """Mean absolute percentage error of every mode, equation (19).
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -1,11 +1,11 @@
 """Removes the offset between measured frequencies and those of an FE model."""
 
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
+from sklearn.base import BaseEstimator, OneToOneFeatureMixin
 
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
@@ -13,6 +13,7 @@ from skthermo._models import is_model
 from skthermo._validation import (
     HasMethods,
     StrOptions,
+    TransformerMixin,
     _fit_context,
     check_array,
     check_is_fitted,
@@ -22,7 +23,7 @@ from skthermo._validation import (
 
 
 class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
-    """Move measured frequencies so that their means are the model's frequencies, eq. (22).
+    """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------
@@ -105,6 +106,10 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
                     raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
         return self
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Shift or scale measured frequencies to the reference.
 
@@ -116,6 +121,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Aligned frequencies in Hz.
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False)
@@ -123,6 +129,10 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             return frame_like(X, F / self.mean_ * self.reference_)
         return frame_like(X, F - self.mean_ + self.reference_)
 
+    @overload
+    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Shift or scale the model's frequencies back to the measured ones.
 
@@ -134,6 +144,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Frequencies in the measured domain in Hz.
         """
         check_is_fitted(self)
         if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):

@@ -1,14 +1,22 @@
 """Broken lines: features whose slopes change at knots."""
 
 from numbers import Integral
+from typing import overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 
 from skthermo._frames import frame_like
-from skthermo._validation import Interval, _check_feature_names_in, _fit_context, check_is_fitted, validate_data
+from skthermo._validation import (
+    Interval,
+    TransformerMixin,
+    _check_feature_names_in,
+    _fit_context,
+    check_is_fitted,
+    validate_data,
+)
 
 
 class HingeFeatures(TransformerMixin, BaseEstimator):
@@ -86,6 +94,10 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         self.knots_ = np.nanquantile(values, np.linspace(0, 1, self.n_knots + 2)[1:-1], axis=0)
         return self
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Append the hinges.
 

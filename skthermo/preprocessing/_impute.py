@@ -1,6 +1,6 @@
 """Fills gaps in monitoring records."""
 
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -151,6 +151,10 @@ class KNNGapImputer(KNNImputer):
             self.donors_ = Donors(values)
         return self
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Fill the gaps.
 
@@ -207,6 +211,7 @@ class KNNGapImputer(KNNImputer):
         Returns
         -------
         ndarray of str
+            Names of the columns, indicators included.
         """
         check_is_fitted(self)
         names = list(_check_feature_names_in(self, input_features))

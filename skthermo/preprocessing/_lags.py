@@ -3,17 +3,18 @@
 from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from numbers import Integral
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
     Interval,
     StrOptions,
+    TransformerMixin,
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
@@ -163,6 +164,10 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             self.time_zone_ = _time_zone(stamps)
         return self
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Lagged values, one block of columns for each sensor.
 
@@ -204,6 +209,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
+            Sensor and lag of each column.
         """
         check_is_fitted(self)
         return np.array(self._lag_names(_check_feature_names_in(self, input_features)), dtype=object)

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.utils import Bunch
 
 from skthermo._validation import Interval, _fit_context, check_is_fitted
 from skthermo.preprocessing._assignment import Pairs, close_modes, fitting_pairs
@@ -16,7 +15,7 @@ from skthermo.preprocessing._following import assign_near, assign_while_followin
 from skthermo.preprocessing._poles import Poles, read_poles
 from skthermo.preprocessing._reference_modes import ReferenceModes, read_reference, warn_of_alike
 from skthermo.preprocessing._stamps import as_duration, as_stamps
-from skthermo.preprocessing._tracked_modes import tracked_modes
+from skthermo.preprocessing._tracked_modes import TrackedModes, tracked_modes
 from skthermo.preprocessing._tracking_warnings import warn_of_losses, warn_of_unknown_shapes, warn_of_unlike_shapes
 
 
@@ -81,7 +80,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
 
     References
     ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982.
+    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------
@@ -165,7 +164,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         self.frequencies_, self.shapes_, self.mode_names_, self.sensors_ = modes
         return self
 
-    def transform(self, X: Any) -> Bunch:
+    def transform(self, X: Any) -> TrackedModes:
         """Assign poles to modes.
 
         Parameters
@@ -181,6 +180,8 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         Returns
         -------
         Bunch
+            With these attributes:
+
             frequencies : DataFrame of shape (n_records, n_modes)
                 In Hz; NaN where no pole fits.
             damping : DataFrame of shape (n_records, n_modes) or None
@@ -249,6 +250,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         Returns
         -------
         ndarray of str
+            Names of the modes.
         """
         check_is_fitted(self)
         return np.array(self.mode_names_, dtype=object)

@@ -10,7 +10,22 @@ from skthermo.preprocessing._poles import Poles
 from skthermo.preprocessing._reference_modes import ReferenceModes
 
 
-def tracked_modes(poles: Poles, chosen: Pairs, near: Pairs, followed: NDArray, reference: ReferenceModes) -> Bunch:
+class TrackedModes(Bunch):
+    """What `ModeTracker.transform` returns."""
+
+    frequencies: pd.DataFrame
+    damping: pd.DataFrame | None
+    shapes: NDArray | None
+    mac: pd.DataFrame | None
+    poles: pd.DataFrame
+    left_over: pd.Series
+    followed: pd.DataFrame
+    summary: pd.DataFrame
+
+
+def tracked_modes(
+    poles: Poles, chosen: Pairs, near: Pairs, followed: NDArray, reference: ReferenceModes
+) -> TrackedModes:
     """Frequencies, damping ratios, shapes and counts of the chosen pairs of poles and modes.
 
     Parameters
@@ -62,7 +77,7 @@ def tracked_modes(poles: Poles, chosen: Pairs, near: Pairs, followed: NDArray, r
         index=pd.Index(names, name="mode"),
     )
     n_left = np.bincount(poles.record, minlength=n_records) - np.bincount(record, minlength=n_records)
-    return Bunch(
+    return TrackedModes(
         frequencies=frequencies,
         damping=damping,
         shapes=shapes,

@@ -84,7 +84,9 @@ class PODCurve:
 
         Returns
         -------
-        pod, lowest, highest : float or ndarray
+        pod : float or ndarray
+            Probability of detection.
+        lowest, highest : float or ndarray
             Wald bounds on the scale of the logit; each holds the POD at one severity with the curve's confidence. NaN
             where the data determine no finite slope.
 
@@ -193,7 +195,7 @@ def pod_curve(
 
     References
     ----------
-    MIL-HDBK-1823A, Nondestructive evaluation system reliability assessment, US Department of Defense, 2009.
+    MIL-HDBK-1823A, Nondestructive evaluation system reliability assessment, US Department of Defense, 2009 [MIL09]_.
 
     Examples
     --------

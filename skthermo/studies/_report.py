@@ -42,7 +42,7 @@ def report(
     Parameters
     ----------
     study : DetectabilityStudy
-        With the results of `run`.
+        With the results of `DetectabilityStudy.run`.
     path : str or path
         The file; an older one is replaced when the new one is complete.
     identified : IdentifiedDamage, optional

@@ -41,14 +41,14 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
     fem : DataInformedFEM
         Fitted.
     detector : detector
-        `MahalanobisDetector`, another detector of this package, or a pipeline that ends with one or with any of
-        scikit-learn's outlier detectors; a clone is fitted.
+        `~skthermo.detection.MahalanobisDetector`, another detector of this package, or a pipeline that ends with one or
+        with any of scikit-learn's outlier detectors; a clone is fitted.
     scenarios : sequence of Scenario, ProgressiveDamage or UncertainDamage
         With different names; `sweep` makes them for all damage groups and severities.
     n_repeats : int, default=20
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
-        Of the simulated frequencies, as in `DataInformedFEM.simulate`.
+        Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats.
     random_state : int, RandomState or None, default=None
@@ -83,14 +83,15 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
     their number over the design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten
     correlation times in different repeats, to that of independent records. With it, Clopper-Pearson bounds are honest
-    also for rates of 0 and 1 (Korn & Graubard 1998). Measured records are one repeat only; their variance between
+    also for rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between
     blocks of time holds that of the weather, too.
 
     References
     ----------
-    Korn & Graubard, Survey Methodology 24 (1998) 193-201.
+    Korn & Graubard, Confidence intervals for proportions with small expected number of positive counts estimated from
+    survey data, Survey Methodology 24 (1998) 193-201 [KG98]_.
 
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------
@@ -151,7 +152,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             Measured frequencies of the healthy structure, or temperatures and frequencies side by side, which the
             detector learns. It sees the same columns of simulated records. By default the records that the chain was
             fitted on: their frequencies, beside temperatures if a part of the detector has ``targets``, as
-            `TemperatureCompensator`.
+            `~skthermo.detection.TemperatureCompensator`.
         reference : mapping or callable, optional
             Truth to compare with: by name of the scenario, measured frequencies, which may have other rows than T, and
             then temperatures of their own beside them where the detector sees temperatures; or a function of a

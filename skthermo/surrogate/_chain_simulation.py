@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, Matrix, as_floats, as_random_state, real_array
+from skthermo._arrays import Array, MatrixLike, as_floats, as_random_state, real_array
 from skthermo._frames import check_same_rows, frame_like
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
@@ -21,18 +22,42 @@ LARGE_FACTOR = 10.0
 class ChainSimulation:
     """Methods of the chain that simulate records."""
 
+    @overload
+    def simulate(
+        self,
+        X: pd.DataFrame,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> pd.DataFrame: ...
+    @overload
     def simulate(
         self,
         X: ArrayLike,
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
         parameters: Mapping[str, float] | None = None,
-        stiffness: Matrix | ArrayLike | None = None,
-        mass: Matrix | ArrayLike | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
         noise: ArrayLike | Literal["fitted"] = 0.0,
         random_state: int | np.random.RandomState | None = None,
-    ) -> Any:
-        """Frequencies of the structure, healthy or damaged, as monitoring would record them, eq. (8).
+    ) -> Array: ...
+    def simulate(
+        self,
+        X: ArrayLike,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Array | pd.DataFrame:
+        """Frequencies of the structure, healthy or damaged, as monitoring would record them, equation (8).
 
         Parameters
         ----------
@@ -71,6 +96,11 @@ class ChainSimulation:
         -----
         UserWarning
             If a factor is above 10, which may be meant in percent.
+
+        References
+        ----------
+        Politis & Romano, The stationary bootstrap, Journal of the American Statistical Association 89 (1994) 1303-1313
+        [PR94]_, for runs of consecutive residuals.
         """
         check_is_fitted(self)
         changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
@@ -122,8 +152,8 @@ class ChainSimulation:
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
         parameters: Mapping[str, float] | None = None,
-        stiffness: Matrix | ArrayLike | None = None,
-        mass: Matrix | ArrayLike | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
     ) -> Array:
         """Frequencies of other modes than the measured ones, without noise and as the model gives them.
 
@@ -167,8 +197,8 @@ class ChainSimulation:
         X: ArrayLike,
         damage: Mapping[str, float | ArrayLike] | None = None,
         parameters: Mapping[str, float] | None = None,
-        stiffness: Matrix | ArrayLike | None = None,
-        mass: Matrix | ArrayLike | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
     ) -> NDArray[np.float64]:
         """The same in the numerical domain."""
         if stiffness is not None or mass is not None:

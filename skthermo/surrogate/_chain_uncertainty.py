@@ -1,7 +1,7 @@
 """How far to trust the chain: intervals of predictions, realistic noise, weather unlike that of the training rows."""
 
 from numbers import Real
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
@@ -22,6 +22,10 @@ N_FOLDS = 5
 class ChainUncertainty:
     """Methods of the chain that say how far to trust it, and their private steps."""
 
+    @overload
+    def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
+    @overload
+    def predict_interval(self, X: ArrayLike, confidence: float = 0.9) -> tuple[Array, Array]: ...
     def predict_interval(self, X: ArrayLike, confidence: float = 0.9) -> tuple[Any, Any]:
         """Intervals that hold the measured frequencies with a given probability, mode by mode.
 
@@ -34,8 +38,10 @@ class ChainUncertainty:
 
         Returns
         -------
-        lowest, highest : ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz, in the measured domain. Infinite if there are too few training records for the confidence.
+        lowest : ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain; 0 if there are too few training records for the confidence.
+        highest : ndarray or DataFrame of shape (n_samples, n_modes)
+            Likewise; infinite if there are too few.
 
         Raises
         ------
@@ -51,6 +57,11 @@ class ChainUncertainty:
         asked. Records of one structure are not: they are serially correlated, so that the share of a short period that
         is held varies much more than that of independent records, and weather beyond the training range has no
         residuals to learn from: there the interval is widened by the distance (see `applicability`).
+
+        References
+        ----------
+        Lei, G'Sell, Rinaldo, Tibshirani & Wasserman, Distribution-free predictive inference for regression, Journal of
+        the American Statistical Association 113 (2018) 1094-1111 [LGR18]_.
 
         Examples
         --------
@@ -95,6 +106,16 @@ class ChainUncertainty:
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
+    @overload
+    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[False] = False) -> pd.DataFrame: ...
+    @overload
+    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[True]) -> tuple[pd.DataFrame, Array]: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[False] = False) -> Array: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[True]) -> tuple[Array, Array]: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: bool) -> Any: ...
     def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
         """Mean relative residual of the training records in weather like that of each row.
 

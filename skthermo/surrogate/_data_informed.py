@@ -1,7 +1,7 @@
 """The whole chain: temperatures and frequencies in, a thermal FE model out."""
 
 from numbers import Integral, Real
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 import pandas as pd
@@ -105,7 +105,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------
@@ -189,7 +189,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in `report_`: few rows, rows left out, modes that
+            One warning, with counts, for each kind of doubtful data in ``report_``: few rows, rows left out, modes that
             are far from the model's or look swapped, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
@@ -208,8 +208,12 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         self._report(T, F, theta)
         return self
 
+    @overload
+    def estimate_parameters(self, F: pd.DataFrame, shapes: ArrayLike | None = None) -> pd.DataFrame: ...
+    @overload
+    def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> NDArray[np.float64]: ...
     def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> Table:
-        """Parameters behind measured frequencies, eq. (5).
+        """Parameters behind measured frequencies, equation (5).
 
         Parameters
         ----------
@@ -236,8 +240,12 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         theta = as_floats(self.inverse_.transform(inputs))
         return frame_like(F, theta, self.parameter_names_)
 
+    @overload
+    def predict_parameters(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def predict_parameters(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def predict_parameters(self, X: ArrayLike) -> Table:
-        """Parameters at given temperatures, eq. (7).
+        """Parameters at given temperatures, equation (7).
 
         Parameters
         ----------
@@ -252,6 +260,16 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
+    @overload
+    def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
+    @overload
+    def predict(self, X: pd.DataFrame, return_std: Literal[True]) -> tuple[pd.DataFrame, pd.DataFrame]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> NDArray[np.float64]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: bool) -> Any: ...
     def predict(self, X: ArrayLike, return_std: bool = False) -> Table | tuple[Table, Table]:
         """Frequencies of the healthy structure at given temperatures.
 
@@ -288,7 +306,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         -------
         float
             NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
-            `skthermo.metrics.frequency_scorer` always reports their share.
+            `~skthermo.metrics.frequency_scorer` always reports their share.
         """
         check_is_fitted(self)
         check_same_rows(X, y, ("temperatures", "frequencies"))

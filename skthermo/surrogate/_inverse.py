@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping
 from numbers import Integral, Real
+from typing import overload
 
 import numpy as np
 import pandas as pd
 from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
 from skthermo._arrays import Bounds
 from skthermo._frames import frame_like
-from skthermo._validation import HasMethods, Interval, _fit_context
+from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context
 from skthermo.fem import FEModel, check_theta
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._refinement import Refinement
@@ -21,7 +22,7 @@ from skthermo.surrogate._simulator import Simulator
 
 
 class InverseSurrogate(TransformerMixin, SimulatedTraining):
-    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; eqs. (3)-(4).
+    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
 
@@ -50,7 +51,7 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
     dofs : array-like of int of shape (n_sensors,), optional
         Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
         frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
-        Components are real, of any scale and sign; `skthermo.fem.shape_components` makes them of complex shapes.
+        Components are real, of any scale and sign; `~skthermo.fem.shape_components` makes them of complex shapes.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of the measured components of a shape as a share of their root mean square.
     refine : int, optional
@@ -87,6 +88,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
     scores_ : ShapeScores
         With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
+    simulator_ : Simulator
+        If there is a model: it and, with ``reduce``, its reduced model.
+    refinement_ : Refinement
+        If estimates are refined: the model, the box and the prior of the steps.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
@@ -98,6 +103,8 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         Number of parameters.
     parameter_names_ : list of str or None
         Their names: the model's, or those of the frame that `fit` saw.
+    y_is_vector_ : bool
+        Whether `fit` saw one parameter as a vector.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str
@@ -122,7 +129,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Kamali, Mariani, Hadianfard & Marzani, Inverse surrogate model for deterministic structural model updating based on
+    random forest regression, Mechanical Systems and Signal Processing 215 (2024) 111416 [KMH24]_.
 
     Examples
     --------
@@ -241,6 +251,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
             self.scatter_ = self._scatter(X)
         return self
 
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: ArrayLike | None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]: ...
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
         """Fit, and return the parameters of the same records.
 
@@ -259,6 +273,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         """
         return self.fit(X, y if self.model is None else None).transform(X)
 
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Multipliers of the nominal parameters, as `predict` gives them.
 

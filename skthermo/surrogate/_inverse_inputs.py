@@ -1,6 +1,6 @@
 """The part of the inverse surrogate that reads its columns, frequencies and components of shapes, and names them."""
 
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,10 @@ class InverseInputs(MultiplierRegressor):
     n_jobs: int | None
     shape_inputs_: ShapeInputs | None
 
+    @overload
+    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """Frequencies and, with ``dofs``, shapes of given parameters, computed by the FE model.
 

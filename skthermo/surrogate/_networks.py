@@ -64,7 +64,7 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Base of both surrogates: regression of standardised log multipliers on standardised inputs."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
@@ -32,6 +32,14 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
 
     _default_regressor: Callable[[], BaseEstimator]
 
+    @overload
+    def predict(self, X: pd.DataFrame, return_std: bool = False) -> Any: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> Array: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[Array, Array]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: bool) -> Any: ...
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
         """Multipliers of the nominal parameters.
 

@@ -23,6 +23,17 @@ WELL_KNOWN = 0.1
 """Largest relative standard deviation of the estimates of a recommended subset."""
 
 
+class Identifiability(Bunch):
+    """What `identifiability` returns."""
+
+    sensitivity: pd.DataFrame
+    singular_values: Array
+    condition_number: float
+    deviations: pd.Series
+    collinear: list[list[str]]
+    recommended: list[str]
+
+
 def identifiability(
     model: FEModel,
     theta: ArrayLike | None = None,
@@ -30,7 +41,7 @@ def identifiability(
     noise: ArrayLike,
     dofs: ArrayLike | None = None,
     shape_noise: float | None = None,
-) -> Bunch:
+) -> Identifiability:
     """Which parameters measured modes can identify, and how accurately.
 
     Parameters
@@ -44,7 +55,7 @@ def identifiability(
         sqrt(n).
     dofs : array-like of int of shape (n_dofs,), optional
         Degrees of freedom, the first being 0, where mode shapes are measured too. The model needs a method
-        ``local_modes``, as `AffineModel` has.
+        ``local_modes``, as `~skthermo.fem.AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 
@@ -82,8 +93,9 @@ def identifiability(
 
     References
     ----------
-    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3.
-    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2.
+    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3 [Kay93]_.
+
+    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2 [GV13]_.
 
     Examples
     --------
@@ -117,7 +129,7 @@ def identifiability(
     values = np.linalg.svd(rows, compute_uv=False)
     smallest = values[-1] if len(values) == len(names) else 0.0
     ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
-    return Bunch(
+    return Identifiability(
         sensitivity=S,
         singular_values=values,
         condition_number=float(values[0] / smallest) if smallest else np.inf,

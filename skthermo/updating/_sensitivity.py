@@ -24,7 +24,7 @@ def sensitivity(
     method: Literal["exact", "central"] = "exact",
     step: float = 0.01,
 ) -> pd.DataFrame:
-    """Normalised sensitivities of frequencies to parameters, eq. (A.1).
+    """Normalised sensitivities of frequencies to parameters, equation (A.1).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def sensitivity(
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------

@@ -40,7 +40,7 @@ class ModelUpdater(BaseEstimator):
     ----------
     model : FE model
         Measured mode j is column j of its frequencies. To use shapes, it must have ``local_modes``, ``n_dof`` and
-        ``track``, as `AffineModel` has.
+        ``track``, as `~skthermo.fem.AffineModel` has.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
         Box of multipliers that contains 1: a half-width, lowest and highest of each parameter, or a mapping that
         gives one or the other for every parameter.
@@ -107,12 +107,15 @@ class ModelUpdater(BaseEstimator):
 
     References
     ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A.
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
-    Friswell & Mottershead, Finite element model updating in structural dynamics, Kluwer, 1995.
+    Friswell & Mottershead, Finite element model updating in structural dynamics, Kluwer, 1995 [FM95]_.
 
     Möller & Friberg, Updating large finite element models in structural dynamics, AIAA Journal 36 (1998)
-    1861-1868.
+    1861-1868 [MF98]_.
+
+    Liu & Nocedal, On the limited memory BFGS method for large scale optimization, Mathematical Programming 45 (1989)
+    503-528 [LN89]_.
 
     Examples
     --------

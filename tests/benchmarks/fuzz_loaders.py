@@ -105,6 +105,12 @@ def mtx(matrix, **options):
     return written(lambda stream: scipy.io.mmwrite(stream, matrix, **options))
 
 
+def triplets(matrix):
+    half = np.triu(matrix)
+    lines = [f"{i + 1} {j + 1}  {half[i, j]:.13e}" for i, j in zip(*np.nonzero(half), strict=True)]
+    return "\n".join(lines).encode()
+
+
 def sparse_npz(form):
     matrix = getattr(scipy.sparse, f"{form}_array")(matrices()["E_1"])
     return written(lambda stream: scipy.sparse.save_npz(stream, matrix))
@@ -123,6 +129,7 @@ def valid_files():
         "mtx, symmetric": ("folder", "E_1.mtx", mtx(E_1, symmetry="symmetric")),
         "mtx, sparse": ("folder", "E_1.mtx", mtx(scipy.sparse.coo_array(E_1), symmetry="general")),
         "mtx, complex": ("folder", "E_1.mtx", mtx(scipy.sparse.coo_array(E_1 + 0j), symmetry="hermitian")),
+        "sti": ("folder", "E_1.sti", triplets(E_1)),
         "z24, csv": ("z24", "z24.csv", z24_text().encode()),
         "z24, mat": ("z24", "z24.mat", mat(z24_fields())),
         "z24, mat compressed": ("z24", "z24.mat", mat(z24_fields(), compressed=True)),

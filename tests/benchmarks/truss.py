@@ -21,7 +21,7 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
 
-import plot_truss_study as example
+import truss_recipes as example
 
 GROUPS, NOISE, SEVERITIES, HALVED = example.GROUPS, example.NOISE, example.SEVERITIES, example.HALVED
 SCENARIOS = sweep(make_truss(), SEVERITIES, GROUPS)

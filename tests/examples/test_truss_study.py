@@ -1,27 +1,15 @@
-"""The truss study with two seeds: the example's tables, and the benchmark's targets."""
-
-import importlib.util
-from pathlib import Path
+"""The truss study with two seeds: its tables, and the benchmark's targets."""
 
 import numpy as np
 import pytest
 
 from tests.benchmarks.truss import NAMES, SingleRecords, best_theta, detectable, run, summary
+from tests.examples.pages import recipes
 
-pytest.importorskip("matplotlib").use("Agg")
-
-ROOT = Path(__file__).parents[2]
 GROUPS = ["bottom", "top", "diagonal"]
 
 
-def load(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-EXAMPLE = load(ROOT / "examples" / "plot_truss_study.py")
+EXAMPLE = recipes("truss")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +39,7 @@ def test_simulated_years_err_little_more_than_noise(realisations):
 def test_table_3_is_the_studies_mean_beside_the_papers(studies):
     table = EXAMPLE.table_3(studies)
     assert list(table.index) == NAMES + ["Average"]
-    for source in EXAMPLE.SOURCES:
+    for source in EXAMPLE.PAPER_RATES:
         rates = [study.results_.set_index(["source", "scenario"])["rate"].loc[source] for study in studies]
         np.testing.assert_allclose(table[source, "here"].loc[NAMES], 100 * sum(rates).loc[NAMES] / 2, atol=0.006)
         assert (table[source, "lowest"] <= table[source, "here"] + 0.01)[:-1].all()
@@ -71,21 +59,6 @@ def test_minimum_detectable_damage_is_the_papers(studies):
         assert (table[level, "here"] <= table[level, "highest"]).all()
     assert table["POD 90%", "here"].unstack("source").loc[GROUPS, "reference"].tolist() == [20, 30, 20]
     assert (table["", "paper"] <= table["POD 95%", "highest"]).all()
-
-
-def test_all_figures_show_the_study(realisations, studies):
-    figures = EXAMPLE.figures(realisations[0], studies[0])
-    n_panels = {name: len(figure.axes) for name, figure in figures.items()}
-    assert n_panels == {
-        "fig04_baseline": 12,
-        "fig06_parameters": 4,
-        "fig08_verification": 6,
-        "fig09_damage_index": 4,
-        "fig10_bottom_family": 6,
-        "pod_curves": 3,
-    }
-    for figure in figures.values():
-        EXAMPLE.plt.close(figure)
 
 
 def test_single_records_meet_the_targets_of_the_benchmark(tables):
@@ -116,12 +89,3 @@ def test_oracle_recovers_parameters_that_exist():
     theta = np.array([[0.9, 1.1, 1.05, 1.0], [1.2, 0.9, 0.95, 1.0]])
     fitted = best_theta(model, model.frequencies(theta), steps=60)
     np.testing.assert_allclose(fitted[:, :3], theta[:, :3], rtol=0.01)
-
-
-def test_grid_search_example_has_a_truss_that_lags_behind_the_air():
-    example = load(ROOT / "examples" / "plot_grid_search.py")
-    T, F = example.monitoring(n_days=10)
-    assert T.index.equals(F.index)
-    assert len(T) == 240
-    lagged = T["T1"].ewm(halflife=8).mean()
-    assert abs(np.corrcoef(F["f1"], lagged)[0, 1]) > abs(np.corrcoef(F["f1"], T["T1"])[0, 1])

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, Bounds, RandomState
+from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
 from skthermo.fem._theta import check_theta, nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
@@ -22,7 +22,7 @@ from skthermo.fem.affine._reduced import ReducedModel
 from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal import check_supported, count_modes
 
-Terms = Mapping[tuple[str, ...], ArrayLike] | Sequence[tuple[tuple[str, ...], ArrayLike]]
+Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
 
 
 class AffineModel(AffineBase):
@@ -93,7 +93,7 @@ class AffineModel(AffineBase):
     def __init__(
         self,
         stiffness: Terms,
-        mass: ArrayLike | Terms,
+        mass: MatrixLike | Terms,
         *,
         n_modes: int = 6,
         parameter_names: Sequence[str] | None = None,

@@ -5,9 +5,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, Matrix
+from skthermo._arrays import Array, MatrixLike
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import check_different, read_matrix
 
@@ -87,8 +86,8 @@ class Interventions:
 
     def with_added(
         self: Model,
-        stiffness: Matrix | ArrayLike | None = None,
-        mass: Matrix | ArrayLike | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
     ) -> Model:
         """A new model with further stiffness and mass, such as those of a retrofit.
 

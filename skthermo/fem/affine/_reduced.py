@@ -62,7 +62,7 @@ class ReducedModel(AffineBase):
     References
     ----------
     Machiels, Maday, Oliveira, Patera & Rovas, Output bounds for reduced-basis approximations of symmetric
-    positive definite eigenvalue problems, C. R. Acad. Sci. Paris I 331 (2000) 153-158.
+    positive definite eigenvalue problems, C. R. Acad. Sci. Paris I 331 (2000) 153-158 [MMO00]_.
 
     Examples
     --------
@@ -152,6 +152,7 @@ class ReducedModel(AffineBase):
         Returns
         -------
         ReducedModel
+            Of the same full model.
         """
         return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
 

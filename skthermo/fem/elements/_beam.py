@@ -114,7 +114,7 @@ class Beam(PhysicalElement):
 
     References
     ----------
-    Przemieniecki, Theory of Matrix Structural Analysis, McGraw-Hill, 1968, chapters 5 and 11.
+    Przemieniecki, Theory of Matrix Structural Analysis, McGraw-Hill, 1968, chapters 5 and 11 [Prz68]_.
 
     Examples
     --------

@@ -39,7 +39,7 @@ class Membrane(PhysicalElement):
 
     References
     ----------
-    Hughes, The Finite Element Method, Prentice-Hall, 1987, chapters 2 and 3.
+    Hughes, The Finite Element Method, Prentice-Hall, 1987, chapters 2 and 3 [Hug87]_.
 
     Examples
     --------

@@ -3,5 +3,6 @@
 from skthermo.fem.external._callable import CallableModel
 from skthermo.fem.external._exported import load_affine
 from skthermo.fem.external._probe import probe
+from skthermo.fem.external._triplets import read_triplets
 
-__all__ = ["CallableModel", "load_affine", "probe"]
+__all__ = ["CallableModel", "load_affine", "probe", "read_triplets"]

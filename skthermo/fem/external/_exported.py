@@ -43,8 +43,9 @@ def load_affine(
     ----------
     path : str or path-like
         A MATLAB v5 file (``.mat``; ``save -v7`` writes it), a NumPy file (``.npz``) of named arrays, or a
-        folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``) or what
-        `scipy.sparse.save_npz` writes (``.npz``). Matrices are dense or sparse.
+        folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``), what
+        `scipy.sparse.save_npz` writes (``.npz``), or the text of CalculiX (``.sti``, ``.mas``) and SAP2000 (``.TXK``,
+        ``.TXM``), see `read_triplets`. Matrices are dense or sparse.
     stiffness : collection of str, or mapping of str to str or tuple of str, optional
         Names of the matrices that are terms. A mapping also gives the parameters that multiply each matrix, as in
         `AffineModel`: ``()`` for none, ``("E", "A")`` for a product; several matrices may have the same parameter. By
@@ -68,6 +69,7 @@ def load_affine(
     Returns
     -------
     AffineModel
+        With the matrices of the file as its terms.
 
     Raises
     ------
@@ -88,6 +90,7 @@ def load_affine(
     --------
     AffineModel : From matrices in memory.
     probe : From a program that returns matrices.
+    read_triplets : One matrix from the text of CalculiX or SAP2000.
 
     Notes
     -----

@@ -14,7 +14,7 @@ from skthermo.fem.sampling._evaluate import evaluate
 from skthermo.fem.sampling._evaluate_modes import evaluate_modes
 
 if TYPE_CHECKING:
-    from sklearn.utils import Bunch
+    from skthermo.fem.sampling._samples import Samples
 
 
 def sample(
@@ -27,7 +27,7 @@ def sample(
     n_jobs: int | None = None,
     progress: bool | None = None,
     random_state: RandomState = None,
-) -> "Bunch":
+) -> "Samples":
     """Frequencies of an FE model at random parameters.
 
     Parameters
@@ -71,7 +71,7 @@ def sample(
     >>> drawn.theta.shape, drawn.frequencies.shape
     ((100, 4), (100, 6))
     """
-    from sklearn.utils import Bunch  # imported here because scikit-learn imports pandas
+    from skthermo.fem.sampling._samples import Samples  # imported here because scikit-learn imports pandas
 
     check_model(model)
     lowest, highest = check_bounds(bounds, model.parameter_names).T
@@ -81,8 +81,8 @@ def sample(
     theta += lowest
     if dofs is not None:
         frequencies, shapes = evaluate_modes(cast(ModalModel, model), theta, dofs, n_jobs=n_jobs)
-        return Bunch(theta=theta, frequencies=frequencies, shapes=shapes)
-    return Bunch(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
+        return Samples(theta=theta, frequencies=frequencies, shapes=shapes)
+    return Samples(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
 
 
 def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.random.RandomState) -> Array:

@@ -1,0 +1,68 @@
+"""Matrices as CalculiX and SAP2000 write them: half of the entries, a line each."""
+
+import numpy as np
+import pytest
+
+from skthermo.fem import load_affine, read_triplets
+from tests.fem.exported_files import EXPECTED, MATRICES, TERMS, TOTAL, M, N, assert_same
+
+
+def write_half(file, matrix, *, upper=True, heading=""):
+    half = np.triu(matrix) if upper else np.tril(matrix)
+    lines = [f"{i + 1} {j + 1}  {half[i, j]:.17e}" for i, j in zip(*np.nonzero(half), strict=True)]
+    file.write_text(heading + "\n".join(lines))
+    return file
+
+
+@pytest.mark.parametrize("upper", [True, False])
+@pytest.mark.parametrize("heading", ["", "Note: the lower half\n\trow\tcolumn\tvalue\n\n"])
+def test_either_half_is_the_whole_matrix(tmp_path, upper, heading):
+    file = write_half(tmp_path / "bridge.TXK", TOTAL, upper=upper, heading=heading)
+    np.testing.assert_array_equal(read_triplets(file).toarray(), TOTAL)
+
+
+@pytest.mark.parametrize(("stiffness", "mass"), [("sti", "mas"), ("TXK", "TXM")])
+def test_a_folder_of_them_is_a_model(tmp_path, stiffness, mass):
+    for name, matrix in MATRICES.items():
+        write_half(tmp_path / f"{name}.{mass if name == 'M0' else stiffness}", matrix)
+    assert_same(load_affine(tmp_path, n_modes=4), EXPECTED)
+
+
+def test_a_mass_whose_last_rows_are_zero_has_the_size_of_the_stiffness(tmp_path):
+    light = M * (np.arange(N) < 4)
+    for name, matrix in (TERMS | {"M": light}).items():
+        write_half(tmp_path / f"{name}.sti", matrix)
+    assert read_triplets(tmp_path / "M.sti").shape == (4, 4)
+    assert load_affine(tmp_path, n_modes=3).n_dof == N
+
+
+def test_stiffness_and_mass_of_one_job_need_different_names(tmp_path):
+    write_half(tmp_path / "bridge.sti", TOTAL)
+    write_half(tmp_path / "bridge.mas", M)
+    with pytest.raises(ValueError, match=r"holds 'bridge' as \.mas and as \.sti; expected one .*or another name"):
+        load_affine(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "0 numbers in 0 lines; expected three in each"),
+        ("row column value\n", "0 numbers in 0 lines"),
+        ("1 1 2.0\n2 2", "5 numbers in 2 lines; expected three"),
+        ("1 1 2.0\n2 2 x", "'x' is no number"),
+        ("1 1 2.0\n1 2 -1.0\n2 1 -1.0", "entries on both sides of its diagonal"),
+        ("1.5 1 2.0", "rows or columns outside"),
+        ("0 1 2.0", "rows or columns outside"),
+        ("1e300 1 2.0", "rows or columns outside"),
+        ("1000000000 1 2.0", r"it would take \d+ MB of memory"),
+    ],
+)
+def test_errors_name_the_file(tmp_path, text, message):
+    (tmp_path / "bridge.sti").write_text(text)
+    with pytest.raises(ValueError, match=rf"bridge\.sti: not readable as lines of row, column and value .*{message}"):
+        read_triplets(tmp_path / "bridge.sti")
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"bridge\.sti does not exist; expected a text"):
+        read_triplets(tmp_path / "bridge.sti")
