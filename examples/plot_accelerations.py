@@ -76,8 +76,8 @@ right.set(xlabel="frequency (Hz)", ylabel="power spectral density (m²/s³)", ti
 # -------------------
 # Stochastic subspace identification (SSI) fits models of increasing order to the record. The eigenvalues of each are
 # poles: frequency, damping ratio and mode shape. Those of a mode come again at every order and are called stable,
-# spurious ones do not. Four of the sensors serve as references, which saves time and memory. A clustering then joins the
-# stable poles of each mode.
+# spurious ones do not. Four of the sensors serve as references, which saves time and memory. A clustering then joins
+# the stable poles of each mode.
 
 
 def identify(accelerations):
