@@ -28,6 +28,7 @@ templates_path = ["_templates"]
 
 autosummary_generate = True
 autodoc_typehints = "none"
+toc_object_entries_show_parents = "hide"
 numpydoc_show_class_members = False
 
 # Inventories that come with the docs, so that no build needs a network (tools/write_inventories.py).
@@ -65,7 +66,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"skthermo {release}"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
-html_css_files = ["site.css"]
+html_css_files = ["site.css", "api.css"]
 html_js_files = [("mathjax/settings.js", {"priority": 100})]
 mathjax_path = "mathjax/tex-svg.js"
 html_show_sourcelink = False

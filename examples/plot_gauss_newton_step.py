@@ -1,25 +1,21 @@
 """
-A Gauss-Newton step between the stages
-======================================
+A step of your own between the stages
+=====================================
 
 Each stage of the method can be used alone, and you may change its result before the next stage. As an example, the
 inverse surrogate's own refinement is switched off with ``refine=0``; its estimates are improved by one Gauss-Newton
-step on the FE model's frequencies and derivatives, and the temperature mapper learns from the improved parameters. A
-second step changes little: the misfit that is left is noise, and the effect of temperature on zones that cut across the
-model's four parameters.
+step on the FE model's frequencies and derivatives, and the temperature mapper learns from the improved parameters.
 
-You need not do this. By default the surrogate takes such steps itself until they converge, and the mapper learns the
-result in coordinates of frequencies, without the part that the prior keeps back. The last line that is printed compares
-with it.
+You need not do this: by default the surrogate takes such steps itself until they converge. The page shows where your
+own ideas can go.
 
-Run it with ``python examples/plot_gauss_newton_step.py``; the figure goes to the folder ``figures``.
+Run it with ``python examples/plot_gauss_newton_step.py``; it needs :download:`page_recipes.py` beside it. The guide is
+:doc:`/guide/method`.
 """
-
-import argparse
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from page_recipes import command_line, save_figures
 from sklearn.base import clone
 
 from skthermo.datasets import make_truss, make_truss_campaign
@@ -27,9 +23,28 @@ from skthermo.fem import linearise
 from skthermo.plotting import HistoryDisplay
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
-NOISE = 0.002  # of the records, relative
-SCATTER = 0.005  # the same and what the model cannot follow
+options = command_line().parse_args()
+
+# %%
+# The chain, without refinement
+# -----------------------------
+# A year of the truss, measured with 0.2 % noise. The inverse surrogate is a small network that has learned simulated
+# frequencies; its estimates are a first guess.
+
+SCATTER = 0.005  # of the records, and what the model cannot follow
 WIDTH = 0.2
+model = make_truss()
+year = make_truss_campaign(noise=0.002, random_state=0)
+inverse = InverseSurrogate(bounds=WIDTH, noise=SCATTER, refine=0)
+fem = DataInformedFEM(model, inverse=inverse, random_state=0).fit(year.temperatures, year.frequencies)
+theta = fem.estimate_parameters(year.frequencies)
+print(theta.describe().loc[["mean", "std", "min", "max"]].round(3))
+
+# %%
+# One Gauss-Newton step
+# ---------------------
+# :func:`~skthermo.fem.linearise` gives the model's frequencies and their exact derivatives for every row of parameters
+# at once.
 
 
 def gauss_newton_step(model, theta: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
@@ -48,42 +63,49 @@ def gauss_newton_step(model, theta: pd.DataFrame, measured: pd.DataFrame) -> pd.
     return theta * np.exp(steps[:, :, 0])
 
 
+improved = gauss_newton_step(model, theta, year.frequencies)
+twice = gauss_newton_step(model, improved, year.frequencies)
+
+# %%
+# The misfit, row by row
+# ----------------------
+# How far are the model's frequencies from the measured ones, with the parameters before and after?
+
+
 def misfit(model, theta: pd.DataFrame, measured: pd.DataFrame) -> np.ndarray:
     """Relative difference of the model's frequencies from the measured ones in each row, root mean square, in %."""
     return 100 * np.sqrt(((linearise(model, theta)[0] / measured - 1) ** 2).mean(axis=1))
 
 
-def main(figures: Path) -> None:
-    """Fit the chain without refinement, take the step, refit the mapper, and draw the misfit of every record."""
-    model = make_truss()
-    year = make_truss_campaign(noise=NOISE, random_state=0)
-    inverse = InverseSurrogate(bounds=WIDTH, noise=SCATTER, refine=0)
-    fem = DataInformedFEM(model, inverse=inverse, random_state=0).fit(year.temperatures, year.frequencies)
+before, after, again = (misfit(model, parameters, year.frequencies) for parameters in (theta, improved, twice))
+print(f"Misfit of the frequencies, mean of {len(before)} records: {before.mean():.3f} %")
+print(f"After one step: {after.mean():.3f} %; after another: {again.mean():.3f} %")
 
-    theta = fem.estimate_parameters(year.frequencies)
-    improved = gauss_newton_step(model, theta, year.frequencies)
-    twice = gauss_newton_step(model, improved, year.frequencies)
-    mapper = clone(fem.mapper_).fit(year.temperatures, improved)
+histories = {"inverse surrogate": before, "after one Gauss-Newton step": after}
+display = HistoryDisplay.from_predictions(histories, unit="%", kind="points", titles=["misfit of six frequencies"])
+display.axes_[0].set_ylim(bottom=0)
 
-    before, after, again = (misfit(model, parameters, year.frequencies) for parameters in (theta, improved, twice))
-    print(f"Misfit of the frequencies, mean of {len(before)} records: {before.mean():.3f} %")
-    print(f"After one step: {after.mean():.3f} %; after another: {again.mean():.3f} %")
-    later = make_truss_campaign(noise=0.0, random_state=1)
-    for name, fitted in (("estimates", fem.mapper_), ("improved estimates", mapper)):
-        error = misfit(model, fitted.predict(later.temperatures), later.frequencies)
-        print(f"Error over a later year, noise-free, of the mapper fitted to {name}: {error.mean():.3f} %")
-    default = clone(fem).set_params(inverse__refine=None).fit(year.temperatures, year.frequencies)
-    error = misfit(model, default.predict_parameters(later.temperatures), later.frequencies)
-    print(f"The same where the surrogate refines its estimates itself, as by default: {error.mean():.3f} %")
+# %%
+# A second step changes little: the misfit that is left is noise, and the effect of temperature on zones that cut across
+# the model's four parameters.
+#
+# The mapper learns from the improved parameters
+# ----------------------------------------------
+# A later year, noise-free, tells whether this helps. The last line is the chain with its own refinement, the default.
+# It maps temperatures in coordinates of frequencies, without the part of the parameters that the prior keeps back.
 
-    histories = {"inverse surrogate": before, "after one Gauss-Newton step": after}
-    display = HistoryDisplay.from_predictions(histories, unit="%", kind="points", titles=["misfit of six frequencies"])
-    display.axes_[0].set_ylim(bottom=0)
-    figures.mkdir(exist_ok=True, parents=True)
-    display.figure_.savefig(figures / "gauss_newton_step.png", dpi=150)
+mapper = clone(fem.mapper_).fit(year.temperatures, improved)
+default = clone(fem).set_params(inverse__refine=None).fit(year.temperatures, year.frequencies)
+later = make_truss_campaign(noise=0.0, random_state=1)
+predicted = {
+    "mapper fitted to the estimates": fem.mapper_.predict(later.temperatures),
+    "mapper fitted to the improved estimates": mapper.predict(later.temperatures),
+    "chain with its own refinement": default.predict_parameters(later.temperatures),
+}
+for name, parameters in predicted.items():
+    print(f"Error over a later year, {name}: {misfit(model, parameters, later.frequencies).mean():.3f} %")
 
+# %%
+# The same way is open to any other change: what a stage gives is a frame, and the next stage takes any frame.
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figure")
-    main(parser.parse_args().figures)
+save_figures(options.figures)

@@ -1,30 +1,24 @@
 """
-Grid search over the whole chain, and why folds must be contiguous
-==================================================================
+One search over the whole chain
+===============================
 
-Every stage is a scikit-learn estimator, so one ``GridSearchCV`` chooses lags, noise and both
-networks together. The FE simulations do not change with any of these: ``memory`` keeps them,
-and the whole search solves the FE model's Monte Carlo once.
+Every stage is a scikit-learn estimator, so one :class:`~sklearn.model_selection.GridSearchCV` chooses lags, noise and
+the settings of both networks together. The FE simulations do not change with any of these: ``memory`` keeps them, and
+the whole search solves the FE model's Monte Carlo once. The page then shows why the folds of such a search must be
+contiguous.
 
-The data are two months of hourly records. The truss follows the air with thermal inertia (an exponential mean of
-eight hours), which only lagged temperatures can describe, and an effect that no sensor measures, such as moisture or
-traffic, makes its frequencies drift slowly.
-
-**Why random folds flatter lagged features.** Neighbouring hours share 23 of their 24 lagged values and
-almost the same drift. With random folds, every tested hour has such neighbours among
-the training rows, and a model that is flexible enough memorises the hour instead of learning the effect of
-temperature. Contiguous folds test the model on weather that it has not seen, which is its purpose.
-
-Run it with ``python examples/plot_grid_search.py``; the figure goes to the folder ``figures``.
+Run it with ``python examples/plot_grid_search.py``. Here the search has four settings and one month of records; with
+``--full`` it has 24 settings and two months, and takes some four minutes on one core. It needs
+:download:`page_recipes.py` beside it.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from page_recipes import command_line, save_figures
 from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.model_selection import GridSearchCV, KFold, cross_validate
 from sklearn.neural_network import MLPRegressor
@@ -36,9 +30,16 @@ from skthermo.metrics import frequency_scorer
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
-CONTIGUOUS = KFold(4)
-RANDOM = KFold(4, shuffle=True, random_state=0)
-BLUE, ORANGE = "#0072B2", "#D55E00"
+parser = command_line()
+parser.add_argument("--full", action="store_true", help="24 settings and 60 days of records in place of 4 and 30")
+options = parser.parse_args()
+
+# %%
+# Records with inertia
+# --------------------
+# Hourly records. The truss follows the air with thermal inertia (an exponential mean of eight hours), which only lagged
+# temperatures can describe, and an effect that no sensor measures, such as moisture or traffic, makes its frequencies
+# drift slowly.
 
 
 def monitoring(n_days=60, noise=0.005, seed=0):
@@ -54,84 +55,86 @@ def monitoring(n_days=60, noise=0.005, seed=0):
     return air, pd.DataFrame(noisy, index=air.index, columns=year.frequencies.columns)
 
 
-NETWORK = MLPRegressor(alpha=0.5, learning_rate_init=0.003, max_iter=2000)
+T, F = monitoring(60 if options.full else 30)
+fig, (air, mode) = plt.subplots(2, 1, figsize=(9, 4), sharex=True, layout="constrained")
+air.plot(T["T1"][:240])
+air.set_ylabel("air (°C)")
+mode.plot(F["f1"][:240], ".", markersize=3)
+mode.set_ylabel("$f_1$ (Hz)")
+
+# %%
+# The chain as one estimator
+# --------------------------
+# Parts that are given explicitly nest, so that their settings have names such as ``mapper__lagfeatures__lags``.
+
+NETWORK = MLPRegressor(hidden_layer_sizes=(32,), alpha=0.5, learning_rate_init=0.003, max_iter=2000)
+memory = tempfile.TemporaryDirectory()
 
 
-def chain(model, memory, regressor=NETWORK):
-    """Lags, both surrogates and the FE model as one estimator."""
+def chain(regressor=NETWORK):
+    """Lags, both surrogates and the FE model."""
     return DataInformedFEM(
-        model,
-        inverse=InverseSurrogate(regressor=NETWORK, bounds=0.2, n_samples=500, memory=memory),
+        make_truss(),
+        inverse=InverseSurrogate(regressor=NETWORK, bounds=0.2, n_samples=500, memory=memory.name),
         mapper=make_pipeline(LagFeatures(freq="1h"), TemperatureMapper(regressor)),
         random_state=0,
     )
 
 
-GRID = {
-    "mapper__lagfeatures__lags": [1, 6, 24],
-    "inverse__noise": [0.0, 0.005],
-    "inverse__regressor__hidden_layer_sizes": [(32,), (64,)],
-    "mapper__temperaturemapper__regressor__alpha": [0.5, 5.0],
-}
+# %%
+# The search
+# ----------
+# ``frequency_scorer`` gives the error of the predicted frequencies and the share of rows that it could judge. Folds are
+# contiguous: each is a stretch of weather that the model has not seen.
 
+grid = {"mapper__lagfeatures__lags": [1, 24], "mapper__temperaturemapper__regressor__alpha": [0.5, 5.0]}
+if options.full:
+    grid |= {
+        "mapper__lagfeatures__lags": [1, 6, 24],
+        "inverse__noise": [0.0, 0.005],
+        "inverse__regressor__hidden_layer_sizes": [(32,), (64,)],
+    }
+contiguous = KFold(4)
+search = GridSearchCV(chain(), grid, cv=contiguous, scoring=frequency_scorer, refit="neg_mape", n_jobs=2).fit(T, F)
 
-def table_of(search):
-    """Best first: parameters, MAPE in percent and share of rows scored."""
-    results = pd.DataFrame(search.cv_results_)
-    columns = {f"param_{name}": name.split("__")[0] + " " + name.split("__")[-1] for name in GRID}
-    table = results[list(columns)].rename(columns=columns)
-    table["MAPE (%)"] = -results["mean_test_neg_mape"].round(3)
-    table["rows scored (%)"] = (100 * results["mean_test_share_scored"]).round(1)
-    return table.sort_values("MAPE (%)").reset_index(drop=True)
+columns = {f"param_{name}": name.split("__")[0] + " " + name.split("__")[-1] for name in grid}
+results = pd.DataFrame(search.cv_results_).rename(columns=columns)
+table = results[list(columns.values())].assign(
+    **{"MAPE (%)": -results["mean_test_neg_mape"], "rows scored (%)": 100 * results["mean_test_share_scored"]}
+)
+print(table.sort_values("MAPE (%)").head(8).round(3).to_string(index=False))
+simulations = len(list(Path(memory.name).rglob("output.pkl")))
+print(f"\n{len(table)} settings, {contiguous.get_n_splits()} folds, {simulations} Monte Carlo of the FE model")
 
+# %%
+# Lags matter most: without them, the chain cannot know how warm the steel is.
+#
+# Why random folds flatter lagged features
+# ----------------------------------------
+# Neighbouring hours share 23 of their 24 lagged values and almost the same drift. With random folds, every tested hour
+# has such neighbours among the training rows, and a model that is flexible enough memorises the hour instead of
+# learning the effect of temperature. Here extremely randomised trees, which can memorise, are judged by both kinds of
+# folds.
 
-def compare_folds(model, memory, T, F):
-    """MAPE by number of lags for contiguous and random folds, with a regressor that can memorise."""
-    rows = {}
-    for lags in (1, 2, 6, 12, 24):
-        estimator = chain(model, memory, ExtraTreesRegressor(100, min_samples_leaf=2))
-        estimator.set_params(mapper__lagfeatures__lags=lags)
-        rows[lags] = {
-            name: -cross_validate(estimator, T, F, cv=folds, scoring=frequency_scorer)["test_neg_mape"].mean()
-            for name, folds in (("contiguous folds", CONTIGUOUS), ("random folds", RANDOM))
-        }
-    return pd.DataFrame(rows).T.rename_axis("lags")
+folds = {"contiguous folds": contiguous, "random folds": KFold(4, shuffle=True, random_state=0)}
+lags = [1, 6, 24]
+promised = pd.DataFrame(index=pd.Index(lags, name="lags"), columns=list(folds), dtype=float)
+for n in lags:
+    trees = chain(ExtraTreesRegressor(50, min_samples_leaf=2)).set_params(mapper__lagfeatures__lags=n)
+    for name, cv in folds.items():
+        scores = cross_validate(trees, T, F, cv=cv, scoring=frequency_scorer)
+        promised.loc[n, name] = -scores["test_neg_mape"].mean()
+memory.cleanup()
+print(promised.round(3))
 
+fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
+for name, marker in zip(folds, "os", strict=True):
+    ax.plot(promised[name], marker=marker, label=name)
+ax.set(xlabel="lags (hours, the current one included)", ylabel="MAPE of frequencies (%)", xticks=lags)
+ax.legend()
 
-def plot_folds(table):
-    """MAPE over the number of lags."""
-    fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
-    for name, colour, marker in (("contiguous folds", BLUE, "o"), ("random folds", ORANGE, "s")):
-        ax.plot(table.index, table[name], marker=marker, color=colour, label=name)
-    ax.set(xlabel="lags (hours, the current one included)", ylabel="MAPE of frequencies (%)")
-    ax.set_xticks(table.index)
-    ax.legend()
-    return fig
+# %%
+# Random folds promise about half of the error. Only contiguous folds test the model on weather that it has not seen,
+# which is its purpose; :doc:`/guide/validation` says more.
 
-
-def main():
-    parser = argparse.ArgumentParser(description="Grid search over the whole chain.")
-    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figure")
-    options = parser.parse_args()
-
-    T, F = monitoring()
-    model = make_truss()
-    with tempfile.TemporaryDirectory() as memory:
-        search = GridSearchCV(
-            chain(model, memory), GRID, cv=CONTIGUOUS, scoring=frequency_scorer, refit="neg_mape", n_jobs=2
-        ).fit(T, F)
-        simulations = len(list(Path(memory).rglob("output.pkl")))
-        print(f"{len(search.cv_results_['params'])} settings x {CONTIGUOUS.get_n_splits()} contiguous folds, ", end="")
-        print(f"{simulations} Monte Carlo of the FE model\n")
-        print(table_of(search).head(8).to_string(), end="\n\n")
-        folds = compare_folds(model, memory, T, F)
-    print("MAPE (%) that folds promise, with extremely randomised trees as temperature mapper:\n")
-    print(folds.round(3))
-    options.figures.mkdir(parents=True, exist_ok=True)
-    path = options.figures / "grid_search_folds.png"
-    plot_folds(folds).savefig(path, dpi=130)
-    print(f"\nFigure: {path}")
-
-
-if __name__ == "__main__":
-    main()
+save_figures(options.figures)

@@ -7,336 +7,132 @@ temperature mapper M2, from temperatures to these parameters. Seven kinds are co
 a small network, a random forest, a quadratic polynomial, broken lines, a Gaussian process and gradient boosting. The
 small network is M1's default, and broken lines are M2's.
 
-For M1 they learn from simulations of the 28-bar truss and of the bridges KW51 and Z24, without and with noise, and are
-tested on fresh ones, as they are and refined on the FE model. For M2 they learn a year of the truss, a year made up for
-KW51 (season, spells of some days, day and night, frost), and the first four fifths of Z24's healthy records. They are
-tested on what comes later, beside the same regressor from temperatures straight to frequencies, and in weather 20 °C
-beyond all they have seen.
-
-Run it with ``python examples/plot_regressors.py``. The data of Z24 belong to KU Leuven and are not part of this
-package; add the folder or the file that holds them, or set ``SKTHERMO_DATA``. Figures go to the folder ``figures``.
+Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
+its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
+minutes, and :doc:`/guide/regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the file
+that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
+:download:`page_recipes.py` beside it.
 """
 
-import argparse
-import os
-import time
 import warnings
-from collections import namedtuple
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
-from sklearn.ensemble import GradientBoostingRegressor, RandomForestRegressor
-from sklearn.frozen import FrozenEstimator
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-from sklearn.linear_model import RidgeCV
-from sklearn.multioutput import MultiOutputRegressor
-from sklearn.neural_network import MLPRegressor
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer, PolynomialFeatures
+from page_recipes import command_line, save_figures
+from regressors_recipes import (
+    BEYOND,
+    FULL,
+    SMALL,
+    STYLES,
+    averaged,
+    find,
+    fitted_chain,
+    inverse_results,
+    kw51_campaign,
+    limits,
+    mapper_results,
+    regressors,
+    structures,
+    truss_campaign,
+    z24_campaign,
+)
 
-from skthermo.datasets import load_z24, make_kw51, make_truss, make_truss_campaign, make_z24, steel_modulus
-from skthermo.fem import add_noise, evaluate, sample
-from skthermo.metrics import mape
-from skthermo.preprocessing import BiasAligner, HingeFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
-
-NOISES = (0.0, 0.005)
-PENALTIES = np.logspace(-6, 4, 21)
-BEYOND = 20.0  # degrees Celsius
-Z24_FILES = ("z24_monitoring.csv", "z24/z24_monitoring.csv", "z24.mat", "z24/z24.mat")
-STYLES = {
-    "paper's network": ("#0072B2", "o"),
-    "small network": ("#56B4E9", "s"),
-    "random forest": ("#009E73", "^"),
-    "quadratic": ("#D55E00", "D"),
-    "broken lines": ("#CC79A7", "v"),
-    "Gaussian process": ("#E69F00", "P"),
-    "boosting": ("#777777", "X"),
-}
-Size = namedtuple("Size", "simulations fresh days")  # rows to learn M1 from and to test it on; days of made-up weather
-FULL, SMALL = Size(1000, 500, 365), Size(200, 50, 180)
-
-
-class FewRows(GaussianProcessRegressor):
-    """Learns from at most 500 evenly spaced rows, because the time it takes grows with their cube."""
-
-    def fit(self, X, y):
-        step = -(-len(X) // 500)
-        return super().fit(X[::step], y[::step])
-
-
-def quadratic():
-    """A quadratic polynomial with a penalty chosen by cross-validation."""
-    return make_pipeline(PolynomialFeatures(2), RidgeCV(PENALTIES))
-
-
-def regressors(network):
-    """The regressors by name; the surrogates give them standardised inputs and outputs, and logarithms."""
-    kernel = ConstantKernel() * RBF() + WhiteKernel(noise_level_bounds=(1e-8, 10))
-    small = {"alpha": 1.0, "learning_rate_init": 0.003, "max_iter": 2000, "n_iter_no_change": 20}
-    return {
-        "paper's network": paper_network(network),
-        "small network": MLPRegressor(hidden_layer_sizes=(64,), **small),
-        "random forest": RandomForestRegressor(),
-        "quadratic": quadratic(),
-        "broken lines": make_pipeline(HingeFeatures(), RidgeCV(np.logspace(-3, 5, 33))),
-        "Gaussian process": FewRows(kernel),
-        "boosting": MultiOutputRegressor(GradientBoostingRegressor()),
-    }
-
-
-def structures():
-    """FE models by name, the box of each, and the paper's network for its inverse; the bridges are reduced models."""
-    return {
-        "truss": (make_truss(), 0.2, "truss"),
-        "KW51": (make_kw51().reduced(0.3, tol=1e-4, random_state=0), 0.3, "kw51-inverse"),
-        "Z24": (make_z24().reduced([[0.4, 4.0]] * 4, random_state=0), 0.3, "truss"),
-    }
-
-
-def timed(function: Callable, *arguments) -> tuple[Any, float]:
-    """What a function returns, and the seconds that it takes."""
-    start = time.perf_counter()
-    return function(*arguments), time.perf_counter() - start
-
-
-def inverse_results(model, bounds, network, noise, seed, size=SMALL):
-    """Mean absolute error of ln theta in percent, and times, of every regressor as the inverse surrogate."""
-    drawn = sample(model, bounds, size.simulations, random_state=seed)
-    fresh = sample(model, bounds, size.fresh, random_state=1000 + seed)
-    learned = add_noise(drawn.frequencies, noise, random_state=seed)
-    measured = add_noise(fresh.frequencies, noise, random_state=1000 + seed)
-    rows = {}
-    for name, regressor in regressors(network).items():
-        plain = InverseSurrogate(model, regressor, bounds=bounds, noise=noise, refine=0, random_state=seed)
-        _, training = timed(plain.fit, learned, drawn.theta)
-        same = FrozenEstimator(plain.regressor_)
-        refined = InverseSurrogate(model, same, bounds=bounds, noise=noise).fit(learned, drawn.theta)
-        guess, guessing = timed(plain.predict, measured)
-        found, refining = timed(refined.invert, measured)
-        rows[name] = {
-            "error": 100 * np.abs(np.log(guess / fresh.theta)).mean(),
-            "refined": 100 * np.abs(np.log(found.theta / fresh.theta)).mean(),
-            "converged": 100 * found.converged.mean(),
-            "training, s": training,
-            "prediction, ms": 1e6 * guessing / size.fresh,
-            "refined, ms": 1e6 * refining / size.fresh,
-        }
-    return pd.DataFrame(rows).T.rename_axis("regressor")
-
-
-class Campaign(NamedTuple):
-    """Records to learn from and later ones to test on; ``law`` gives the true frequencies at temperatures, if known."""
-
-    model: Any
-    train: tuple[pd.DataFrame, pd.DataFrame]
-    test: tuple[pd.DataFrame, pd.DataFrame]
-    noise: float
-    bounds: float
-    network: str
-    aligner: Any = FunctionTransformer()
-    law: Callable | None = None
-
-
-def truss_campaign(seed, size=SMALL):
-    """A year of the truss, and the clean frequencies of a later year."""
-    year, later = (make_truss_campaign(samples_per_year=size.days, random_state=s) for s in (seed, 1000 + seed))
-    train, test = (year.temperatures, year.frequencies), (later.temperatures, later.clean_frequencies)
-    law = lambda T: year.model.frequencies(steel_modulus(T))  # noqa: E731
-    return Campaign(make_truss(), train, test, noise=0.01, bounds=0.2, network="truss", law=law)
-
-
-def weather(days, seed):
-    """Temperature of the steel every six hours: season, spells of some days, day and night."""
-    random = np.random.default_rng(seed)
-    day = np.arange(4 * days) / 4
-    spell = lfilter([1], [1, -0.95], random.normal(0, 3.5 * np.sqrt(1 - 0.95**2), len(day)))
-    return pd.DataFrame({"steel": 11 - 9 * np.cos(2 * np.pi * day / days) + spell - 4 * np.cos(2 * np.pi * day)})
-
-
-def kw51_parameters(T):
-    """Steel loses 0.04 % of its stiffness per degree; frost adds 0.5 % per degree to the first parameter, E_bot."""
-    temperature = np.asarray(T)[:, :1]
-    theta = np.repeat(1 - 0.0004 * (temperature - 11), 5, axis=1)
-    theta[:, :1] += 0.005 * np.maximum(-temperature, 0)
-    return theta
-
-
-def kw51_campaign(model, seed, size=SMALL):
-    """A year of made-up monitoring of KW51 with 0.15 % noise, and the clean frequencies of a later year."""
-
-    def law(T):
-        return pd.DataFrame(model.frequencies(kw51_parameters(T)), columns=[f"f{i + 1}" for i in range(6)])
-
-    T, later = weather(size.days, seed), weather(size.days, 1000 + seed)
-    F = law(T) * add_noise(np.ones((len(T), 6)), 0.0015, random_state=seed)
-    return Campaign(model, (T, F), (later, law(later)), noise=0.0015, bounds=0.3, network="kw51-mapper", law=law)
-
-
-def z24_campaign(model, file):
-    """The healthy records of Z24, the last fifth of them for the test."""
-    data = load_z24(file)
-    T, F = (frame[data.state == "undamaged"] for frame in (data.temperatures, data.frequencies))
-    n = 4 * len(T) // 5
-    aligner = BiasAligner(model, method="scale")
-    return Campaign(model, (T[:n], F[:n]), (T[n:], F[n:]), noise=0.005, bounds=0.3, network="truss", aligner=aligner)
-
-
-def fitted_chain(campaign, regressor, seed):
-    """The whole chain with a regressor as its M2; M1 refines, so that every M2 learns the same parameters."""
-    inverse = InverseSurrogate(campaign.model, quadratic(), bounds=campaign.bounds, noise=campaign.noise)
-    mapper = TemperatureMapper(regressor)
-    chain = DataInformedFEM(campaign.model, inverse=inverse, mapper=mapper, aligner=campaign.aligner, random_state=seed)
-    return chain.fit(*campaign.train)
-
-
-def fitted_directly(campaign, regressor, seed):
-    """The frequencies at temperatures that the same regressor learns without an FE model."""
-    T, F = campaign.train
-    mapper = TemperatureMapper(regressor, random_state=seed).fit(T, F / F.mean())
-    return lambda T: mapper.predict(T) * F.mean()
-
-
-def beyond(predict, T, sign):
-    """Largest change of a frequency, in percent, from the hottest (or coldest) record to 20 °C beyond it."""
-    record = T.iloc[[int((sign * T.mean(axis=1)).argmax())]]
-    return 100 * np.abs(np.asarray(predict(record + sign * BEYOND)) / np.asarray(predict(record)) - 1).max()
-
-
-def mapper_results(campaign, seed):
-    """Errors in percent, times, and behaviour beyond the data of every regressor as the temperature mapper."""
-    (T, _), (T_test, F_test) = campaign.train, campaign.test
-    rows = {}
-    for name, regressor in regressors(campaign.network).items():
-        predict = fitted_chain(campaign, regressor, seed).predict
-        predict_directly, training = timed(fitted_directly, campaign, regressor, seed)
-        errors = [mape(F_test, p(T_test)).mean() for p in (predict, predict_directly)]
-        rows[name] = {
-            "chain": errors[0],
-            "direct": errors[1],
-            "ratio": errors[0] / errors[1],
-            "training, s": training,
-            "20 °C hotter": beyond(predict, T, 1),
-            "20 °C colder": beyond(predict, T, -1),
-        }
-    return pd.DataFrame(rows).T.rename_axis("regressor")
-
-
-def limits(campaign):
-    """What the results compare with, in percent: the range of the training data and, where it is known, the truth."""
-    (T, F), law = campaign.train, campaign.law
-    spread = 100 * ((F.quantile(0.99) - F.quantile(0.01)) / F.mean()).max()
-    print(f"The middle 98 % of the training records span {spread:.1f} % of the mean in the mode that varies most.")
-    if law is not None:
-        exact = InverseSurrogate(campaign.model, quadratic(), bounds=campaign.bounds, random_state=0).fit()
-        best = exact.transform(campaign.test[1])
-        left = mape(campaign.test[1], evaluate(campaign.model, best)).mean()
-        print(
-            f"The best parameters for each later row would leave an error of {left:.2g} %. 20 °C beyond the data, the"
-        )
-        print(f"truth changes by {beyond(law, T, 1):.1f} % (hotter) and {beyond(law, T, -1):.1f} % (colder).")
-
-
-def averaged(tables):
-    """Mean of the tables of several seeds, and the standard deviation of their first column."""
-    stacked = pd.concat(tables).groupby(level="regressor", sort=False)
-    table = stacked.mean()
-    table.insert(1, "± over seeds", stacked[table.columns[0]].std(ddof=0))
-    return table
+parser = command_line()
+parser.add_argument("data", type=Path, nargs="?", help="file or folder with the data of Z24")
+parser.add_argument("--full", action="store_true", help="as in the guide, about twelve minutes")
+parser.add_argument("--seeds", type=int, help="repetitions to average over (default 1, with --full 5)")
+options = parser.parse_args()
+size, seeds = FULL if options.full else SMALL, range(options.seeds or (5 if options.full else 1))
+warnings.filterwarnings("ignore")  # of optimisers that stop early, and of foreign weather, which is the point here
 
 
 def show(table):
-    print(f"\n{table.to_string(float_format='%.3g')}\n", flush=True)
+    print(table.to_string(float_format="%.3g"), end="\n\n")
 
 
-def plot_inverse(tables):
-    """Error of M1 over training time, as learned and refined."""
-    names = list(dict.fromkeys(name for name, _ in tables))
-    fig, axes = plt.subplots(1, len(names), figsize=(13, 4.6), sharey=True, layout="constrained")
-    for ax, name in zip(axes, names, strict=True):
-        for regressor, row in tables[name, 0.0].iterrows():
-            colour, marker = STYLES[regressor]
-            ax.plot(row["training, s"], row["error"], marker, color=colour, ms=9, label=regressor)
-            ax.plot(row["training, s"], row["refined"], marker, color=colour, ms=9, mfc="none")
-        ax.set(xscale="log", yscale="log", xlabel="training time (s)", title=f"{name}, noise-free")
-        ax.grid(alpha=0.3)
-    axes[0].set_ylabel("mean error of the parameters (%)\nfilled: as learned, hollow: refined")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(STYLES))
-    return fig
+# %%
+# The regressors
+# --------------
+# Bare regressors of scikit-learn; the surrogates standardise inputs and outputs and take logarithms for them.
+#
+# .. literalinclude:: regressors_recipes.py
+#    :pyobject: regressors
+#
+# M1: from frequencies to parameters
+# ----------------------------------
+# M1 learns simulations of the 28-bar truss and of the bridges KW51 and Z24, without and with 0.5 % noise, and is tested
+# on fresh ones. ``error`` is the mean error of the parameters in percent as learned, ``refined`` after steps on the FE
+# model, which are the default.
 
+models, inverse = structures(), {}
+for name, (model, bounds, network) in models.items():
+    for noise in (0.0, 0.005):
+        tables = [inverse_results(model, bounds, network, noise, seed, size) for seed in seeds]
+        inverse[name, noise] = averaged(tables)
+        print(f"M1, {name}, box of {bounds:.0%}, noise {noise:.1%}")
+        show(inverse[name, noise])
 
-def plot_beyond(campaign, seed):
-    """The frequency that frost moves most, over temperature and 20 °C beyond, by every mapper."""
-    T, F = campaign.train
-    lowest, highest = T["steel"].min(), T["steel"].max()
-    grid = pd.DataFrame({"steel": np.linspace(lowest - BEYOND, highest + BEYOND, 121)})
-    truth = campaign.law(grid).to_numpy()
-    mode = int((truth[0] / truth[-1]).argmax())
-    fig, ax = plt.subplots(figsize=(9, 5), layout="constrained")
-    ax.axvspan(lowest, highest, color="#777777", alpha=0.12, lw=0)
-    ax.plot(T["steel"], F.iloc[:, mode], ".", ms=2, color="#bbbbbb", label="training records")
-    ax.plot(grid, truth[:, mode], color="black", lw=2.5, label="true law")
-    for name, regressor in regressors(campaign.network).items():
-        colour, marker = STYLES[name]
-        curve = fitted_chain(campaign, regressor, seed).predict(grid).iloc[:, mode]
-        ax.plot(grid, curve, color=colour, marker=marker, markevery=10, ms=5, lw=1.2, label=name)
-    ax.set(
-        xlabel="temperature of the steel (°C); shaded: the range of the training records", ylabel=f"$f_{mode + 1}$ (Hz)"
-    )
-    ax.legend(ncols=2)
-    return fig
+# %%
+# Without noise, refined estimates are exact whichever regressor made the first guess; with noise, all end at the same
+# estimate. So take one that learns fast. Filled marks below are errors as learned, hollow ones refined.
 
+fig, axes = plt.subplots(1, len(models), figsize=(13, 4.6), sharey=True, layout="constrained")
+for ax, name in zip(axes, models, strict=True):
+    for regressor, row in inverse[name, 0.0].iterrows():
+        colour, marker = STYLES[regressor]
+        ax.plot(row["training, s"], row["error"], marker, color=colour, ms=9, label=regressor)
+        ax.plot(row["training, s"], row["refined"], marker, color=colour, ms=9, mfc="none")
+    ax.set(xscale="log", yscale="log", xlabel="training time (s)", title=f"{name}, noise-free")
+    ax.grid(alpha=0.3)
+axes[0].set_ylabel("mean error of the parameters (%)")
+fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(STYLES))
 
-def find(path):
-    """The file of Z24's data at a path, a file or a folder, or None."""
-    return next((file for file in (path, *(path / name for name in Z24_FILES)) if file.is_file()), None)
+# %%
+# M2: from temperatures to parameters
+# -----------------------------------
+# M2 learns a year of the truss and a year made up for KW51 (season, spells of some days, day and night, frost), and is
+# tested on the year that follows. ``chain`` is the error of the frequencies, ``direct`` that of the same regressor from
+# temperatures straight to frequencies. The last columns have the largest change of a frequency from the hottest
+# (coldest) record to weather 20 °C beyond it.
 
+campaigns = {
+    "truss": lambda seed: truss_campaign(seed, size),
+    "KW51": lambda seed: kw51_campaign(models["KW51"][0], seed, size),
+}
+if options.data:
+    file = find(options.data) or parser.error(f"no Z24 data at {options.data}")
+    campaigns["Z24"] = lambda seed: z24_campaign(models["Z24"][0], file)
+for name, campaign in campaigns.items():
+    print(f"M2, {name}")
+    limits(campaign(0))
+    show(averaged(mapper_results(campaign(seed), seed) for seed in seeds))
 
-def main():
-    parser = argparse.ArgumentParser(description="Regressors for the inverse surrogate and the temperature mapper.")
-    parser.add_argument("data", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"), help="of Z24")
-    parser.add_argument("--seeds", type=int, default=5, help="repetitions to average over (default 5)")
-    parser.add_argument("--small", action="store_true", help="few simulations and records, to see that all works")
-    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
-    options = parser.parse_args()
-    size, seeds = SMALL if options.small else FULL, range(options.seeds)
-    warnings.filterwarnings("ignore")  # of optimisers that stop early, and of foreign weather, which is the point here
+# %%
+# Inside the weather that they have learned, the regressors hardly differ. Beyond it they do: trees stay at their last
+# value, polynomials run away, and broken lines go on straight. The frequency that frost moves most shows it:
 
-    models, inverse = structures(), {}
-    for name, (model, bounds, network) in models.items():
-        for noise in NOISES:
-            seeded = (inverse_results(model, bounds, network, noise, seed, size) for seed in seeds)
-            inverse[name, noise] = averaged(seeded)
-            print(f"M1, {name}, box of {bounds:.0%}, noise {noise:.1%}: mean error of the parameters, as learned and")
-            print("refined, and rows that converged, in %; times for training and for 1000 rows.")
-            show(inverse[name, noise])
+campaign = campaigns["KW51"](0)
+T, F = campaign.train
+lowest, highest = T["steel"].min(), T["steel"].max()
+grid = pd.DataFrame({"steel": np.linspace(lowest - BEYOND, highest + BEYOND, 121)})
+truth = campaign.law(grid).to_numpy()
+mode = int((truth[0] / truth[-1]).argmax())
 
-    makers = {
-        "truss": lambda seed: truss_campaign(seed, size),
-        "KW51": lambda seed: kw51_campaign(models["KW51"][0], seed, size),
-    }
-    if file := options.data and find(Path(options.data)):
-        makers["Z24"] = lambda seed: z24_campaign(models["Z24"][0], file)
-    else:
-        print("No data of Z24: its part of M2 is left out. Pass the file or folder, or set SKTHERMO_DATA.\n")
-    for name, campaign in makers.items():
-        print(f"M2, {name}: error of later frequencies in the chain and directly, change beyond the data, all in %.")
-        limits(campaign(0))
-        show(averaged(mapper_results(campaign(seed), seed) for seed in seeds))
+fig, ax = plt.subplots(figsize=(9, 5), layout="constrained")
+ax.axvspan(lowest, highest, color="#777777", alpha=0.12, lw=0)
+ax.plot(T["steel"], F.iloc[:, mode], ".", ms=2, color="#bbbbbb", label="training records")
+ax.plot(grid, truth[:, mode], color="black", lw=2.5, label="true law")
+for name, regressor in regressors(campaign.network).items():
+    colour, marker = STYLES[name]
+    curve = fitted_chain(campaign, regressor, 0).predict(grid).iloc[:, mode]
+    ax.plot(grid, curve, color=colour, marker=marker, markevery=10, ms=5, lw=1.2, label=name)
+label = "temperature of the steel (°C); shaded: the range of the training records"
+ax.set(xlabel=label, ylabel=f"$f_{mode + 1}$ (Hz)")
+ax.legend(ncols=2)
 
-    options.figures.mkdir(parents=True, exist_ok=True)
-    figures = {"regressors_inverse": plot_inverse(inverse), "regressors_beyond": plot_beyond(makers["KW51"](0), 0)}
-    for name, figure in figures.items():
-        figure.savefig(options.figures / f"{name}.png", dpi=130)
-        plt.close(figure)
-    print("Figures:", *(options.figures / f"{name}.png" for name in figures), sep="\n  ")
+# %%
+# :doc:`/guide/regressors` says which regressor to choose, with means of five seeds.
 
-
-if __name__ == "__main__":
-    main()
+save_figures(options.figures)

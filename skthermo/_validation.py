@@ -77,6 +77,25 @@ def check_array(values: Any, **options: Any) -> Any:
         return sklearn.utils.check_array(with_nan(values), **options)
 
 
+def refuse_times(table: Any) -> None:
+    """Raise an error for a column of times in a frame of pandas or Polars, which would count as numbers or fail later.
+
+    Raises
+    ------
+    ValueError
+        Names the column.
+    """
+    if not (hasattr(table, "columns") and hasattr(table, "dtypes")):
+        return
+    for name, dtype in zip(table.columns, table.dtypes, strict=True):
+        is_time = dtype.is_temporal() if hasattr(dtype, "is_temporal") else getattr(dtype, "kind", "") in ("M", "m")
+        if is_time:
+            raise ValueError(
+                f"column {name!r} holds times; expected numbers, and times as the index of a pandas frame, as by "
+                f"frame.set_index({name!r})"
+            )
+
+
 @contextmanager
 def numbers_expected() -> Iterator[None]:
     """Replace NumPy's conversion error by one that says that a table holds text or complex numbers."""
@@ -91,7 +110,11 @@ def numbers_expected() -> Iterator[None]:
 
 
 def with_nan(X: Any) -> Any:
-    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged."""
+    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
+
+    A column of times is an error.
+    """
+    refuse_times(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
     if isinstance(X, np.ndarray) and X.dtype == object:

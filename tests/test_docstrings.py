@@ -1,13 +1,15 @@
 """Docstrings agree with signatures, and every public name is typed and shown at work."""
 
+import functools
 import importlib
 import inspect
 import pkgutil
+import re
 import typing
 
 import pandas as pd
 import pytest
-from numpydoc.docscrape import FunctionDoc
+from numpydoc.docscrape import ClassDoc, FunctionDoc
 from numpydoc.validate import validate
 
 import skthermo
@@ -16,23 +18,12 @@ from skthermo.fem.sampling._samples import Samples
 
 ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
 
-# Parts of numpydoc's standard that one-line summaries of properties and protocols do not need.
+# Parts of numpydoc's standard that are not asked for.
 NOT_ASKED = {
     "ES01",  # extended summary
     "EX01",  # example: asked of classes and functions below, not of every method
     "SA01",  # see also
-    "SA04",
-    "GL01",  # summary begins on the line of the quotes, as Ruff formats it
-    "RT03",  # a description for every return value: shapes say it
-    "RT04",
-    "RT05",
-    "PR04",  # type of **parameters
-    "PR06",
-    "PR08",  # descriptions may begin with a formula or a lower-case name
-    "PR09",
-    "SS06",  # equation numbers may break the summary's line
     "SS05",  # it takes plural nouns ("Frequencies of ...") for verbs
-    "YD01",
 }
 
 
@@ -43,15 +34,21 @@ def public_objects():
             yield f"{room}.{name}", getattr(module, name)
 
 
+def public_members(thing):
+    """Members of a class and of its bases in skthermo."""
+    ours = [base for base in thing.__mro__[::-1] if base.__module__.startswith("skthermo")]
+    return {name: member for base in ours for name, member in vars(base).items() if not name.startswith("_")}
+
+
 def public_callables():
     """Functions, classes and their methods, those of bases in skthermo included."""
     for name, thing in public_objects():
         if isinstance(thing, type):
             yield name, thing.__init__, thing
-            ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
-            for attribute, member in {k: v for base in ours[::-1] for k, v in vars(base).items()}.items():
-                if inspect.isfunction(member) and not attribute.startswith("_"):
-                    yield f"{name}.{attribute}", member, member
+            for attribute, member in public_members(thing).items():
+                function = getattr(member, "__func__", member)  # of class methods
+                if inspect.isfunction(function):
+                    yield f"{name}.{attribute}", function, function
         elif callable(thing):
             yield name, thing, thing
 
@@ -61,21 +58,15 @@ PROTOCOLS = {name for name, thing in public_objects() if getattr(thing, "_is_pro
 ELEMENT_METHODS = ("dofs", "ends", "stiffness", "mass")
 
 
-def is_contract_of_a_protocol(name):
-    """Methods whose parameters a protocol documents once, for every class that follows it."""
+def is_contract_of_an_element(name):
+    """Methods whose parameters the protocol of elements documents, once for all of them."""
     owner, _, method = name.rpartition(".")
-    return (
-        owner in PROTOCOLS
-        or name in PROTOCOLS
-        or (
-            owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
-        )
-    )
+    return owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
 
 
 @pytest.mark.parametrize(("name", "function", "documented"), CALLABLES, ids=[c[0] for c in CALLABLES])
 def test_documented_parameters_are_the_signatures(name, function, documented):
-    if is_contract_of_a_protocol(name):
+    if is_contract_of_an_element(name) or name in PROTOCOLS:
         assert inspect.getdoc(documented)
         return
     expected = [
@@ -99,21 +90,51 @@ def test_every_public_callable_is_typed(name, function, documented):
     assert function.__name__ == "__init__" or "return" in hints
 
 
-DEFAULTS = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
+def faults(name):
+    return [(code, message) for code, message in validate(name)["errors"] if code not in NOT_ASKED]
 
 
-@pytest.mark.parametrize(("name", "thing"), DEFAULTS, ids=[d[0] for d in DEFAULTS])
+DOCUMENTED = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
+
+
+@pytest.mark.parametrize(("name", "thing"), DOCUMENTED, ids=[d[0] for d in DOCUMENTED])
 def test_docstrings_follow_numpydoc_and_show_an_example(name, thing):
     if name in PROTOCOLS:
         assert "Attributes" in inspect.getdoc(thing)
         return
-    report = validate(name)
-    errors = [(code, message) for code, message in report["errors"] if code not in NOT_ASKED]
-    assert not errors
+    assert not faults(name)
     assert ">>>" in inspect.getdoc(thing), "expected an example that runs"
 
 
-DOCUMENTED_DEFAULTS = [c for c in CALLABLES if not is_contract_of_a_protocol(c[0])]
+METHODS = [c[0] for c in CALLABLES if c[0].count(".") > 2 and not is_contract_of_an_element(c[0])]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_docstrings_of_methods_follow_numpydoc(name):
+    assert not faults(name)
+
+
+CLASSES = [d for d in DOCUMENTED if inspect.isclass(d[1])]
+
+
+@pytest.mark.parametrize(("name", "thing"), CLASSES, ids=[c[0] for c in CLASSES])
+def test_every_public_property_has_a_summary(name, thing):
+    properties = [m for m in public_members(thing).values() if isinstance(m, property | functools.cached_property)]
+    assert all((inspect.getdoc(member) or "").partition("\n")[0].endswith(".") for member in properties)
+
+
+ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
+
+
+@pytest.mark.parametrize(("name", "thing"), CLASSES, ids=[c[0] for c in CLASSES])
+def test_every_fitted_attribute_is_documented(name, thing):
+    ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
+    fitted = {attribute for base in ours for attribute in ASSIGNED.findall(inspect.getsource(base))}
+    documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
+    assert fitted <= documented
+
+
+DOCUMENTED_DEFAULTS = [c for c in CALLABLES if not is_contract_of_an_element(c[0]) and c[0] not in PROTOCOLS]
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,21 @@ def test_estimators_refuse_a_generator_by_name():
         TemperatureMapper(random_state=np.random.default_rng(0)).fit([[1.0], [2.0]], [[1.0], [1.1]])
 
 
+@pytest.mark.parametrize("times", [HOURS, HOURS.tz_localize("UTC"), HOURS - HOURS[0]], ids=["stamps", "zone", "spans"])
+@each_estimator
+def test_a_column_of_times_is_refused_by_name(estimator, times):
+    with pytest.raises(ValueError, match=r"column 'stamp' holds times; expected numbers, .*set_index\('stamp'\)"):
+        estimator.fit(RECORDS.assign(stamp=times))
+
+
+@each_estimator
+def test_a_column_of_times_in_a_polars_frame_is_refused_by_name(estimator):
+    polars = pytest.importorskip("polars")
+    frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
+    with pytest.raises(ValueError, match="column 'stamp' holds times; expected numbers"):
+        estimator.fit(frame.with_columns(polars.Series("stamp", range(60)).cast(polars.Datetime)))
+
+
 # Names and rows
 
 

@@ -19,7 +19,7 @@ KELVIN = 150.0  # no structure gets this hot in degrees Celsius
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
-    """Multiplier of Young's modulus at a temperature, eq. (10).
+    """Multiplier of Young's modulus at a temperature, equation (10).
 
     E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
 
@@ -91,10 +91,12 @@ def make_truss_campaign(
     Returns
     -------
     Bunch
+        With these attributes:
+
         temperatures : DataFrame of shape (n_records, 3)
-            ``T1``..``T3`` in degrees Celsius.
+            ``T1`` to ``T3`` in degrees Celsius.
         frequencies : DataFrame of shape (n_records, 6)
-            ``f1``..``f6`` in Hz, with noise and damage.
+            ``f1`` to ``f6`` in Hz, with noise and damage.
         clean_frequencies : DataFrame of shape (n_records, 6)
             Without noise.
         theta : DataFrame of shape (n_records, 3)

@@ -28,7 +28,7 @@ def kw51_sensors() -> dict[str, int]:
     side, and y or z the direction. On the arch, the numbers 9 and 10, 15 and 16, 21 and 22 lie about a middle of 15.5
     as the deck's numbers 11, 17 and 23 about theirs: the sensors are taken as those above them, at stations 10, 16
     and 22. Side A is the line 0 of the model (y = -6.2 m), and every sensor counts as positive along the model's axes.
-    Check these assumptions by the MAC of measured and computed shapes (`skthermo.fem.match_modes`).
+    Check these assumptions by the MAC of measured and computed shapes (`~skthermo.fem.match_modes`).
     For `load_kw51`, ``[kw51_sensors()[name] for name in data.sensors]`` are the degrees of freedom of the last axis of
     ``shapes``.
 

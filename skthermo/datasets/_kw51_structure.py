@@ -45,8 +45,8 @@ def kw51_structure() -> Structure:
     Returns
     -------
     Structure
-        x along the bridge, y across it from -6.2 to 6.2 m, z upwards. Nodes are ("deck", station, line) and
-        ("arch", station, line), with stations 0 to 32 and lines 0 to 4, of which 0 and 4 carry arches;
+        Its axes are x along the bridge, y across it from -6.2 to 6.2 m, z upwards. Nodes are ("deck", station, line)
+        and ("arch", station, line), with stations 0 to 32 and lines 0 to 4, of which 0 and 4 carry arches;
         ("joint", foot, head, line, "deck" or "arch") is where a brace meets a connection.
 
     See Also

@@ -90,7 +90,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     abutment rx       3e9         N m/rad  z spread over the 8.6 m: 8.6**2 / 12 times as much; ry, rz free
     ================  ==========  =======  =================================================================
 
-    ``tools/fit_z24_constants.py`` found the four fitted constants by `skthermo.updating.ModelUpdater`, with a
+    ``tools/fit_z24_constants.py`` found the four fitted constants by `~skthermo.updating.ModelUpdater`, with a
     weak prior centred on the start values, from the mean frequencies of the healthy records in which all seven
     sensors are above 5 C, so that nothing is frozen.
 

@@ -37,8 +37,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     ----------
     estimator : regressor
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
-        target is fitted once for each), a pipeline with `skthermo.preprocessing.LagFeatures`, or
-        `skthermo.surrogate.DataInformedFEM`.
+        target is fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.
@@ -56,8 +55,8 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Attributes
     ----------
-    estimator_ : regressor
-        Clone of ``estimator``, fitted on all rows that it can take.
+    estimator_, regression_ : regressor
+        Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
     spread_ : object
         Covariance of the residuals by weather, if they are scaled. ``spread_.smoothing`` says over how many records of
         similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -77,17 +76,16 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
 
     Notes
     -----
-    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the
-    noise of the rows it was fitted on, so their residuals are smaller than those of new records, and a
-    threshold set on them gives too many false alarms. `fit_transform` predicts each row by a clone fitted
-    on the other folds, and also fits on all rows for the records to come. A pipeline calls `fit_transform`
-    in its own ``fit``, so ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its
-    threshold on out-of-fold residuals.
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
+    it was fitted on, so their residuals are smaller than those of new records, and a threshold set on them gives too
+    many false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows
+    for the records to come. A pipeline calls `fit_transform` in its own ``fit``, so
+    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its threshold on out-of-fold residuals.
 
-    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be
-    predicted by its neighbours in time, which are nearly the same record. If the baseline holds each season
-    only once, a fold is predicted from other seasons, and its residuals and the threshold become too large.
-    A baseline of several years, or more and shorter folds, avoids this.
+    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be predicted by its
+    neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
+    predicted from other seasons, and its residuals and the threshold become too large. A baseline of several years, or
+    more and shorter folds, avoids this.
 
     A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
     too; an array is passed as an array.
@@ -109,14 +107,14 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
       that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
       the pipeline, and to the rows of X where the estimator is no such pipeline.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
-      estimator of its own, fitted on the rows that have it. Only an
-      estimator with an FE model (``DataInformedFEM``, also at the end of a pipeline or in a search) gets all
-      rows, because its lags need them; it leaves out incomplete rows itself.
-    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to
-      fit the estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
-    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold
-      takes the last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a
-      DatetimeIndex, the rows of another fold shift the lags.
+      estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
+      also at the end of a pipeline or in a search) gets all rows, because its lags need them; it leaves out incomplete
+      rows itself.
+    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to fit the
+      estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
+      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a DatetimeIndex,
+      the rows of another fold shift the lags.
 
     Examples
     --------
@@ -298,6 +296,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
+            Names of the targets.
         """
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]

@@ -86,6 +86,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         Returns
         -------
         dict
+            Values by name.
         """
         return self._get_params("detectors", deep=deep)
 
@@ -100,6 +101,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         Returns
         -------
         FusedDetector
+            This detector.
         """
         return self._set_params("detectors", **params)
 

@@ -24,6 +24,7 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     Returns
     -------
     ndarray of shape (n_parameters, 2)
+        Lowest and highest multipliers.
 
     Raises
     ------
@@ -74,6 +75,7 @@ def check_prior(prior: ArrayLike | Mapping[str, float], parameter_names: Sequenc
     Returns
     -------
     ndarray of shape (n_parameters,)
+        Relative standard deviations.
 
     Raises
     ------

@@ -17,6 +17,7 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int of shape (n_dofs,)
+        The same numbers.
 
     Raises
     ------

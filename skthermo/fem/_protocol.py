@@ -52,7 +52,18 @@ class FEModel(Protocol):
         """Columns of the frequencies."""
 
     def frequencies(self, theta: ArrayLike) -> Array:
-        """Natural frequencies in Hz, (n_samples, n_modes), of theta (n_samples, n_parameters)."""
+        """Natural frequencies.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            In Hz.
+        """
 
 
 class ModalModel(FEModel, Protocol):
@@ -67,7 +78,20 @@ class ModalModel(FEModel, Protocol):
     """
 
     def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
-        """Frequencies, and shapes (n_samples, n_dof, n_modes) of unit modal mass."""
+        """Natural frequencies and mode shapes.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz.
+        shapes : ndarray of shape (n_samples, n_dof, n_modes)
+            With unit modal mass.
+        """
 
 
 class DifferentiableModel(FEModel, Protocol):
@@ -82,7 +106,18 @@ class DifferentiableModel(FEModel, Protocol):
     """
 
     def jacobian(self, theta: ArrayLike) -> Array:
-        """d f / d theta in Hz, (n_samples, n_modes, n_parameters)."""
+        """Derivatives of the frequencies.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_parameters)
+            Derivatives d f / d theta in Hz.
+        """
 
 
 class DamageableModel(FEModel, Protocol):
@@ -103,7 +138,18 @@ class DamageableModel(FEModel, Protocol):
         """The damage groups by name."""
 
     def damaged(self, damage: Mapping[str, float]) -> "DamageableModel":
-        """A new model with the stiffness of each group times (1 - severity)."""
+        """A new model with the stiffness of each group times (1 - severity).
+
+        Parameters
+        ----------
+        damage : mapping of str to float
+            Severity by damage group.
+
+        Returns
+        -------
+        FE model
+            Its columns are the modes of the undamaged model.
+        """
 
 
 class LocalModel(FEModel, Protocol):
@@ -130,7 +176,20 @@ class LocalModel(FEModel, Protocol):
         """Whether a column follows its mode rather than its rank."""
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
-        """`LocalModes` at one theta: the lowest modes; with ``follow``, enough to contain every nominal mode."""
+        """Modes at one theta, with what their derivatives need.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,)
+            Multipliers of the nominal parameters.
+        follow : bool, default=False
+            Whether to compute enough modes to contain every nominal mode, rather than the lowest ones.
+
+        Returns
+        -------
+        LocalModes
+            More modes than ``n_modes``, in ascending order.
+        """
 
 
 class BatchModel(FEModel, Protocol):
@@ -163,7 +222,21 @@ class BatchModel(FEModel, Protocol):
         """Whether several threads may ask it at the same time."""
 
     def quiet(self) -> FEModel:
-        """The same model without warnings."""
+        """The same model without warnings.
+
+        Returns
+        -------
+        FE model
+            For searches that may pass through theta of which it would warn.
+        """
 
     def warn_of(self, theta: Array, frequencies: NDArray) -> None:
-        """Give the model's warnings about a whole table and its solution."""
+        """Give the model's warnings about a whole table and its solution.
+
+        Parameters
+        ----------
+        theta : ndarray of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+        frequencies : ndarray of shape (n_samples, n_modes)
+            Solution in Hz.
+        """

@@ -38,6 +38,7 @@ def check_theta(
     Returns
     -------
     ndarray of shape (n_samples, n_parameters)
+        The multipliers, a vector as one row.
 
     Raises
     ------

@@ -18,7 +18,7 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ----------
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the healthy structure that are not in the baseline; NaN is
-        ignored. `skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
+        ignored. `~skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
         of that.
     threshold : float
         A damage index above it is an alarm.

@@ -15,7 +15,7 @@ AVERAGE = "Average"
 
 
 def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
-    """Mean absolute percentage error of every mode, eq. (19).
+    """Mean absolute percentage error of every mode, equation (19).
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ class PredictionDisplay:
         Parameters
         ----------
         estimator : fitted regressor
-            From temperatures to frequencies, such as `skthermo.surrogate.DataInformedFEM`.
+            From temperatures to frequencies, such as `~skthermo.surrogate.DataInformedFEM`.
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
         y : array-like or DataFrame of shape (n_samples, n_modes)

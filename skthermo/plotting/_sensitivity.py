@@ -89,7 +89,7 @@ class SensitivityDisplay:
         Parameters
         ----------
         sensitivity : DataFrame of shape (n_modes, n_parameters)
-            As `skthermo.updating.sensitivity` gives them.
+            As `~skthermo.updating.sensitivity` gives them.
         label : str, default="normalised sensitivity"
             Label of the colour bar.
         **options : dict

@@ -23,7 +23,7 @@ from skthermo._validation import (
 
 
 class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
-    """Move measured frequencies so that their means are the model's frequencies, eq. (22).
+    """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
     ----------
@@ -121,6 +121,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Aligned frequencies in Hz.
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False)
@@ -143,6 +144,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_modes)
+            Frequencies in the measured domain in Hz.
         """
         check_is_fitted(self)
         if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):

@@ -211,6 +211,7 @@ class KNNGapImputer(KNNImputer):
         Returns
         -------
         ndarray of str
+            Names of the columns, indicators included.
         """
         check_is_fitted(self)
         names = list(_check_feature_names_in(self, input_features))

@@ -209,6 +209,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
+            Sensor and lag of each column.
         """
         check_is_fitted(self)
         return np.array(self._lag_names(_check_feature_names_in(self, input_features)), dtype=object)

@@ -180,6 +180,8 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         Returns
         -------
         Bunch
+            With these attributes:
+
             frequencies : DataFrame of shape (n_records, n_modes)
                 In Hz; NaN where no pole fits.
             damping : DataFrame of shape (n_records, n_modes) or None
@@ -248,6 +250,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         Returns
         -------
         ndarray of str
+            Names of the modes.
         """
         check_is_fitted(self)
         return np.array(self.mode_names_, dtype=object)

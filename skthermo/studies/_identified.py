@@ -107,7 +107,7 @@ class IdentifiedDamage:
 
     @property
     def damage(self) -> dict[str, float]:
-        """Severities of the model's groups that are not 0, for `skthermo.surrogate.DataInformedFEM.simulate`."""
+        """Severities of the model's groups that are not 0, for `~skthermo.surrogate.DataInformedFEM.simulate`."""
         found: dict[str, float] = {}
         for group, severity in self.severities.dropna().items():
             for member in self.members[str(group)]:
@@ -126,6 +126,7 @@ class IdentifiedDamage:
         Returns
         -------
         UncertainDamage
+            A scenario whose severities are drawn from ``draws``.
         """
         return UncertainDamage(name, self.draws)
 

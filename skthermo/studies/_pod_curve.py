@@ -84,7 +84,9 @@ class PODCurve:
 
         Returns
         -------
-        pod, lowest, highest : float or ndarray
+        pod : float or ndarray
+            Probability of detection.
+        lowest, highest : float or ndarray
             Wald bounds on the scale of the logit; each holds the POD at one severity with the curve's confidence. NaN
             where the data determine no finite slope.
 

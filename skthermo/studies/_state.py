@@ -44,7 +44,7 @@ class State(ABC):
         return not self.groups
 
     def changes(self, T: Any, repeat: int = 0) -> dict[str, Any]:
-        """Arguments of `skthermo.surrogate.DataInformedFEM.simulate` that put the structure into this state.
+        """Arguments of `~skthermo.surrogate.DataInformedFEM.simulate` that put the structure into this state.
 
         Parameters
         ----------

@@ -41,14 +41,14 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
     fem : DataInformedFEM
         Fitted.
     detector : detector
-        `skthermo.detection.MahalanobisDetector`, another detector of this package, or a pipeline that ends with one or
+        `~skthermo.detection.MahalanobisDetector`, another detector of this package, or a pipeline that ends with one or
         with any of scikit-learn's outlier detectors; a clone is fitted.
     scenarios : sequence of Scenario, ProgressiveDamage or UncertainDamage
         With different names; `sweep` makes them for all damage groups and severities.
     n_repeats : int, default=20
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
-        Of the simulated frequencies, as in `skthermo.surrogate.DataInformedFEM.simulate`.
+        Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats.
     random_state : int, RandomState or None, default=None
@@ -152,7 +152,7 @@ class DetectabilityStudy(StudyCurves, BaseEstimator):
             Measured frequencies of the healthy structure, or temperatures and frequencies side by side, which the
             detector learns. It sees the same columns of simulated records. By default the records that the chain was
             fitted on: their frequencies, beside temperatures if a part of the detector has ``targets``, as
-            `skthermo.detection.TemperatureCompensator`.
+            `~skthermo.detection.TemperatureCompensator`.
         reference : mapping or callable, optional
             Truth to compare with: by name of the scenario, measured frequencies, which may have other rows than T, and
             then temperatures of their own beside them where the detector sees temperatures; or a function of a

@@ -57,7 +57,7 @@ class ChainSimulation:
         noise: ArrayLike | Literal["fitted"] = 0.0,
         random_state: int | np.random.RandomState | None = None,
     ) -> Array | pd.DataFrame:
-        """Frequencies of the structure, healthy or damaged, as monitoring would record them, eq. (8).
+        """Frequencies of the structure, healthy or damaged, as monitoring would record them, equation (8).
 
         Parameters
         ----------

@@ -38,8 +38,10 @@ class ChainUncertainty:
 
         Returns
         -------
-        lowest, highest : ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz, in the measured domain. Infinite if there are too few training records for the confidence.
+        lowest : ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain; 0 if there are too few training records for the confidence.
+        highest : ndarray or DataFrame of shape (n_samples, n_modes)
+            Likewise; infinite if there are too few.
 
         Raises
         ------

@@ -213,7 +213,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
     @overload
     def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> NDArray[np.float64]: ...
     def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> Table:
-        """Parameters behind measured frequencies, eq. (5).
+        """Parameters behind measured frequencies, equation (5).
 
         Parameters
         ----------
@@ -245,7 +245,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
     @overload
     def predict_parameters(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def predict_parameters(self, X: ArrayLike) -> Table:
-        """Parameters at given temperatures, eq. (7).
+        """Parameters at given temperatures, equation (7).
 
         Parameters
         ----------
@@ -306,7 +306,7 @@ class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMi
         -------
         float
             NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
-            `skthermo.metrics.frequency_scorer` always reports their share.
+            `~skthermo.metrics.frequency_scorer` always reports their share.
         """
         check_is_fitted(self)
         check_same_rows(X, y, ("temperatures", "frequencies"))

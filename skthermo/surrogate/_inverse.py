@@ -22,7 +22,7 @@ from skthermo.surrogate._simulator import Simulator
 
 
 class InverseSurrogate(TransformerMixin, SimulatedTraining):
-    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; eqs. (3)-(4).
+    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
 
@@ -51,7 +51,7 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
     dofs : array-like of int of shape (n_sensors,), optional
         Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
         frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
-        Components are real, of any scale and sign; `skthermo.fem.shape_components` makes them of complex shapes.
+        Components are real, of any scale and sign; `~skthermo.fem.shape_components` makes them of complex shapes.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of the measured components of a shape as a share of their root mean square.
     refine : int, optional
@@ -88,6 +88,10 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
     scores_ : ShapeScores
         With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
+    simulator_ : Simulator
+        If there is a model: it and, with ``reduce``, its reduced model.
+    refinement_ : Refinement
+        If estimates are refined: the model, the box and the prior of the steps.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
@@ -99,6 +103,8 @@ class InverseSurrogate(TransformerMixin, SimulatedTraining):
         Number of parameters.
     parameter_names_ : list of str or None
         Their names: the model's, or those of the frame that `fit` saw.
+    y_is_vector_ : bool
+        Whether `fit` saw one parameter as a vector.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of str

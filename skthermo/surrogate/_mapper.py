@@ -14,7 +14,7 @@ from skthermo.surrogate._regression import MultiplierRegressor
 
 
 class TemperatureMapper(MultiplierRegressor):
-    """Parameters of an FE model from temperatures, eq. (6).
+    """Parameters of an FE model from temperatures, equation (6).
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ class TemperatureMapper(MultiplierRegressor):
         ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data.
         See `paper_network` for the paper's network.
     sensitivities : array-like of shape (n_modes, n_parameters), optional
-        d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change of
-        ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
+        Derivatives d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change
+        of ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
         by damped least squares. `DataInformedFEM` gives those of its model.
     damping : float or array-like of shape (n_parameters,), default=0.0
         What damped least squares adds to the diagonal of sensitivities' sensitivities. It keeps parameters that hardly

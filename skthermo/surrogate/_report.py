@@ -124,7 +124,13 @@ class FitReport:
         return percent
 
     def warnings(self) -> Iterator[tuple[str, str]]:
-        """Warnings about the rows: kind and text of each."""
+        """Warnings about the rows.
+
+        Yields
+        ------
+        kind, text : str
+            What the warning is about, and what it says.
+        """
         n_parameters = len(self.deviations)
         if 2 * self.n_trained < self.n_rows:
             reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())

@@ -55,7 +55,7 @@ def identifiability(
         sqrt(n).
     dofs : array-like of int of shape (n_dofs,), optional
         Degrees of freedom, the first being 0, where mode shapes are measured too. The model needs a method
-        ``local_modes``, as `skthermo.fem.AffineModel` has.
+        ``local_modes``, as `~skthermo.fem.AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 

@@ -24,7 +24,7 @@ def sensitivity(
     method: Literal["exact", "central"] = "exact",
     step: float = 0.01,
 ) -> pd.DataFrame:
-    """Normalised sensitivities of frequencies to parameters, eq. (A.1).
+    """Normalised sensitivities of frequencies to parameters, equation (A.1).
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class ModelUpdater(BaseEstimator):
     ----------
     model : FE model
         Measured mode j is column j of its frequencies. To use shapes, it must have ``local_modes``, ``n_dof`` and
-        ``track``, as `skthermo.fem.AffineModel` has.
+        ``track``, as `~skthermo.fem.AffineModel` has.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
         Box of multipliers that contains 1: a half-width, lowest and highest of each parameter, or a mapping that
         gives one or the other for every parameter.

@@ -1,7 +1,8 @@
-"""Pages of the gallery, run as scripts."""
+"""Pages of the gallery, run as scripts, and the modules beside them."""
 
 import runpy
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -22,3 +23,8 @@ def run(name, *arguments):
     finally:
         sys.argv = before
         matplotlib.pyplot.close("all")
+
+
+def recipes(name):
+    """The module with the functions of some pages."""
+    return import_module(f"{name}_recipes")

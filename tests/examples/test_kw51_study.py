@@ -1,19 +1,14 @@
 """The KW51 study: its records from a file, and what its default chain must show."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from skthermo.datasets import load_kw51, make_kw51_campaign
 from tests.datasets.kw51_file import write_kw51
+from tests.examples.pages import recipes
 
-PATH = Path(__file__).parents[2] / "examples" / "kw51_recipes.py"
-SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
-study = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(study)
+study = recipes("kw51")
 INDEX = {"check_freq": False, "check_index_type": False}  # a file's time stamps have no frequency
 FOURTEEN = [f"f{mode}" for mode in range(1, 15)]
 

@@ -1,17 +1,12 @@
 """The updating of KW51: modes followed, a false match refused."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-pytest.importorskip("matplotlib").use("Agg")
+from skthermo.datasets import make_kw51
+from tests.examples.pages import recipes
 
-PATH = Path(__file__).parents[2] / "examples" / "plot_kw51_updating.py"
-SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
-EXAMPLE = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(EXAMPLE)
+EXAMPLE = recipes("kw51_appendix")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +26,7 @@ def mean_error(updater, when="after"):
 
 def test_the_design_variables_are_those_of_the_model(tracked):
     theta = np.linspace(0.9, 1.1, 11)
-    model = EXAMPLE.make_kw51(list(EXAMPLE.DESIGN))
+    model = make_kw51(list(EXAMPLE.DESIGN))
     for ours, theirs in zip(tracked.matrices(theta), model.matrices(theta), strict=True):
         np.testing.assert_allclose(ours.toarray(), theirs.toarray(), rtol=1e-9)
 

@@ -1,8 +1,5 @@
 """Laws of the study of regressors, at its smallest size."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 from pandas.testing import assert_frame_equal
@@ -10,13 +7,9 @@ from sklearn.base import clone
 
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 from tests.examples.frozen_bridge import frozen_bridge
+from tests.examples.pages import recipes
 
-pytest.importorskip("matplotlib").use("Agg")
-
-PATH = Path(__file__).parents[2] / "examples" / "plot_regressors.py"
-SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
-EXAMPLE = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(EXAMPLE)
+EXAMPLE = recipes("regressors")
 SIZE = EXAMPLE.Size(simulations=100, fresh=20, days=60)
 
 pytestmark = pytest.mark.filterwarnings(

@@ -1,25 +1,15 @@
 """The truss study with two seeds: its tables, and the benchmark's targets."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.benchmarks.truss import NAMES, SingleRecords, best_theta, detectable, run, summary
+from tests.examples.pages import recipes
 
-ROOT = Path(__file__).parents[2]
 GROUPS = ["bottom", "top", "diagonal"]
 
 
-def load(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-EXAMPLE = load(ROOT / "examples" / "truss_recipes.py")
+EXAMPLE = recipes("truss")
 
 
 @pytest.fixture(scope="module")
@@ -99,12 +89,3 @@ def test_oracle_recovers_parameters_that_exist():
     theta = np.array([[0.9, 1.1, 1.05, 1.0], [1.2, 0.9, 0.95, 1.0]])
     fitted = best_theta(model, model.frequencies(theta), steps=60)
     np.testing.assert_allclose(fitted[:, :3], theta[:, :3], rtol=0.01)
-
-
-def test_grid_search_example_has_a_truss_that_lags_behind_the_air():
-    example = load(ROOT / "examples" / "plot_grid_search.py")
-    T, F = example.monitoring(n_days=10)
-    assert T.index.equals(F.index)
-    assert len(T) == 240
-    lagged = T["T1"].ewm(halflife=8).mean()
-    assert abs(np.corrcoef(F["f1"], lagged)[0, 1]) > abs(np.corrcoef(F["f1"], T["T1"])[0, 1])

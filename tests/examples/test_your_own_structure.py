@@ -47,9 +47,7 @@ def test_the_log_has_the_defects_of_a_logger_and_is_read_in_order(page, folder):
 
 def test_updating_finds_the_scale_of_the_log(page):
     found = page["model"].frequencies(np.ones((1, 4)))[0]
-    np.testing.assert_allclose(
-        found, page["F"].mean(), rtol=0.002
-    )  # F: those that teach
+    np.testing.assert_allclose(found, page["F"].mean(), rtol=0.002)  # F: those that teach
     assert page["fem"].report_.left_out.index.tolist() == ["a lag reaches into a gap"]
 
 

@@ -1,13 +1,14 @@
 """The Z24 examples on a bridge that freezes by a known law, on the real one where its data are, and without data."""
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
-from tests.examples.z24 import BRIDGE, DAMAGE, DETECTION
+from tests.examples.pages import recipes, run
+
+Z24, DAMAGE = recipes("z24"), recipes("z24_damage")
 
 pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside"),
@@ -15,7 +16,7 @@ pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
 ]
 
-LINES = [f"broken lines, {label}" for label in DETECTION.SCALES]
+LINES = [f"broken lines, {label}" for label in Z24.SCALES]
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,7 @@ def frozen(tmp_path_factory):
     """The bridge that freezes, as the examples read it."""
     folder = tmp_path_factory.mktemp("z24")
     frozen_bridge().to_csv(folder / "z24_monitoring.csv", index=False)
-    return BRIDGE.Bridge(BRIDGE.find(folder))
+    return Z24.Bridge(Z24.find(folder))
 
 
 def test_the_damage_is_identified_and_its_alarms_are_foretold(frozen):
@@ -34,13 +35,13 @@ def test_the_damage_is_identified_and_its_alarms_are_foretold(frozen):
     assert found.severities.drop(["piers", "soil"]).max() < 0.02
     unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
     assert unexplained.abs().max() < 2
-    table = DAMAGE.simulation_table(frozen, DETECTION.Records.of(frozen), fem, found, LINES, n_repeats=10)
+    table = DAMAGE.simulation_table(frozen, Z24.Records.of(frozen), fem, found, LINES, n_repeats=10)
     found = table.loc["damage found"]
     assert (found["measured"].between(found["lowest"] - 5, found["highest"] + 5)).all()
 
 
 def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
-    ratio = BRIDGE.hold_out_table(frozen)["ratio"]
+    ratio = Z24.hold_out_table(frozen)["ratio"]
     for regressor in ("broken lines", "boosted trees"):
         tracked, by_rank = (ratio[f"{regressor}, chain, {kind}, bounds 0.5"] for kind in ("tracked", "sorted"))
         assert tracked < 1.05
@@ -48,34 +49,30 @@ def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
 
 
 def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
-    records = DETECTION.Records.of(frozen)
-    table = DETECTION.alarm_table(
-        {
-            label: DETECTION.compensate(records, DETECTION.TemperatureMapper(), scale)[0]
-            for label, scale in DETECTION.SCALES.items()
-        }
+    records = Z24.Records.of(frozen)
+    table = Z24.alarm_table(
+        {label: Z24.compensate(records, Z24.TemperatureMapper(), scale)[0] for label, scale in Z24.SCALES.items()}
     )
     assert (table["false alarms"] <= 5).all()
-    assert table["damage found"][DETECTION.WHITENED] > 95
+    assert table["damage found"][Z24.WHITENED] > 95
 
 
 def test_the_parameter_that_was_damaged_falls(frozen):
-    measured, names = DAMAGE.in_parameters(DETECTION.Records.of(frozen))
+    measured, names = DAMAGE.in_parameters(Z24.Records.of(frozen))
     fall = DAMAGE.changes(measured, names).damaged.mean()
     assert fall["piers_soil"] == pytest.approx(-100 * SEVERITY, abs=5)
     assert fall.drop("piers_soil").abs().max() < 5
 
 
-@pytest.mark.parametrize("example", [BRIDGE, DETECTION, DAMAGE])
+@pytest.mark.parametrize("page", ["z24_bridge", "z24_detection", "z24_damage"])
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [([], "No Z24 data at SKTHERMO_DATA, which is not set"), (["no/such/folder"], "No Z24 data at no/such/folder")],
 )
-def test_without_data_it_says_what_to_get_and_where(example, arguments, message, monkeypatch):
+def test_without_data_it_says_what_to_get_and_where(page, arguments, message, monkeypatch):
     monkeypatch.delenv("SKTHERMO_DATA", raising=False)
-    monkeypatch.setattr(sys, "argv", [example.__file__, *arguments])
     with pytest.raises(SystemExit) as left:
-        example.main()
+        run(page, *arguments)
     assert left.value.code.startswith(message)  # to stderr, with status 1
     assert "https://bwk.kuleuven.be/bwm/z24" in left.value.code
 
@@ -84,11 +81,11 @@ def test_without_data_it_says_what_to_get_and_where(example, arguments, message,
 def real():
     if "SKTHERMO_DATA" not in os.environ:
         pytest.skip("SKTHERMO_DATA does not name the folder with z24/z24_monitoring.csv")
-    return BRIDGE.Bridge(BRIDGE.find(Path(os.environ["SKTHERMO_DATA"])))
+    return Z24.Bridge(Z24.find(Path(os.environ["SKTHERMO_DATA"])))
 
 
 def test_the_real_bridge_is_predicted_as_well_as_by_a_direct_regression(real):
-    table = BRIDGE.hold_out_table(real)
+    table = Z24.hold_out_table(real)
     tracked = table.index.str.contains("chain, tracked")
     assert tracked.sum() == 4
     assert (table["ratio"][tracked] < 1.03).all()
@@ -96,15 +93,15 @@ def test_the_real_bridge_is_predicted_as_well_as_by_a_direct_regression(real):
 
 
 def test_the_real_bridges_damage_is_found(real):
-    records = DETECTION.Records.of(real)
+    records = Z24.Records.of(real)
     found = {
-        name: DETECTION.compensate(records, estimator, "local")[0]
-        for name, estimator in (("broken lines", DETECTION.TemperatureMapper()), ("trees", BRIDGE.boosting()))
+        name: Z24.compensate(records, estimator, "local")[0]
+        for name, estimator in (("broken lines", Z24.TemperatureMapper()), ("trees", Z24.boosting()))
     }
-    table = DETECTION.alarm_table(found)
+    table = Z24.alarm_table(found)
     assert (table["false alarms"] <= 3).all()
     assert (table["damage found"] >= 80).all()
-    days = DETECTION.found_by_day({("broken lines", DETECTION.WHITENED): found["broken lines"]}).loc["found"]
+    days = Z24.found_by_day({("broken lines", Z24.WHITENED): found["broken lines"]}).loc["found"]
     assert (days.iloc[2:] == 100).all()
 
 
@@ -113,6 +110,6 @@ def test_the_real_bridges_rates_are_within_the_simulated_band(real):
     unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
     assert unexplained.abs().max() < 2
     assert found.table.loc["soil", "significant"]
-    table = DAMAGE.simulation_table(real, DETECTION.Records.of(real), fem, found, LINES, n_repeats=10)
+    table = DAMAGE.simulation_table(real, Z24.Records.of(real), fem, found, LINES, n_repeats=10)
     found = table.loc["damage found"]
     assert found["measured"].between(found["lowest"], found["highest"]).all()

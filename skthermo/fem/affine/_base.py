@@ -131,7 +131,7 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         Returns
         -------
         ndarray of shape (n_samples, n_modes, n_parameters)
-            d f / d theta in Hz.
+            Derivatives d f / d theta in Hz.
         """
         return self.linearised(theta)[1]
 
@@ -148,7 +148,7 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         frequencies : ndarray of shape (n_samples, n_modes)
             In Hz.
         jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-            d f / d theta in Hz.
+            Derivatives d f / d theta in Hz.
         """
         frequencies, jacobian = self._in_chunks(self._core.linearised, theta)
         return frequencies, jacobian
@@ -197,7 +197,10 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
 
         Returns
         -------
-        stiffness, mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
+        stiffness : scipy.sparse.csc_array of shape (n_dof, n_dof)
+            In N/m.
+        mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
+            In kg.
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
         core = self._full_core

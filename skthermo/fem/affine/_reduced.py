@@ -152,6 +152,7 @@ class ReducedModel(AffineBase):
         Returns
         -------
         ReducedModel
+            Of the same full model.
         """
         return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
 

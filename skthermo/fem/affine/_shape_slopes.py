@@ -43,11 +43,12 @@ class ShapeSlopes:
         frequencies : ndarray of shape (n_samples, n_modes)
             In Hz.
         jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-            d f / d theta in Hz.
+            Derivatives d f / d theta in Hz.
         shapes : ndarray of shape (n_samples, n_dofs, n_modes)
             Of unit modal mass; signs are arbitrary.
         derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
-            d phi / d theta of these shapes. Where eigenvalues repeat, they do not exist and the values are arbitrary.
+            Derivatives d phi / d theta of these shapes. Where eigenvalues repeat, they do not exist and the values are
+            arbitrary.
 
         Raises
         ------

@@ -140,6 +140,7 @@ class Structure:
         Returns
         -------
         AffineModel
+            With the parameters and damage groups asked for.
 
         Raises
         ------

@@ -44,19 +44,73 @@ class Element(Protocol):
         """Names of its nodes."""
 
     def dofs(self, dimension: int) -> list[Dof]:
-        """(node, direction) of every row of the matrices."""
+        """Degrees of freedom of every row of the matrices.
+
+        Parameters
+        ----------
+        dimension : {2, 3}
+            Of the structure.
+
+        Returns
+        -------
+        list of (hashable, str)
+            Node and direction.
+        """
 
     def properties(self) -> Iterator[tuple[str, float, bool]]:
-        """Name, value and whether zero is allowed, of every physical property."""
+        """Physical properties, such as E and A.
+
+        Yields
+        ------
+        name : str
+            Symbol.
+        value : float
+            In SI units.
+        may_be_zero : bool
+            Whether the value 0 is allowed.
+        """
 
     def ends(self, coordinates: Array) -> Array:
-        """Where the element itself has its ends or corners, given its nodes."""
+        """Ends or corners of the element itself.
+
+        Parameters
+        ----------
+        coordinates : ndarray of shape (n_nodes, dimension)
+            Of its nodes in m.
+
+        Returns
+        -------
+        ndarray of shape (n_ends, dimension)
+            In m; the nodes, unless the element begins at an offset from them.
+        """
 
     def stiffness(self, coordinates: Array) -> ByProperties:
-        """Stiffness matrices in N/m, one for each product of properties."""
+        """Stiffness matrices, one for each product of properties.
+
+        Parameters
+        ----------
+        coordinates : ndarray of shape (n_nodes, dimension)
+            Of its nodes in m.
+
+        Returns
+        -------
+        dict of tuple of str to ndarray of shape (n_dofs, n_dofs)
+            In N/m for translations.
+        """
 
     def mass(self, coordinates: Array) -> ByProperties:
-        """Mass matrices in kg, one for each product of properties."""
+        """Mass matrices, one for each product of properties.
+
+        Parameters
+        ----------
+        coordinates : ndarray of shape (n_nodes, dimension)
+            Of its nodes in m.
+
+        Returns
+        -------
+        dict of tuple of str to ndarray of shape (n_dofs, n_dofs)
+            In kg for translations.
+        """
 
 
 class PhysicalElement:
@@ -66,7 +120,17 @@ class PhysicalElement:
     _may_be_zero: tuple[str, ...] = ()
 
     def properties(self) -> Iterator[tuple[str, float, bool]]:
-        """Name, value and whether zero is allowed, of every physical property."""
+        """Physical properties, such as E and A.
+
+        Yields
+        ------
+        name : str
+            Symbol.
+        value : float
+            In SI units.
+        may_be_zero : bool
+            Whether the value 0 is allowed.
+        """
         for name in self._properties:
             yield name, getattr(self, name), name in self._may_be_zero
 

@@ -69,6 +69,7 @@ def load_affine(
     Returns
     -------
     AffineModel
+        With the matrices of the file as its terms.
 
     Raises
     ------

@@ -187,7 +187,7 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     shapes : ndarray of shape (n_dofs, n_modes)
         With unit modal mass; signs are arbitrary.
     derivatives : ndarray of shape (n_dofs, n_modes, n_parameters)
-        d phi / d theta of these shapes.
+        Derivatives d phi / d theta of these shapes.
 
     Raises
     ------

@@ -22,6 +22,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of shape (n_a, n_b)
+        Between 0 and 1.
 
     Raises
     ------

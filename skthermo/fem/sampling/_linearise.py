@@ -37,7 +37,7 @@ def linearise(
     frequencies : ndarray of shape (n_samples, n_modes)
         In Hz; NaN in rows with NaN.
     jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-        d f / d theta in Hz; NaN in rows with NaN.
+        Derivatives d f / d theta in Hz; NaN in rows with NaN.
 
     Raises
     ------

@@ -42,11 +42,11 @@ def linearise_modes(
     frequencies : ndarray of shape (n_samples, n_modes)
         In Hz; NaN in rows with NaN, as are the others.
     jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-        d f / d theta in Hz.
+        Derivatives d f / d theta in Hz.
     shapes : ndarray of shape (n_samples, n_dofs, n_modes)
         As the model scales them; signs are arbitrary.
     derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
-        d phi / d theta of these shapes.
+        Derivatives d phi / d theta of these shapes.
 
     Raises
     ------

@@ -19,6 +19,7 @@ def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of shape (n_modes,)
+        Relative standard deviations.
 
     Raises
     ------

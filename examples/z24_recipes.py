@@ -1,0 +1,175 @@
+"""Records of the Z24 bridge, its model and chain, and tables of alarms; for the pages ``plot_z24_*.py``."""
+
+import os
+import sys
+import warnings
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+from page_recipes import command_line
+from sklearn.ensemble import GradientBoostingRegressor
+from sklearn.multioutput import MultiOutputRegressor
+
+from skthermo.datasets import load_z24, make_z24
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.metrics import mape
+from skthermo.preprocessing import BiasAligner
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+FILES = ("z24_monitoring.csv", "z24/z24_monitoring.csv", "z24.mat", "z24/z24.mat")
+NO_DATA = f"""No Z24 data at {{}}.
+Expected a CSV or MATLAB file as skthermo.datasets.load_z24 describes it, or a folder with one of
+{", ".join(FILES)}. The monitoring data of the Z24 bridge are provided by KU Leuven for
+non-commercial use on request: https://bwk.kuleuven.be/bwm/z24. Pass the path, or set SKTHERMO_DATA."""
+
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#777777"
+MOTIONS = ["vertical", "lateral", "vertical", "torsion"]
+MODES = [f"$f_{i}$ ({kind})" for i, kind in enumerate(MOTIONS, 1)]
+FREQUENCIES = ["f1", "f2", "f3", "f4"]
+PAVEMENT = "TP"
+KINDS = {"baseline": ("healthy, baseline", GREY), "later": ("healthy, hold-out", BLUE), "damaged": ("damaged", ORANGE)}
+PLAIN, WHITENED = "residuals", "residuals whitened by weather"
+SCALES = {PLAIN: None, WHITENED: "local"}
+
+
+def boosting():
+    """The regressor for every input of temperatures."""
+    return MultiOutputRegressor(GradientBoostingRegressor(random_state=0))
+
+
+def bridge_model(track=True):
+    """The bridge's FE model, reduced for all multipliers that frost or damage may need."""
+    return make_z24(track=track).reduced([[0.4, 4.0]] * 4, random_state=0)
+
+
+def chain(model, bounds=0.3, regressor=None):
+    """Default chain, or with another regressor for the mapper; frequencies aligned to the model's by their means.
+
+    The scatter of the measurement, 0.5 %, keeps the inverse from amplifying it.
+    """
+    return DataInformedFEM(
+        model,
+        inverse=InverseSurrogate(model, bounds=bounds, noise=0.005),
+        mapper=TemperatureMapper(regressor),
+        aligner=BiasAligner(model, method="scale"),
+        random_state=0,
+    )
+
+
+def find(path):
+    """The data file at a path; exits with a message if it is missing."""
+    if path is None:
+        sys.exit(NO_DATA.format("SKTHERMO_DATA, which is not set"))
+    for file in (path, *(path / name for name in FILES)):
+        if file.is_file():
+            return file
+    sys.exit(NO_DATA.format(path))
+
+
+class Bridge:
+    """Healthy records to learn from and to test on, and the records after damage began."""
+
+    def __init__(self, file):
+        data = load_z24(file)
+        healthy = (data.state == "undamaged").to_numpy()
+        self.T, self.F = data.temperatures[healthy], data.frequencies[healthy]
+        self.T_damaged, self.F_damaged = data.temperatures[~healthy], data.frequencies[~healthy]
+        self.n_train = 4 * len(self.T) // 5
+
+    def split(self):
+        """Temperatures and frequencies of the first four fifths, and of the last, without shuffling."""
+        n = self.n_train
+        return self.T[:n], self.F[:n], self.T[n:], self.F[n:]
+
+
+def hold_out_table(bridge):
+    """Errors on the last fifth, in percent of the frequency: direct regression, tracked chain, sorted chain.
+
+    The ratio is to the same regressor from temperatures straight to frequencies.
+    """
+    T, F, T_test, F_test = bridge.split()
+    rows = {}
+    for name, regressor in (("broken lines", None), ("boosted trees", boosting())):
+        direct = mape(F_test, TemperatureMapper(regressor).fit(T, F).predict(T_test))
+        rows[f"{name}, T to F"] = [*direct, direct.mean(), 1.0]
+        for track, bounds in ((True, 0.3), (True, 0.5), (False, 0.3), (False, 0.5)):
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "modes change their order")  # which is what sorting is here for
+                warnings.filterwarnings("ignore", ".*rows did not converge")
+                warnings.filterwarnings("ignore", ".* far outside the bounds")
+                fem = chain(bridge_model(track), bounds, regressor).fit(T, F)
+            errors = mape(F_test, fem.predict(T_test))
+            label = f"{name}, chain, {'tracked' if track else 'sorted'}, bounds {bounds}"
+            rows[label] = [*errors, errors.mean(), errors.mean() / direct.mean()]
+    return pd.DataFrame(rows, [*F, "mean", "ratio"]).T.round(3)
+
+
+class Records(NamedTuple):
+    """What a detector learns from, and the healthy and the damaged records that it judges."""
+
+    baseline: pd.DataFrame
+    later: pd.DataFrame
+    damaged: pd.DataFrame
+
+    def each(self, transform, baseline=None):
+        """Records that a transformer makes of them; those of the baseline may be given."""
+        first = transform(self.baseline) if baseline is None else baseline
+        return Records(first, transform(self.later), transform(self.damaged))
+
+    @property
+    def onset(self):
+        """Time of the first damaged record."""
+        return self.damaged.index[0]
+
+    def stream(self):
+        """All records that are judged, in order of time."""
+        return pd.concat([self.later, self.damaged])
+
+    @classmethod
+    def of(cls, bridge):
+        """Temperatures and frequencies side by side."""
+        T, F, T_test, F_test = bridge.split()
+        return cls(T.join(F), T_test.join(F_test), bridge.T_damaged.join(bridge.F_damaged))
+
+
+def compensate(records, estimator, scale=None, cv=None, targets=FREQUENCIES):
+    """Residuals, those of the baseline out of fold, and the compensator."""
+    compensator = TemperatureCompensator(estimator, targets=targets, scale=scale, cv=cv)
+    return records.each(compensator.transform, compensator.fit_transform(records.baseline)), compensator
+
+
+def alarms(detector, frame):
+    """Share of records that raise an alarm, in percent."""
+    return 100 * float((detector.predict(frame) == -1).mean())
+
+
+def alarm_table(inputs, detector=None):
+    """Alarms on healthy hold-out records and on damaged ones, in percent."""
+    rows = {}
+    for label, (baseline, later, damaged) in inputs.items():
+        fitted = (detector or MahalanobisDetector()).fit(baseline)
+        rows[label] = {"false alarms": alarms(fitted, later), "damage found": alarms(fitted, damaged)}
+    return pd.DataFrame(rows).T
+
+
+def found_by_day(inputs):
+    """Number of records on each damaged day, and share of them that raise an alarm, in percent."""
+    baseline, _, damaged = inputs["broken lines", WHITENED]
+    alarm = pd.Series(MahalanobisDetector().fit(baseline).predict(damaged) == -1)
+    days = alarm.groupby(damaged.index.floor("D").strftime("%m-%d"))
+    return pd.DataFrame({"records": days.size(), "found": 100 * days.mean()}).T
+
+
+def plot_kinds(ax, x, y, **style):
+    """Records of the baseline, of the hold-out and after damage, in their colours."""
+    for kind, (label, colour) in KINDS.items():
+        ax.plot(getattr(x, kind), getattr(y, kind), ".", color=colour, label=label, **style)
+
+
+def read_arguments():
+    """The bridge's records, and the folder for figures, from the command line."""
+    parser = command_line()
+    parser.add_argument("data", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"), help="file or folder")
+    options = parser.parse_args()
+    return Bridge(find(options.data and Path(options.data))), options.figures

@@ -1,0 +1,140 @@
+"""Detectors, intervals and surrogates of other packages in this package's chain, on the truss.
+
+    pip install pyod mapie smt
+    OMP_NUM_THREADS=1 python tests/benchmarks/other_tools.py
+
+PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals; MAPIE's split conformal
+intervals of each frequency, calibrated on a second healthy year, beside `predict_interval`; SMT's Kriging beside
+scikit-learn's Gaussian process as inverse surrogate, without refining. What is not installed is left out.
+"""
+
+import argparse
+import importlib
+import time
+import warnings
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.fem import sample
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+CONFIDENCE = 0.9
+
+
+class OneMode(RegressorMixin, BaseEstimator):
+    """One frequency that a fitted chain predicts, as MAPIE takes it."""
+
+    def __init__(self, fem=None, mode=0):
+        self.fem = fem
+        self.mode = mode
+
+    def fit(self, X, y):
+        self.is_fitted_ = True
+        return self
+
+    def predict(self, X):
+        return np.asarray(self.fem.predict(X))[:, self.mode]
+
+
+class Kriging(RegressorMixin, BaseEstimator):
+    """SMT's Kriging with scikit-learn's methods: one surrogate for each output, as SMT recommends."""
+
+    def fit(self, X, y):
+        from smt.surrogate_models import KRG
+
+        self.surrogates_ = []
+        for output in np.transpose(y):
+            surrogate = KRG(print_global=False, n_start=1, seed=0)
+            surrogate.set_training_values(np.asarray(X), output.reshape(-1, 1))
+            surrogate.train()
+            self.surrogates_.append(surrogate)
+        return self
+
+    def predict(self, X):
+        return np.hstack([surrogate.predict_values(np.asarray(X)) for surrogate in self.surrogates_])
+
+
+def records(seed, **damage):
+    """A year of temperatures and frequencies side by side."""
+    year = make_truss_campaign(damage=damage or None, random_state=seed)
+    return year.temperatures.join(year.frequencies), list(year.frequencies)
+
+
+def detectors(seed):
+    """False alarms, and alarms at 10 and 20 % damage of the bottom chord, in percent."""
+    from pyod.models.knn import KNN
+
+    baseline, targets = records(seed)
+    found = {}
+    for name, detector in {"MahalanobisDetector": MahalanobisDetector(), "PyOD's KNN": OutlierDetector(KNN())}.items():
+        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets, scale="global")
+        alarm = make_pipeline(compensator, detector).fit(baseline)
+        for severity in (0.0, 0.1, 0.2):
+            later = records(1000 + seed, **({"bottom": severity} if severity else {}))[0]
+            found[name, f"{severity:.0%} damage"] = 100 * (alarm.predict(later) == -1).mean()
+    return pd.Series(found)
+
+
+def intervals(seed):
+    """Share of a later year's frequencies inside intervals of 90 %, mean over modes, in percent."""
+    from mapie.regression import SplitConformalRegressor
+
+    train, second, later = (make_truss_campaign(random_state=s) for s in (seed, 1000 + seed, 2000 + seed))
+    fem = DataInformedFEM(make_truss(), random_state=0).fit(train.temperatures, train.frequencies)
+    measured = later.frequencies.to_numpy()
+    bounds = [table.to_numpy() for table in fem.predict_interval(later.temperatures, CONFIDENCE)]
+    found = {"predict_interval": bounds}
+    both = []
+    for mode, name in enumerate(train.frequencies):
+        regressor = SplitConformalRegressor(OneMode(fem, mode).fit(None, None), CONFIDENCE, prefit=True)
+        regressor.conformalize(second.temperatures, second.frequencies[name])
+        both.append(regressor.predict_interval(later.temperatures)[1][:, :, 0])
+    found["MAPIE, a second year"] = np.stack(both, axis=2).swapaxes(0, 1)
+    shares = {}
+    for name, (lowest, highest) in found.items():
+        shares[name, "held, %"] = 100 * ((lowest <= measured) & (measured <= highest)).mean()
+        shares[name, "mean width, %"] = 100 * ((highest - lowest) / measured).mean()
+    return pd.Series(shares)
+
+
+def surrogates(seed):
+    """Mean error of ln theta in percent of inverse surrogates that do not refine, and seconds of learning."""
+    importlib.import_module("smt")
+    truss, fresh = make_truss(), sample(make_truss(), 0.2, 500, random_state=1000 + seed)
+    kernel = ConstantKernel() * RBF(np.ones(6)) + WhiteKernel(noise_level_bounds=(1e-8, 10))
+    found = {}
+    for name, regressor in {
+        "SMT's Kriging": Kriging(),
+        "GaussianProcessRegressor": GaussianProcessRegressor(kernel),
+    }.items():
+        start = time.perf_counter()
+        inverse = InverseSurrogate(truss, regressor, bounds=0.2, n_samples=200, refine=0, random_state=seed).fit()
+        found[name, "learning, s"] = time.perf_counter() - start
+        found[name, "error, %"] = 100 * np.abs(np.log(inverse.predict(fresh.frequencies) / fresh.theta)).mean()
+    return pd.Series(found)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=10)
+    options = parser.parse_args()
+    warnings.filterwarnings("ignore")  # of optimisers that stop early
+    for compare in (detectors, intervals, surrogates):
+        print(compare.__doc__)
+        try:
+            found = pd.concat([compare(seed) for seed in range(options.seeds)], axis=1)
+        except ImportError as error:
+            print(f"left out: {error}\n")
+            continue
+        print(f"{found.mean(axis=1).unstack().to_string(float_format='%.3g')}\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()
