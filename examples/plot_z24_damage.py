@@ -175,7 +175,7 @@ print(simulation_table(bridge, records, fem, found).round(1).to_string())
 #    false alarms boosted trees, residuals whitened by weather       1.8        1.8     0.9      2.7
 #    damage found boosted trees, residuals whitened by weather      90.8       88.7    40.2    100.0
 #
-# The bands hold the measured rates of all detectors that see residuals: with simulations alone, one would have chosen
-# the same detector. :doc:`/guide/studies` plans such a study for your own bridge.
+# The bands hold the measured rates of damage found by all detectors that see residuals: simulations alone would have
+# led to the same choice of a detector. :doc:`/guide/studies` plans such a study for your own bridge.
 
 save_figures(folder)
