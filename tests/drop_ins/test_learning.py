@@ -62,6 +62,8 @@ def test_chains_of_trees_predict_and_leave_gaps(trees, name):
     predicted = chain.predict(later.temperatures)
     theta = chain.mapper_.predict(later.temperatures)
     np.testing.assert_array_equal(predicted, chain.model.frequencies(theta))
+    regressor = chain.mapper_.regressor_
+    assert all(part.random_state is not None for part in getattr(regressor, "estimators_", [regressor]))
     assert mape(later.clean_frequencies, predicted).mean() < 0.6
     holed = later.temperatures.copy()
     holed.iloc[3, 1] = np.nan
