@@ -178,9 +178,10 @@ print(table.round(3))
 HistoryDisplay.from_predictions(shown, kind="lines", n_columns=2)
 
 # %%
-# Both chains have the same error within a few thousandths of a percentage point. What is left is not noise: temperature
-# acts on zones of the truss that cut across the four parameters of its FE model. With records of ten minutes, modal
-# analysis adds nothing to it that matters.
+# Both chains have the same error, about 0.3 %. It is not the error of identification: temperature acts on zones of the
+# truss that cut across the four parameters of its FE model, and 61 days are few to learn from. In five years (``--seeds
+# 5``) the mean of the six modes differs by -0.0001 to 0.0016 percentage points. With records of ten minutes, modal
+# analysis costs next to nothing.
 
 rows = [table.loc["mean"]]
 for seed in range(1, options.seeds):
