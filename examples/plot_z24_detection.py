@@ -262,7 +262,7 @@ print(pd.DataFrame(rows).T.to_string())
 plot_indices(
     {
         title: (WindowedAlarm("24h", rule=rule), inputs["broken lines", WHITENED])
-        for rule, title in (("mean", "mean of a day's records"), ("m-of-n", "half of a day's records or more"))
+        for rule, title in (("mean", "mean of a day's records"), ("m-of-n", "half of a day's records"))
     },
     label="damage index of a day",
 )

@@ -1,6 +1,7 @@
 """Records of experiments, clusters, frames and files of other packages."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from skthermo.fem import sample
@@ -72,9 +73,15 @@ def test_polars():
         fem.predict(gaps[["T2", "T1", "T3"]])
 
 
-def test_skops(folder):
+@pytest.mark.parametrize("reduce", [False, True])
+def test_skops(folder, reduce):
     pytest.importorskip("skops")
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-skops")
+    recipe = run_recipe(PAGE, "recipe-records")
+    recipe = run_recipe(PAGE, "recipe-skops", **recipe | {"fem": recipe["fem"].set_params(reduce=reduce)})
     assert all(name.startswith(("skthermo.", "sklearn.")) for name in recipe["types"])
-    expected = recipe["fem"].predict(recipe["later"].temperatures)
-    np.testing.assert_array_equal(recipe["predicted"], expected)
+    fem, saved, weather = recipe["fem"], recipe["saved"], recipe["later"].temperatures
+    pd.testing.assert_frame_equal(recipe["predicted"], fem.predict(weather))
+    pd.testing.assert_frame_equal(saved.parameters_, fem.parameters_)
+    assert repr(saved.report_) == repr(fem.report_)
+    drawn = [one.simulate(weather, damage={"bottom": 0.2}, noise="fitted", random_state=0) for one in (saved, fem)]
+    pd.testing.assert_frame_equal(*drawn)
