@@ -8,9 +8,9 @@ known: from accelerations of one year to an FE model that knows the effect of te
 model with one that learned from the true frequencies. :doc:`/guide/accelerations` is the guide for your own records.
 
 Run it with ``python examples/plot_accelerations.py`` after ``pip install "skthermo[plot,oma]"``; a year takes about a
-minute, and ``--seeds 5`` repeats it for four more. It needs
-:download:`accelerations_recipes.py </../examples/accelerations_recipes.py>` beside it, which simulates the
-accelerations, and :download:`page_recipes.py </../examples/page_recipes.py>`.
+minute, and ``--seeds 5`` repeats it for four more. It needs two files beside it:
+:download:`accelerations_recipes.py` simulates the accelerations, :download:`page_recipes.py` has the options and the
+folder for figures.
 """
 
 import os
@@ -76,7 +76,7 @@ right.set(xlabel="frequency (Hz)", ylabel="power spectral density (m²/s³)", ti
 # -------------------
 # Stochastic subspace identification (SSI) fits models of increasing order to the record. The eigenvalues of each are
 # poles: frequency, damping ratio and mode shape. Those of a mode come again at every order and are called stable,
-# spurious ones do not. Four of the sensors serve as references, which saves half of the time. A clustering then joins
+# spurious ones do not. Four of the sensors serve as references, which saves time and memory. A clustering then joins
 # the stable poles of each mode.
 
 

@@ -42,8 +42,8 @@ for method in ("exact", "central"):
 print(f"largest difference: {(found['exact'] - found['central']).abs().max().max():.1g}")
 
 # %%
-# Table A.3, the paper's beside ours, as maps. The two models were built independently from the same publication. Both
-# say that the arch and the pipes carry the lowest modes and that the mass of the arch lowers them.
+# Table A.3, the paper's beside ours, as maps. In both models the arch and the pipes carry the modes of the arch, whose
+# mass lowers them, and the third mode depends on the bottom of the deck alone.
 
 paper = pd.DataFrame(PAPER_A3, index=MODES).T
 fig, axes = plt.subplots(1, 2, figsize=(8, 7.5), sharey=True, layout="constrained")

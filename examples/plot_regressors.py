@@ -110,8 +110,9 @@ for name, campaign in campaigns.items():
     show(averaged(mapper_results(campaign(seed), seed) for seed in seeds))
 
 # %%
-# Inside the weather that they have learned, the regressors hardly differ. Beyond it they do: trees stay at their last
-# value, polynomials run away, and broken lines go on straight. The frequency that frost moves most shows it:
+# On the truss the regressors hardly differ. On KW51 all errors are below the noise of the records, 0.15 %, and come
+# from how a regressor follows the knee at 0 °C. Beyond the weather that they have learned, they do differ: trees stay
+# at their last value, and broken lines go on straight. The frequency that frost moves most shows it:
 
 campaign = campaigns["KW51"](0)
 T, F = campaign.train

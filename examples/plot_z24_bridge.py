@@ -106,8 +106,8 @@ for ax in display.axes_:
 #    :alt: Four frequencies over the temperature of the pavement: flat above 0 °C, steeply rising below, measured and
 #          predicted
 #
-# In the parameters, frost stiffens all parts of the bridge. ``parameters_`` are estimates from frequencies, with the
-# scatter of single records.
+# In the parameters, frost stiffens the girder, the piers and the soil. ``parameters_`` are estimates from frequencies,
+# with the scatter of single records.
 
 display = FrequencyTemperatureDisplay.from_predictions(
     bridge.T["TP"],

@@ -65,7 +65,7 @@ def poles(accelerations, *, order=None, quick=None, br=20, ref_ind=REFERENCES, m
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--records", type=int, default=15, help="for each setting (default 15)")
+    parser.add_argument("--records", type=int, default=12, help="for each setting (default 12)")
     parser.add_argument("--settings", nargs="+", default=list(SETTINGS), choices=list(SETTINGS))
     options = parser.parse_args()
 

@@ -1,29 +1,17 @@
 """Simulated accelerations have the frequencies, damping and variance of theory; pyOMA-2 finds the modes in them."""
 
 import re
-import sys
 import textwrap
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete, freqz, lfilter, welch
 
 from skthermo.datasets import make_truss, make_truss_campaign
+from tests.examples.pages import EXAMPLES, recipes
 
-ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "examples"))  # which Python does itself for a file that it runs
-
-from accelerations_recipes import (  # noqa: E402
-    DAMPING,
-    FORCE,
-    RATE,
-    SENSOR_NOISE,
-    acceleration_filter,
-    ambient_vibration,
-    modes_below,
-)
-
+simulation = recipes("accelerations")
+DAMPING, FORCE, RATE = simulation.DAMPING, simulation.FORCE, simulation.RATE
 SENSORS = np.linspace(0, 22, 8).astype(int)
 STEP = 1 / RATE
 
@@ -35,22 +23,22 @@ def year():
 
 @pytest.fixture(scope="module")
 def modes(year):
-    return modes_below(year.model, year.theta.iloc[0], RATE / 2)
+    return simulation.modes_below(year.model, year.theta.iloc[0], RATE / 2)
 
 
 @pytest.fixture(scope="module")
 def accelerations(modes):
-    return ambient_vibration(*modes, SENSORS, np.random.default_rng(0))
+    return simulation.ambient_vibration(*modes, SENSORS, np.random.default_rng(0))
 
 
 def impulse_response(frequency, damping=DAMPING, step=STEP, time_constants=10):
     n_samples = int(time_constants / (2 * np.pi * frequency * damping * step))
-    return lfilter(*acceleration_filter(frequency, damping, step), np.eye(1, n_samples)[0])
+    return lfilter(*simulation.acceleration_filter(frequency, damping, step), np.eye(1, n_samples)[0])
 
 
 def one_sided_spectrum(frequency, modes):
     """Spectral density of every sensor by theory, (n_frequencies, n_sensors)."""
-    response = [freqz(*acceleration_filter(f), worN=frequency, fs=RATE)[1] for f in modes[0]]
+    response = [freqz(*simulation.acceleration_filter(f), worN=frequency, fs=RATE)[1] for f in modes[0]]
     transfer = np.einsum("sm,mf,dm->fsd", modes[1][SENSORS], response, modes[1])
     return 2 / RATE * FORCE**2 * (np.abs(transfer) ** 2).sum(axis=2)
 
@@ -66,7 +54,7 @@ def test_modes_are_those_of_the_truth_and_one_more(year, modes):
 @pytest.mark.parametrize("frequency", [0.3, 7.5, 95.0, 127.0])
 @pytest.mark.parametrize("damping", [0.001, 0.01, 0.2])
 def test_the_filter_is_the_mode_with_forces_held(frequency, damping):
-    numerator, denominator = acceleration_filter(frequency, damping)
+    numerator, denominator = simulation.acceleration_filter(frequency, damping)
     omega = 2 * np.pi * frequency
     held = cont2discrete(([1, 0, 0], [1, 2 * damping * omega, omega**2]), STEP, method="zoh")
     np.testing.assert_allclose(denominator, held[1], rtol=1e-9)
@@ -90,9 +78,11 @@ def test_sensors_have_the_variance_and_noise_of_theory(modes, accelerations):
     overlap = np.array([[a[: len(b)] @ b[: len(a)] for a in responses] for b in responses])
     participation = modes[1].T @ modes[1] * overlap
     expected = FORCE**2 * np.einsum("sm,mn,sn->s", modes[1][SENSORS], participation, modes[1][SENSORS])
-    np.testing.assert_allclose(accelerations.var(axis=0), (1 + SENSOR_NOISE**2) * expected, rtol=0.05)
+    np.testing.assert_allclose(accelerations.var(axis=0), (1 + simulation.SENSOR_NOISE**2) * expected, rtol=0.05)
     random = (np.random.default_rng(1) for _ in range(2))
-    clean, noisy = (ambient_vibration(*modes, SENSORS, next(random), n_samples=20_000, noise=n) for n in (0, 0.5))
+    clean, noisy = (
+        simulation.ambient_vibration(*modes, SENSORS, next(random), n_samples=20_000, noise=n) for n in (0, 0.5)
+    )
     np.testing.assert_allclose((noisy - clean).std(axis=0), 0.5 * clean.std(axis=0), rtol=0.02)
 
 
@@ -112,13 +102,13 @@ def test_spectra_peak_at_the_modes_with_the_width_of_their_damping(modes, accele
 def test_vibration_is_stationary_from_the_start(modes):
     lowest = modes[0][:1], modes[1][:, :1]
     random = np.random.default_rng(2)
-    records = [ambient_vibration(*lowest, SENSORS, random, n_samples=512, noise=0)[:, 3] for _ in range(60)]
+    records = [simulation.ambient_vibration(*lowest, SENSORS, random, n_samples=512, noise=0)[:, 3] for _ in range(60)]
     power = np.square(records).mean(axis=0)
     assert power[:256].mean() == pytest.approx(power[256:].mean(), rel=0.15)
 
 
 def guide_code():
-    page = (ROOT / "docs" / "guide" / "accelerations.rst").read_text()
+    page = (EXAMPLES.parent / "docs" / "guide" / "accelerations.rst").read_text()
     blocks = re.findall(r"\.\. code-block:: py\n\n((?:    .*\n|\n)+)", page)
     return [textwrap.dedent(block) for block in blocks]
 
