@@ -14,6 +14,8 @@ takes three to four minutes on two cores, a last table shows what each of the pa
 beside it. The guide is :doc:`/guide/kw51`.
 """
 
+# sphinx_gallery_thumbnail_number = 7
+
 from pathlib import Path
 
 import pandas as pd
