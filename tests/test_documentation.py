@@ -13,6 +13,7 @@ import skthermo
 
 ROOT = Path(__file__).parents[1]
 ADDRESS = "https://raw.githubusercontent.com/skthermo/skthermo/main/"
+FILES = "https://github.com/skthermo/skthermo/blob/main/"
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 API = ROOT / "docs" / "reference" / "api"
@@ -69,9 +70,14 @@ def test_sources_are_listed_and_cited():
     assert sorted(cited) == sorted(listed)
 
 
-def test_images_of_readme_exist():
-    images = re.findall(r"!\[.*?\]\((.*?)\)", (ROOT / "README.md").read_text())
-    assert images
-    for image in images:
-        assert image.startswith(ADDRESS), "a package index shows README without the repository beside it"
-        assert (ROOT / image.removeprefix(ADDRESS)).is_file()
+@pytest.mark.parametrize(("pattern", "address"), [(r"!\[.*?\]\((.*?)\)", ADDRESS), (r"[^!]\[.*?\]\((.*?)\)", FILES)])
+def test_images_and_links_of_readme_exist(pattern, address):
+    targets = re.findall(pattern, (ROOT / "README.md").read_text())
+    assert targets
+    for target in targets:
+        assert target.startswith(address), "a package index shows README without the repository beside it"
+        assert (ROOT / target.removeprefix(address)).is_file()
+
+
+def test_the_citation_is_of_this_version():
+    assert f"\nversion: {skthermo.__version__}\n" in (ROOT / "CITATION.cff").read_text()

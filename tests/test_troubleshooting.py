@@ -18,9 +18,6 @@ ERRORS = "The most common errors"
 HELPER, REPEATED = "_warnings.py", "_warnings_once.py"
 """Files that give the warnings of others."""
 
-CHECKS = {"_compensator.py": "check_temperatures"}
-"""Where the text of a caught error becomes a warning, and what raises that error."""
-
 REPORTS = ["_sentences", "_doubts", "summary", "likely_cause"]
 """Functions whose sentences tell what is doubtful."""
 
@@ -55,7 +52,8 @@ class Source:
 
     def errors(self, within=None):
         """Texts of all errors, or of those that one function raises."""
-        raisers = self.functions[within] if within else [f for group in self.functions.values() for f in group]
+        everywhere = [function for group in self.functions.values() for function in group]
+        raisers = everywhere if within is None else self.functions.get(within, [])
         raised = [(f, node.exc) for f in raisers for node in ast.walk(f) if isinstance(node, ast.Raise)]
         calls = [(f, error) for f, error in raised if isinstance(error, ast.Call) and error.args]
         return {text for function, error in calls for text in self.texts(error.args[0], function)}
@@ -89,6 +87,8 @@ class Source:
                 return self.texts(value, function)
             case ast.Name(id=name):
                 return {text for value in assigned(name, function) for text in self.texts(value, function)} or {ANY}
+            case ast.Call(func=ast.Name(id="str"), args=[ast.Name(id=name)]) if caught(name, function):
+                return {text for checks in caught(name, function) for text in self.errors(checks)}
             case ast.Call(func=ast.Attribute(attr="join"), args=[items]):
                 return self.texts(items, function)
             case ast.Call() if called(node) in self.functions:
@@ -120,6 +120,14 @@ def assigned(name, function):
                 yield from node.args
 
 
+def caught(name, function):
+    """Functions whose errors a function catches under a name."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Try) and name in [handler.name for handler in node.handlers]:
+            return [called(call) for line in node.body for call in ast.walk(line) if isinstance(call, ast.Call)]
+    return []
+
+
 def shortened(text):
     return re.sub(f"{ANY}(\\s*{ANY})+", ANY, text)
 
@@ -132,9 +140,7 @@ def source():
 
 @pytest.fixture(scope="module")
 def warnings_of_the_package(source):
-    found = source.warnings()
-    texts = {text for known in found.values() for text in known or ()}
-    return texts | {text for name in CHECKS.values() for text in source.errors(name)}
+    return {text for known in source.warnings().values() for text in known or ()}
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +188,7 @@ def test_terms_are_long_enough_to_be_found(terms):
 
 def test_the_text_of_every_warning_is_read_from_the_source(source):
     unread = {site.split(":")[0].split("/")[-1] for site, texts in source.warnings().items() if not texts}
-    assert unread == {HELPER, REPEATED, *CHECKS}
+    assert unread == {HELPER, REPEATED}
 
 
 FORMS = """
@@ -204,6 +210,15 @@ def text_of(n):
 def several(n):
     warn_each(text_of(n))
 
+def check(n):
+    raise ValueError(f"row {n} is frozen")
+
+def caught(n):
+    try:
+        check(n)
+    except ValueError as error:
+        warn_user(str(error), "kind")
+
 def hidden(n):
     warn_user(n, "kind")
 """
@@ -216,6 +231,7 @@ def test_a_new_warning_is_found_whatever_form_it_has():
         {"… rows are cold", "… rows are hot"},
         {"row … is dry"},
         {"row … is windy"},
+        {"row … is frozen"},
         None,
     ]
     assert not explains("row … is dry", "… rows are wet")

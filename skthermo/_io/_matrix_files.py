@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse
@@ -66,7 +67,7 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matr
         matrices[file.stem] = _matrix(READERS[suffix](file, limit))
     if not matrices:
         raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
-    halves = [matrices[name] for name, suffix in suffixes.items() if suffix in HALF_SUFFIXES]
+    halves: list[Any] = [matrices[name] for name, suffix in suffixes.items() if suffix in HALF_SUFFIXES]
     for half in halves:
         half.resize([max(matrix.shape[0] for matrix in halves)] * 2)
     return matrices

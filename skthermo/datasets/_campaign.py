@@ -94,9 +94,9 @@ def make_truss_campaign(
         With these attributes:
 
         temperatures : DataFrame of shape (n_records, 3)
-            ``T1``..``T3`` in degrees Celsius.
+            ``T1`` to ``T3`` in degrees Celsius.
         frequencies : DataFrame of shape (n_records, 6)
-            ``f1``..``f6`` in Hz, with noise and damage.
+            ``f1`` to ``f6`` in Hz, with noise and damage.
         clean_frequencies : DataFrame of shape (n_records, 6)
             Without noise.
         theta : DataFrame of shape (n_records, 3)

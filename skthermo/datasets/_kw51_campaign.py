@@ -75,9 +75,9 @@ def make_kw51_campaign(
             ``tBD31A``, temperature of the steel below the deck in degrees Celsius. It is missing until 2018-11-21
             and in a few blocks.
         frequencies : DataFrame of shape (n_hours, 6)
-            ``f1``..``f6`` in Hz, with noise; NaN where a mode was not identified.
+            ``f1`` to ``f6`` in Hz, with noise; NaN where a mode was not identified.
         damping : DataFrame of shape (n_hours, 6)
-            Damping ratios ``xi1``..``xi6``; NaN as the frequencies.
+            Damping ratios ``xi1`` to ``xi6``; NaN as the frequencies.
         shapes : ndarray of shape (n_hours, 6, 12)
             Only with ``shapes=True``: complex mode shapes at the sensors, of unit length and any phase, with noise
             of 1 % of their root mean square; NaN as the frequencies.

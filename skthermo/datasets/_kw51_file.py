@@ -56,9 +56,9 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
             direct normal radiation (``grVL``, ``drVL``, ``dnrVL``), rain (``raVL``), and speed and direction of the
             wind (``wsVL``, ``wdVL``), in the units of the file, which it does not state.
         frequencies : DataFrame of shape (n_records, 14)
-            ``f1``..``f14`` in Hz, NaN where a mode was not identified.
+            ``f1`` to ``f14`` in Hz, NaN where a mode was not identified.
         damping : DataFrame of shape (n_records, 14)
-            ``xi1``..``xi14``, damping ratios as fractions of critical damping.
+            ``xi1`` to ``xi14``, damping ratios as fractions of critical damping.
         shapes : complex ndarray of shape (n_records, 14, 12)
             Mode shapes at the sensors.
         sensors : list of str

@@ -31,7 +31,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     Parameters
     ----------
     path : str or path-like
-        A CSV file with the columns ``record``, ``f1``..``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
+        A CSV file with the columns ``record``, ``f1`` to ``f4``, ``TP``, ``TWN``, ``TWC``, ``TDS``, ``TDT``,
         ``TS``, ``Tair`` and ``state`` ("undamaged" or "damaged"), or the MATLAB v5 file in which the data are usually
         shared: ``data`` (n x 4), ``Z24_TP``, ``Z24_TWN``, ... (n x 1) and, optionally, ``idx`` (mask over the hours)
         and ``nc`` (number of undamaged rows).
@@ -44,7 +44,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
         temperatures : DataFrame of shape (n_records, 7)
             In degrees Celsius: pavement (TP), web (TWN, TWC), deck (TDS, TDT), soffit (TS) and air.
         frequencies : DataFrame of shape (n_records, 4)
-            ``f1``..``f4`` in Hz.
+            ``f1`` to ``f4`` in Hz.
         state : Series of shape (n_records,)
             "undamaged", "damaged", or "unknown" where a MATLAB file has no ``nc``.
 

@@ -10,6 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from skthermo._arrays import as_floats
 from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._saved_frames import SavesFrames
 from skthermo._validation import (
     HasMethods,
     Interval,
@@ -33,7 +34,7 @@ from skthermo.surrogate._simulator import tolerance
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(ChainSimulation, ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimator):
+class DataInformedFEM(SavesFrames, ChainSimulation, ChainUncertainty, ChainSteps, RegressorMixin, BaseEstimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps

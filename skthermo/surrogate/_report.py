@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
+from skthermo._saved_frames import SavesFrames
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.surrogate._box import Box
@@ -40,7 +41,7 @@ CLEARLY_BETTER = 0.25
 
 
 @dataclass(frozen=True, repr=False)
-class FitReport:
+class FitReport(SavesFrames):
     """Findings of `DataInformedFEM.fit` about the records.
 
     Parameters

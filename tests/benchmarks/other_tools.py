@@ -3,7 +3,7 @@
     pip install pyod mapie smt
     OMP_NUM_THREADS=1 python tests/benchmarks/other_tools.py
 
-PyOD's nearest neighbours in place of the Mahalanobis distance, behind the same compensator; MAPIE's split conformal
+PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals; MAPIE's split conformal
 intervals of each frequency, calibrated on a second healthy year, beside `predict_interval`; SMT's Kriging beside
 scikit-learn's Gaussian process as inverse surrogate, without refining. What is not installed is left out.
 """
@@ -74,7 +74,7 @@ def detectors(seed):
     baseline, targets = records(seed)
     found = {}
     for name, detector in {"MahalanobisDetector": MahalanobisDetector(), "PyOD's KNN": OutlierDetector(KNN())}.items():
-        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets)
+        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets, scale="global")
         alarm = make_pipeline(compensator, detector).fit(baseline)
         for severity in (0.0, 0.1, 0.2):
             later = records(1000 + seed, **({"bottom": severity} if severity else {}))[0]

@@ -1,9 +1,6 @@
-"""The user guide's networks with dropout learn, as both surrogates, where their packages are installed."""
+"""Networks with dropout learn, as both surrogates, where their packages are installed."""
 
 import os
-import re
-import textwrap
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,22 +10,14 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import sample
 from skthermo.metrics import mape
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
+from tests.drop_ins.recipes import run_recipe
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::FutureWarning", r"ignore:\d+ of \d+ rows give parameters far outside"
 )
-PAGE = Path(__file__).parents[2] / "docs" / "guide" / "regressors.rst"
+PAGE = "drop_ins.rst"
 TRUSS = make_truss()
 YEAR = make_truss_campaign(noise=0.001, random_state=0)
-
-
-def recipe(words):
-    """Names that the page's code with some words defines."""
-    names = {"model": TRUSS}
-    for block in re.findall(r"\.\. code-block:: py\n\n((?:    .*\n|\n)+)", PAGE.read_text()):
-        if any(word in block for word in words):
-            exec(compile(textwrap.dedent(block), PAGE.name, "exec"), names)
-    return names
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +31,7 @@ def torch():
 @pytest.fixture(scope="module")
 def with_skorch(torch):
     pytest.importorskip("skorch")
-    return recipe(["skorch", "DataInformedFEM"])
+    return run_recipe(PAGE, "recipe-records", "recipe-skorch", "recipe-skorch-chain")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +40,7 @@ def with_keras():
         pytest.importorskip("torch").set_num_threads(1)
         os.environ["KERAS_BACKEND"] = "torch"
     pytest.importorskip("scikeras")
-    names = recipe(["scikeras"])
+    names = run_recipe(PAGE, "recipe-scikeras")
     names["keras"].utils.set_random_seed(0)
     return names
 
@@ -82,7 +71,7 @@ def test_skorch_rates_of_dropout_are_the_papers(with_skorch, torch):
 
 
 def test_skorch_as_both_surrogates_of_a_chain(with_skorch):
-    fem = clone(with_skorch["fem"])
+    fem = clone(with_skorch["paper"])
     fem.set_params(inverse__n_samples=200, inverse__regressor__max_epochs=20, mapper__regressor__max_epochs=150)
     fem.fit(YEAR.temperatures, YEAR.frequencies)
     assert mape(YEAR.clean_frequencies, fem.predict(YEAR.temperatures)).mean() < 1.0

@@ -1,0 +1,100 @@
+"""State of objects that hold pandas' frames, as arrays and lists, which skops can save."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+
+class SavesFrames:
+    """Objects of which files hold tables in place of frames; reading a file makes them frames again."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: to_saved(value) for name, value in super().__getstate__().items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        restored = {name: from_saved(value) for name, value in state.items()}
+        if hasattr(super(), "__setstate__"):
+            super().__setstate__(restored)
+        else:
+            vars(self).update(restored)
+
+
+@dataclass
+class SavedLabels:
+    """Labels of an index: a range, times as integers, or a list."""
+
+    kind: str
+    labels: Any
+    dtype: str
+    name: Any
+    zone: str | None = None
+    frequency: str | None = None
+
+
+@dataclass
+class SavedTable:
+    """Values and labels of a frame, or of a series where there are no columns."""
+
+    values: NDArray
+    index: SavedLabels
+    columns: SavedLabels | None
+    name: Any = None
+
+
+def to_saved(value: Any) -> Any:
+    """A frame or series as a table, also within a tuple, if the table gives exactly the frame again; else unchanged."""
+    if isinstance(value, tuple) and type(value) is tuple:
+        return tuple(to_saved(part) for part in value)
+    if not isinstance(value, pd.DataFrame | pd.Series) or value.attrs:
+        return value
+    is_frame = isinstance(value, pd.DataFrame)
+    axes = [_to_labels(axis) for axis in value.axes]
+    dtypes = set(value.dtypes) if is_frame else {value.dtype}
+    if None in axes or len(dtypes) != 1 or dtypes.pop() not in (np.dtype(float), np.dtype("int64")):
+        return value
+    return SavedTable(value.to_numpy(), axes[0], axes[1] if is_frame else None, None if is_frame else value.name)
+
+
+def from_saved(value: Any) -> Any:
+    """The frame or series of a table, also within a tuple; anything else unchanged."""
+    if isinstance(value, tuple) and type(value) is tuple:
+        return tuple(from_saved(part) for part in value)
+    if not isinstance(value, SavedTable):
+        return value
+    index = _from_labels(value.index)
+    if value.columns is None:
+        return pd.Series(value.values, index, name=value.name)
+    return pd.DataFrame(value.values, index, _from_labels(value.columns))
+
+
+def _to_labels(index: pd.Index) -> SavedLabels | None:
+    """None for an index that these labels would not give again."""
+    if isinstance(index, pd.RangeIndex):
+        saved = SavedLabels("range", [index.start, index.stop, index.step], "int64", index.name)
+    elif isinstance(index, pd.DatetimeIndex):
+        zone = None if index.tz is None else str(index.tz)
+        saved = SavedLabels("times", index.asi8, f"M8[{index.unit}]", index.name, zone, index.freqstr)
+    elif type(index) is pd.Index:
+        saved = SavedLabels("list", index.tolist(), str(index.dtype), index.name)
+    else:
+        return None
+    try:
+        same = _from_labels(saved)
+    except (TypeError, ValueError, LookupError):
+        return None
+    return saved if same.identical(index) and getattr(same, "freq", 0) == getattr(index, "freq", 0) else None
+
+
+def _from_labels(saved: SavedLabels) -> pd.Index:
+    if saved.kind == "range":
+        return pd.RangeIndex(*saved.labels, name=saved.name)
+    if saved.kind == "list":
+        return pd.Index(saved.labels, dtype=saved.dtype, name=saved.name, tupleize_cols=False)
+    times = pd.DatetimeIndex(saved.labels.view(saved.dtype), name=saved.name)
+    if saved.zone is not None:
+        times = times.tz_localize("UTC").tz_convert(saved.zone)
+    times.freq = saved.frequency
+    return times

@@ -1,0 +1,133 @@
+"""Simulated accelerations have the frequencies, damping and variance of theory; pyOMA-2 finds the modes in them."""
+
+import re
+import textwrap
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, freqz, lfilter, welch
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from tests.examples.pages import EXAMPLES, recipes
+
+simulation = recipes("accelerations")
+DAMPING, FORCE, RATE = simulation.DAMPING, simulation.FORCE, simulation.RATE
+SENSORS = np.linspace(0, 22, 8).astype(int)
+STEP = 1 / RATE
+
+
+@pytest.fixture(scope="module")
+def year():
+    return make_truss_campaign(samples_per_year=5, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def modes(year):
+    return simulation.modes_below(year.model, year.theta.iloc[0], RATE / 2)
+
+
+@pytest.fixture(scope="module")
+def accelerations(modes):
+    return simulation.ambient_vibration(*modes, SENSORS, np.random.default_rng(0))
+
+
+def impulse_response(frequency, damping=DAMPING, step=STEP, time_constants=10):
+    n_samples = int(time_constants / (2 * np.pi * frequency * damping * step))
+    return lfilter(*simulation.acceleration_filter(frequency, damping, step), np.eye(1, n_samples)[0])
+
+
+def one_sided_spectrum(frequency, modes):
+    """Spectral density of every sensor by theory, (n_frequencies, n_sensors)."""
+    response = [freqz(*simulation.acceleration_filter(f), worN=frequency, fs=RATE)[1] for f in modes[0]]
+    transfer = np.einsum("sm,mf,dm->fsd", modes[1][SENSORS], response, modes[1])
+    return 2 / RATE * FORCE**2 * (np.abs(transfer) ** 2).sum(axis=2)
+
+
+def test_modes_are_those_of_the_truth_and_one_more(year, modes):
+    frequencies, shapes = modes
+    np.testing.assert_allclose(frequencies[:6], year.clean_frequencies.iloc[0], rtol=1e-9)
+    assert len(frequencies) == 7
+    _, mass = year.model.matrices(year.theta.iloc[0])
+    np.testing.assert_allclose(shapes.T @ mass @ shapes, np.eye(7), atol=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [0.3, 7.5, 95.0, 127.0])
+@pytest.mark.parametrize("damping", [0.001, 0.01, 0.2])
+def test_the_filter_is_the_mode_with_forces_held(frequency, damping):
+    numerator, denominator = simulation.acceleration_filter(frequency, damping)
+    omega = 2 * np.pi * frequency
+    held = cont2discrete(([1, 0, 0], [1, 2 * damping * omega, omega**2]), STEP, method="zoh")
+    np.testing.assert_allclose(denominator, held[1], rtol=1e-9)
+    np.testing.assert_allclose(numerator, held[0].ravel(), rtol=1e-6, atol=1e-9)
+    pole = np.log(np.roots(denominator).astype(complex)) / STEP
+    np.testing.assert_allclose(np.abs(pole), omega)
+    np.testing.assert_allclose(-pole.real / np.abs(pole), damping)
+
+
+@pytest.mark.parametrize("damping", [0.01, 0.03])
+def test_the_stationary_variance_of_a_mode_is_that_of_white_noise(damping):
+    """Displacements have the variance s dt / (4 xi w^3), velocities s dt / (4 xi w); both are older than the force."""
+    phase = 0.02  # w dt
+    response = impulse_response(phase / (2 * np.pi * STEP), damping)
+    expected = 1 + phase * (1 + 4 * damping**2) / (4 * damping)
+    np.testing.assert_allclose(response @ response, expected, rtol=1e-3)
+
+
+def test_sensors_have_the_variance_and_noise_of_theory(modes, accelerations):
+    responses = [impulse_response(f) for f in modes[0]]
+    overlap = np.array([[a[: len(b)] @ b[: len(a)] for a in responses] for b in responses])
+    participation = modes[1].T @ modes[1] * overlap
+    expected = FORCE**2 * np.einsum("sm,mn,sn->s", modes[1][SENSORS], participation, modes[1][SENSORS])
+    np.testing.assert_allclose(accelerations.var(axis=0), (1 + simulation.SENSOR_NOISE**2) * expected, rtol=0.05)
+    random = (np.random.default_rng(1) for _ in range(2))
+    clean, noisy = (
+        simulation.ambient_vibration(*modes, SENSORS, next(random), n_samples=20_000, noise=n) for n in (0, 0.5)
+    )
+    np.testing.assert_allclose((noisy - clean).std(axis=0), 0.5 * clean.std(axis=0), rtol=0.02)
+
+
+def test_spectra_peak_at_the_modes_with_the_width_of_their_damping(modes, accelerations):
+    frequency, measured = welch(accelerations, RATE, nperseg=8192, axis=0)
+    expected = one_sided_spectrum(frequency, modes)
+    for f in modes[0]:
+        near = np.abs(frequency - f) < 2 * DAMPING * f  # and no other mode's peak
+        peak = frequency[near][measured[near].sum(axis=1).argmax()]
+        assert abs(peak / f - 1) < DAMPING
+        core = np.abs(frequency - f) < DAMPING * f  # between the half-power points
+        shares = [each[core].sum() / each[near].sum() for each in (measured, expected)]
+        assert shares[0] == pytest.approx(shares[1], rel=0.1)
+        assert measured[near].sum() == pytest.approx(expected[near].sum(), rel=0.2)
+
+
+def test_vibration_is_stationary_from_the_start(modes):
+    lowest = modes[0][:1], modes[1][:, :1]
+    random = np.random.default_rng(2)
+    records = [simulation.ambient_vibration(*lowest, SENSORS, random, n_samples=512, noise=0)[:, 3] for _ in range(60)]
+    power = np.square(records).mean(axis=0)
+    assert power[:256].mean() == pytest.approx(power[256:].mean(), rel=0.15)
+
+
+def guide_code():
+    page = (EXAMPLES.parent / "docs" / "guide" / "accelerations.rst").read_text()
+    blocks = re.findall(r"\.\. code-block:: py\n\n((?:    .*\n|\n)+)", page)
+    return [textwrap.dedent(block) for block in blocks]
+
+
+@pytest.mark.filterwarnings("ignore")  # of other packages, on import
+def test_the_guides_code_finds_the_modes_of_a_record(modes, accelerations, monkeypatch):
+    monkeypatch.setenv("PYOMA_LOG_LEVEL", "ERROR")
+    monkeypatch.setenv("TQDM_DISABLE", "1")
+    pytest.importorskip("pyoma2")
+    namespace = {
+        "measured": [accelerations[: len(accelerations) // 2]],
+        "rate": RATE,
+        "model": make_truss(),
+        "sensors": SENSORS,
+    }
+    for block in guide_code():
+        exec(compile(block, "accelerations.rst", "exec"), namespace)
+    for name in ("modes", "of_one_order"):
+        found = namespace[name]
+        np.testing.assert_allclose(found.frequencies.iloc[0], modes[0][:6], rtol=0.003)
+        np.testing.assert_allclose(found.damping.iloc[0], DAMPING, rtol=0.5)
+        assert (found.mac > 0.97).all(axis=None)
