@@ -163,11 +163,14 @@ show(table_7(pair))
 # %%
 # Verification
 # ------------
-# Frequencies of the test, by the chain with nothing imputed, and over the temperature of the steel in the records that
-# taught it.
+# Frequencies of the test, measured and predicted by the chain with nothing imputed.
 
 predicted = best.simulated()
 PredictionDisplay.from_predictions(best.test(records.frequencies), best.test(predicted))
+
+# %%
+# The records that taught it, over the temperature of the steel, and what the chain makes of them:
+
 steel = records.temperatures["tBD31A"]
 FrequencyTemperatureDisplay.from_predictions(steel[:TRAINED], records.frequencies[:TRAINED], predicted[:TRAINED])
 
