@@ -54,6 +54,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "gallery_order.position",
     "download_all_examples": False,
     "capture_repr": (),
+    "remove_config_comments": True,
     "image_srcset": ["2x"],
     "parallel": 2,
     "abort_on_example_error": True,

@@ -9,6 +9,8 @@ Run it with ``python examples/plot_kw51_model.py``; it needs :download:`page_rec
 :doc:`/guide/models` says how to build such a model of your own structure.
 """
 
+# sphinx_gallery_thumbnail_number = 2
+
 from page_recipes import command_line, save_figures
 
 from skthermo.datasets import kw51_structure, make_kw51

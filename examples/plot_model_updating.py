@@ -15,6 +15,8 @@ Run it with ``python examples/plot_model_updating.py`` (``--starts`` for another
 :download:`frame_recipes.py` (the frame) and :download:`page_recipes.py` beside it. The guide is :doc:`/guide/updating`.
 """
 
+# sphinx_gallery_thumbnail_number = 3
+
 import warnings
 
 import matplotlib.pyplot as plt

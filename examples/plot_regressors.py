@@ -14,6 +14,8 @@ that holds them as an argument, M2 is compared on them, too. The page needs :dow
 :download:`page_recipes.py` beside it.
 """
 
+# sphinx_gallery_thumbnail_number = 2
+
 import warnings
 from pathlib import Path
 

@@ -13,6 +13,8 @@ two files beside it: :download:`truss_recipes.py` has the paper's tables and a r
 :download:`page_recipes.py` the options and the folder for figures.
 """
 
+# sphinx_gallery_thumbnail_number = 4
+
 import warnings
 
 import matplotlib.pyplot as plt

@@ -14,6 +14,8 @@ page shows. It needs :download:`tower_recipes.py` and :download:`page_recipes.py
 :doc:`/guide/five_steps` is the same way in more words.
 """
 
+# sphinx_gallery_thumbnail_number = 2
+
 import tempfile
 from pathlib import Path
 from textwrap import fill
