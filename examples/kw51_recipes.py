@@ -91,6 +91,7 @@ EXPECTED_WARNINGS = (
     r"\d+ of \d+ rows give parameters far outside",
     r"\d+ of \d+ rows have temperatures far outside",
     r"\d+ of \d+ rows have a missing",
+    r"\d+ of \d+ rows did not converge",
     r"\d+ of \d+ theta are outside the bounds for which",
     "Got `batch_size` less than 1",
 )

@@ -3,10 +3,11 @@ From accelerations to a trained FE model
 ========================================
 
 Monitoring systems record accelerations, and skthermo learns from natural frequencies. Operational modal analysis, here
-by `pyOMA-2 <https://pyoma.readthedocs.io>`_, lies between them. This page goes the whole way on a truss whose truth is
+by `pyOMA2 <https://pyoma.readthedocs.io>`_, lies between them. This page goes the whole way on a truss whose truth is
 known: from accelerations of one year to an FE model that knows the effect of temperature. At the end it compares that
-model with one that learned from the true frequencies. :doc:`/guide/accelerations` is the guide for your own records.
+model with one that learned from the true frequencies.
 
+The guide for your own records is :doc:`/guide/accelerations`.
 Run it with ``python examples/plot_accelerations.py`` after ``pip install "skthermo[plot,oma]"``; a year takes about a
 minute, and ``--seeds 5`` repeats it for four more. It needs two files beside it:
 :download:`accelerations_recipes.py` simulates the accelerations, :download:`page_recipes.py` has the options and the

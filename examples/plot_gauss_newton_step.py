@@ -48,11 +48,11 @@ print(theta.describe().loc[["mean", "std", "min", "max"]].round(3))
 
 
 def gauss_newton_step(model, theta: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
-    r"""Parameters improved by one Gauss-Newton step, row by row.
+    """Parameters improved by one Gauss-Newton step, row by row.
 
     ln f is nearly linear in ln theta: ln f_measured = ln f(theta) + S d, with the normalised sensitivities
-    S = theta / f df/dtheta. The step d minimises \|ln f_measured - ln f - S d\|^2 / NOISE^2 +
-    \|ln theta + d\|^2 / WIDTH^2: the second sum limits the step of parameters that hardly affect the frequencies.
+    S = theta / f df/dtheta. The step d minimises the squares of (ln f_measured - ln f - S d) / SCATTER and of
+    (ln theta + d) / WIDTH; the latter limit the step of parameters that hardly affect the frequencies.
     """
     frequencies, jacobian = linearise(model, theta)
     S = jacobian * theta.to_numpy()[:, np.newaxis] / frequencies[:, :, np.newaxis]

@@ -29,6 +29,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign, steel_modulus
 from skthermo.fem import add_noise
 from skthermo.metrics import frequency_scorer
+from skthermo.plotting import HistoryDisplay
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
@@ -58,11 +59,8 @@ def monitoring(n_days=60, noise=0.005, seed=0):
 
 
 T, F = monitoring(60 if options.full else 30)
-fig, (air, mode) = plt.subplots(2, 1, figsize=(9, 4), sharex=True, layout="constrained")
-air.plot(T["T1"][:240])
-air.set_ylabel("air (°C)")
-mode.plot(F["f1"][:240], ".", markersize=3)
-mode.set_ylabel("$f_1$ (Hz)")
+ten_days = pd.DataFrame({"air (°C)": T["T1"], "$f_1$ (Hz)": F["f1"]})[:240]
+HistoryDisplay.from_predictions(ten_days, unit="", kind="points")
 
 # %%
 # The chain as one estimator

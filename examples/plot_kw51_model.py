@@ -11,6 +11,8 @@ Run it with ``python examples/plot_kw51_model.py``; it needs :download:`page_rec
 
 # sphinx_gallery_thumbnail_number = 2
 
+from textwrap import fill
+
 from page_recipes import command_line, save_figures
 
 from skthermo.datasets import kw51_structure, make_kw51
@@ -25,7 +27,7 @@ options = command_line().parse_args()
 # whose parameters multiply the stiffness of groups: here five moduli that depend on temperature.
 
 structure, model = kw51_structure(), make_kw51()
-print(structure, model, sep="\n")
+print(fill(str(structure), 100), model, sep="\n")
 
 # %%
 # Lines below are as wide as the members are stout; the last group is drawn on top.

@@ -12,6 +12,7 @@ model). It needs :download:`kw51_appendix_recipes.py` (the paper's tables, and t
 """
 
 import time
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -81,7 +82,7 @@ print((100 * errors).round(2).T.to_string())
 # is compared with another mode's. The updater says so.
 
 for message in fits["sorted"][1]:
-    print(message)
+    print(fill(str(message), 100))
 
 # %%
 # What six frequencies cannot tell

@@ -45,7 +45,8 @@ options = parser.parse_args()
 year = make_truss_campaign(noise=NOISE, random_state=0)
 moduli = (210 * year.theta).set_axis([f"E of zone {zone} (GPa)" for zone in (1, 2, 3)], axis=1)
 records = [year.temperatures.add_suffix(" (°C)"), moduli, year.frequencies.add_suffix(" (Hz)")]
-HistoryDisplay.from_predictions(pd.concat(records, axis=1), unit="", n_columns=3)
+display = HistoryDisplay.from_predictions(pd.concat(records, axis=1), unit="", n_columns=3)
+display.figure_.set_size_inches(11, 7)
 
 # %%
 # Learn the effect of temperature
@@ -116,7 +117,8 @@ study = study_of(SEVERITIES)
 sources = {"thermo-mechanical": "reference", "data-informed": "data-informed"}
 shown = ["healthy", *(f"{group} 20 %" for group in GROUPS)]
 indices = {name: {label: study.indices_[name, source] for label, source in sources.items()} for name in shown}
-DamageIndexDisplay.from_scenarios(indices, study.threshold_, n_columns=2)
+display = DamageIndexDisplay.from_scenarios(indices, study.threshold_, n_columns=2)
+display.figure_.set_size_inches(7, 4.6)
 
 # %%
 # Points above the line are alarms. Damage of 20 % lifts the index above it on most days, more clearly for the bottom
@@ -128,7 +130,7 @@ DamageIndexDisplay.from_scenarios(indices, study.threshold_, n_columns=2)
 # and of true records reach 90 % at severities that differ by two percentage points at most.
 
 finer = study_of(np.arange(0.02, 0.31, 0.02))
-fig, axes = plt.subplots(1, 3, figsize=(14, 4), layout="constrained", sharey=True)
+fig, axes = plt.subplots(1, 3, figsize=(13, 4.4), layout="constrained", sharey=True)
 for ax, group in zip(axes, GROUPS, strict=True):
     for label, source in sources.items():
         PODCurveDisplay.from_predictions(finer.pod_curve(group, source), label=label, ax=ax)

@@ -125,8 +125,8 @@ for ax in display.axes_:
 # .. image:: /images/z24_parameters.png
 #    :alt: Four multipliers of stiffness over the temperature of the pavement, from frequencies and from temperatures
 #
-# The test is warmer than all that was learned
-# --------------------------------------------
+# Most of the test is warmer than all that was learned
+# ----------------------------------------------------
 # :meth:`~skthermo.surrogate.DataInformedFEM.applicability` says so, and every prediction would warn of it.
 
 beyond = fem.applicability(T_test).drop(columns="outside_bounds").max(axis=1)
