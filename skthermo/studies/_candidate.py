@@ -72,7 +72,7 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     """a90 of the curve; without a finite slope, the middle of its bracket; infinite where damage is not found."""
     try:
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="the severities")
+            warnings.filterwarnings("ignore", message="the (severities|curve lies)")
             curve = pod_curve(severities, n_detected, n_records)
     except ValueError:  # the rate does not increase with severity, or nothing could be judged
         return np.inf

@@ -9,6 +9,7 @@ import pandas as pd
 from sklearn.exceptions import NotFittedError
 
 from skthermo._warnings import warn_user
+from skthermo._warnings_once import warnings_once
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._pod_curve import PODCurve, pod_curve
 from skthermo.studies._pod_fit import bracket_of, check_probability
@@ -41,6 +42,11 @@ class StudyCurves:
         ------
         ValueError
             If there is no such family, or the curve cannot be fitted.
+
+        Warns
+        -----
+        UserWarning
+            If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
         rows = self._families().get((family, source))
         if rows is None:
@@ -76,13 +82,15 @@ class StudyCurves:
         Warns
         -----
         UserWarning
-            If a curve has no finite slope, or there is none because the POD does not increase.
+            If a curve has no finite slope or lies outside the bounds of some tested severities, or there is none
+            because the POD does not increase. Of texts that differ in their numbers only, the first is given.
         """
         check_probability(level, "level")
         if method not in ("grid", "curve"):
             raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
         find = self._on_grid if method == "grid" else self._on_curve
-        found = {key: find(key, rows, level) for key, rows in self._families().items()}
+        with warnings_once("for other families or sources"):
+            found = {key: find(key, rows, level) for key, rows in self._families().items()}
         if not found:
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
         index = pd.MultiIndex.from_tuples(list(found), names=["family", "source"])
@@ -95,6 +103,15 @@ class StudyCurves:
         rows = self.results_
         rows = rows[(rows["measure"] == "POD") & rows["family"].notna() & rows["severity"].notna()]
         return dict(iter(rows.groupby(["family", "source"], sort=False)))  # type: ignore[arg-type]
+
+    def _hint(self, family: str, source: str) -> str:
+        """Likely cause of a POD that does not increase, where there is one."""
+        if not is_blind(self.results_, family, source):
+            return ""
+        return (
+            "; alarms are as rare as for the healthy structure: severities are small, or outliers of the baseline "
+            "raise the threshold"
+        )
 
     def _on_grid(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
         with _naming(key[0]):
@@ -111,12 +128,20 @@ class StudyCurves:
         except ValueError as error:
             if rows["severity"].min() < 0 < rows["severity"].max():
                 raise
-            warn_user(f"no curve of source {key[1]!r} for {error}", "family without a curve")
+            warn_user(f"no curve of source {key[1]!r} for {error}{self._hint(*key)}", "family without a curve")
             return float("nan"), *bracket_of(rows["severity"].abs().to_numpy(), rows["rate"].to_numpy(), level)
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)
         tail = (1 - self._confidence) / 2
         return curve.severity_at(level), curve.severity_at(level, tail), curve.severity_at(level, 1 - tail)
+
+
+def is_blind(results: pd.DataFrame, family: str, source: str) -> bool:
+    """Whether no severity of a family raises clearly more alarms than the healthy structure does."""
+    rows = results[results["source"] == source]
+    healthy = rows.loc[rows["measure"] == "PFA", "highest"].max()
+    rates = rows.loc[(rows["measure"] == "POD") & (rows["family"] == family), "rate"]
+    return bool((rates <= healthy).all())
 
 
 @contextmanager

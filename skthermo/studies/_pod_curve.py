@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from skthermo._arrays import Array, real_array
 from skthermo._warnings import warn_user
+from skthermo.studies._intervals import clopper_pearson
 from skthermo.studies._pod_fit import (
     FLAT,
     bracket_of,
@@ -19,6 +20,12 @@ from skthermo.studies._pod_fit import (
     places_of,
     within,
 )
+
+DOUBT = 0.01
+"""Probability with which data from the curve itself leave the bounds of any severity."""
+
+MISSED = 0.03
+"""Distance between the curve and these bounds from which it matters."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,6 +80,20 @@ class PODCurve:
     def a90_95(self) -> float:
         """Severity at which the lower 95 % confidence bound of the POD reaches 0.9."""
         return self.severity_at(0.9, confidence=0.95)
+
+    @property
+    def n_missed(self) -> int:
+        """Number of severities whose POD the curve misses by more than 3 percentage points beyond its bounds.
+
+        The bounds (Clopper-Pearson) hold the POD of all severities together with 99 % confidence.
+        """
+        if np.isnan(self.slope):
+            return 0
+        confidence = 1 - DOUBT / len(self.severities)
+        counts = zip(self.n_detected, self.n_records, strict=True)
+        lowest, highest = np.array([clopper_pearson(k, n, confidence) for k, n in counts]).T
+        pod = self.predict(self.severities)[0]
+        return int(((pod < lowest - MISSED) | (pod > highest + MISSED)).sum())
 
     def predict(self, severity: ArrayLike) -> tuple[Any, Any, Any]:
         """POD at some severities, with bounds.
@@ -186,7 +207,8 @@ def pod_curve(
     -----
     UserWarning
         If the data determine no finite slope, because all records below one severity are missed and all above it
-        detected. ``bracket`` then holds the two severities between which a90 lies.
+        detected. ``bracket`` then holds the two severities between which a90 lies. If the curve lies clearly outside
+        the bounds of some severities (``n_missed``), so that a90 may be wrong.
 
     Notes
     -----
@@ -209,9 +231,12 @@ def pod_curve(
     x, bracket = places_of(np.abs(s), log), bracket_of(s, k / n, 0.9)
     coefficients, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
     if not k.any() or not (n - k).any() or x[k < n].max() <= x[k > 0].min():
+        expected = "severities in between, with some misses and hits"
+        if not k.any():
+            expected = "some records in alarm: severities are small, or outliers of the baseline raise the threshold"
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
-            f"unknown, and a90 lies {within(bracket)}; expected severities in between, with some misses and hits",
+            f"unknown, and a90 lies {within(bracket)}; expected {expected}",
             "separated severities",
         )
     else:
@@ -223,6 +248,14 @@ def pod_curve(
                 f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}, which does not increase; expected "
                 "one that increases with the magnitude of the severity"
             )
-    return PODCurve(
+    curve = PODCurve(
         s, k, n, float(coefficients[0]), float(coefficients[1]), covariance, log, float(confidence), bracket
     )
+    if curve.n_missed:
+        warn_user(
+            f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
+            f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
+            "severities near a90 and fit those alone",
+            "curve beside its points",
+        )
+    return curve

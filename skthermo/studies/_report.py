@@ -12,6 +12,8 @@ from uuid import uuid4
 
 from sklearn.exceptions import NotFittedError
 
+from skthermo.studies._findings import doubts
+from skthermo.studies._identified import IdentifiedDamage
 from skthermo.studies._report_answer import answer, found_and_missed
 from skthermo.studies._report_findings import findings_of
 from skthermo.studies._report_html import Html, bullets, element, paragraphs, section, table
@@ -88,7 +90,7 @@ def report(
     """
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
-    if identified is not None and not all(hasattr(identified, name) for name in ("table", "shifts", "similarity")):
+    if identified is not None and not isinstance(identified, IdentifiedDamage):
         raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
@@ -116,7 +118,7 @@ def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[st
     }
     if identified is not None:
         sections["identified"] = ("Identified damage", identified_damage(identified))
-    return sections | {"settings": ("Settings", _settings(study))}
+    return sections | {"settings": ("Settings", _settings(study, identified))}
 
 
 def _introduction(study: Any) -> Html:
@@ -124,14 +126,15 @@ def _introduction(study: Any) -> Html:
     return paragraphs(f"The alarm system was tested by simulation, in {counted(n_states, 'state')} of the structure.")
 
 
-def _settings(study: Any) -> Html:
+def _settings(study: Any, identified: Any) -> Html:
     """Parameters, versions and warnings."""
     parts = {"model": study.fem, "alarm system": study.detector}
     rows = [[f"{part}: {name}", value] for part, estimator in parts.items() for name, value in _parameters(estimator)]
     rows += [
         [f"study: {name}", value] for name, value in _parameters(study) if name not in ("fem", "detector", "scenarios")
     ]
-    warned = getattr(study, "warnings_", [])
+    warned = [*getattr(study, "warnings_", [])]
+    warned += [f"Identified damage: {text}" for _, text in ([] if identified is None else doubts(identified))]
     return section(
         "settings",
         "Settings",
@@ -139,7 +142,7 @@ def _settings(study: Any) -> Html:
         table("Settings of the model, of the alarm system and of the study.", ["Setting", "Value"], rows),
         table("Versions of the programs.", ["Program", "Version"], _versions()),
         element("h3", "Warnings"),
-        bullets(warned) or paragraphs("The simulations gave no warning."),
+        bullets(warned) or paragraphs("There was no warning."),
     )
 
 

@@ -94,6 +94,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         f"{counted(int(results['n_repeats'].max()), 'time')}, each time with other scatter of the measurements. For "
         "the healthy structure, alarms are false and should be few; for a damaged one, they should be many."
     )
+    introduction += _beginning(study)
     if has_truth:
         introduction += reference
     parts = [paragraphs(introduction), table("Alarms in every scenario.", columns, cells)]
@@ -121,6 +122,16 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         )
     )
     return section("found", "What would be found and what not", *(part for part in parts if part))
+
+
+def _beginning(study: Any) -> str:
+    """From when on the time to the first alarm counts."""
+    weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)].index
+    first = f", {_place(weather.min())}" if isinstance(weather, pd.DatetimeIndex) else ""
+    return (
+        " The time to the first alarm begins with the damage or, where that is there from the beginning or there is "
+        f"none, with the first record of the simulated weather{first}."
+    )
 
 
 def described(scenario: State | None) -> str:

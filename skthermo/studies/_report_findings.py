@@ -9,6 +9,7 @@ import pandas as pd
 
 from skthermo._arrays import Array
 from skthermo.metrics import minimum_detectable_damage
+from skthermo.studies._curves import is_blind
 from skthermo.studies._pod_curve import PODCurve
 from skthermo.studies._report_numbers import severity_text, tested
 
@@ -76,7 +77,8 @@ class Finding:
         """Severity at which the curve reaches the level, and with 95 % confidence, for a table."""
         if self.curve is None or np.isnan(self.curve.slope):
             return "no curve"
-        return f"{self._on_curve(self.curve.a90)}; {self._on_curve(self.curve.a90_95)}"
+        doubt = " (doubtful)" if self.curve.n_missed else ""
+        return f"{self._on_curve(self.curve.a90)}; {self._on_curve(self.curve.a90_95)}{doubt}"
 
     def sentence(self) -> str:
         """The smallest severity that is found, and how uncertain it is."""
@@ -107,7 +109,13 @@ class Finding:
             return f"The limit lies between {tested(low)} and {tested(high)}; nothing in between was tested."
         a90, a90_95 = self._on_curve(self.curve.a90), self._on_curve(self.curve.a90_95)
         sure = f"with {tested(0.95)} confidence"
-        return f"A curve through the tested severities puts this limit at {a90} and, {sure}, at {a90_95}."
+        text = f"A curve through the tested severities puts this limit at {a90} and, {sure}, at {a90_95}."
+        if not self.curve.n_missed:
+            return text
+        return (
+            f"{text} This is doubtful, because the curve lies outside the bounds of {self.curve.n_missed} of "
+            f"{len(self.severities)} tested severities."
+        )
 
     def _on_curve(self, severity: float) -> str:
         """A severity within those that were tested; beyond them a curve is a guess."""
@@ -138,6 +146,11 @@ def _finding(study: Any, family: Any, rows: pd.DataFrame, source: str) -> Findin
     curve, problem = None, ""
     if len(rows) < 2:
         problem = "Only one severity was tested, so that nothing can be said about others."
+    elif is_blind(study.results_, family, source):
+        problem = (
+            "Alarms are as rare as for the healthy structure, so that no curve is drawn: the tested severities are "
+            "small, or outliers in the records that the alarm system learned raise its threshold."
+        )
     else:
         try:
             with warnings.catch_warnings():

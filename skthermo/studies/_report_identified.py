@@ -3,25 +3,32 @@
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from skthermo.studies._likely_cause import unexplained
 from skthermo.studies._report_figures import draw_identified_damage
 from skthermo.studies._report_html import Html, bullets, element, figure, paragraphs, section, table
 from skthermo.studies._report_numbers import exact, listed, probability
 
-UNLIKELY = 0.05
+YES, NO, DOUBTFUL, ALONE = "yes", "no", "doubtful", "yes, if nothing else has changed"
+SENTENCES = {
+    YES: "{} has lost {} of its stiffness (± {}).",
+    ALONE: "{} has lost {} of its stiffness (± {}), if nothing else has changed.",
+    DOUBTFUL: "It is doubtful whether {} is damaged: a loss of {} (± {}) may come from what else has changed.",
+}
+"""What is said of a damaged group, its severity and two standard errors."""
 
 
 def identified_damage(identified: Any) -> Html:
     """Where damage is, how severe, what it explains, and what cannot be said."""
-    found = identified.table
-    clear = found["significant"].eq(True)  # missing where a group cannot be seen
+    found, answers = identified.table, _answers(identified)
     rows = [
         [
             group,
             exact(row["severity"]) if np.isfinite(row["severity"]) else "cannot be seen",
             f"± {exact(2 * row['standard_error'])}" if np.isfinite(row["standard_error"]) else "",
             probability(row["p_value"]) if np.isfinite(row["severity"]) else "",
-            "yes" if clear[group] else "no",
+            answers[group],
         ]
         for group, row in found.iterrows()
     ]
@@ -63,12 +70,15 @@ def identified_damage(identified: Any) -> Html:
 
 def identified_sentences(identified: Any) -> list[str]:
     """Which groups are damaged, and how surely."""
-    found = identified.table[identified.table["significant"].eq(True)]
+    answers = _answers(identified)
+    found = identified.table[answers != NO]
     sentences = [
-        f"{group} has lost {exact(row['severity'])} of its stiffness (± {exact(2 * row['standard_error'])})."
+        SENTENCES[answers[group]].format(group, exact(row["severity"]), exact(2 * row["standard_error"]))
         for group, row in found.iterrows()
     ]
     sentences = sentences or ["No group is clearly damaged."]
+    if identified.is_unexplained:
+        sentences.insert(0, _misfit(identified))
     p_value = float(getattr(identified, "p_value", np.nan))
     if np.isfinite(p_value):
         sentences.append(f"The probability that a healthy structure shows such shifts is {probability(p_value)}.")
@@ -79,12 +89,31 @@ def _limits(identified: Any) -> list[str]:
     sentences = [f"{listed(groups)} cannot be told apart by these modes." for groups in identified.confused]
     if len(identified.unseen):
         sentences.append(f"Damage in {listed(identified.unseen)} cannot be seen in these modes.")
-    misfit = float(identified.misfit_p_value)
-    if np.isnan(misfit):
+    if np.isnan(identified.misfit_p_value):
         sentences.append("There are no more modes than groups, so that any shift can be explained: it proves little.")
-    elif misfit < UNLIKELY:
-        sentences.append(
-            "Damage of these groups does not explain all shifts, so that something else has changed too (the "
-            f"probability of such a misfit by chance is {probability(misfit)})."
-        )
+    elif identified.is_unexplained:
+        sentences.append(_misfit(identified))
     return sentences
+
+
+def _misfit(identified: Any) -> str:
+    return (
+        "Damage of these groups does not explain all shifts of the frequencies, so that something else has changed "
+        "too, or the model is wrong; severities may be wrong by more than their uncertainties (the probability of such "
+        f"a misfit by chance is {probability(identified.misfit_p_value)})."
+    )
+
+
+def _answers(identified: Any) -> pd.Series:
+    """Whether each group is damaged.
+
+    Where shifts are not explained, their errors are larger than assumed, about by the factor by which the worst mode
+    is off, and a severity within two such errors is doubtful.
+    """
+    table = identified.table
+    answers = pd.Series(NO, table.index).mask(table["significant"].eq(True), YES)  # missing where a group is not seen
+    if not identified.is_unexplained:
+        return answers
+    factor = max(np.nanmax(np.abs(unexplained(identified.shifts)), initial=1.0), 1.0)
+    small = table["severity"] < 2 * factor * table["standard_error"]
+    return answers.mask(answers == YES, small.map({True: DOUBTFUL, False: ALONE}))

@@ -1,5 +1,6 @@
 """Sections of a report on what was monitored, and on how good the model is."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -20,18 +21,21 @@ LARGE_DEVIATION, MANY_OUTSIDE = 0.5, 0.05
 def monitored(study: Any, structure: Any, families: list[str]) -> Html:
     """Records, period, temperatures and modes, and where the damage groups are."""
     T, F = training_tables(study.fem)
+    sensors = _sensors(T)
+    has_lags = len(sensors.columns) < len(T.columns)
     when, step = period(F.index), _step(F.index)
     weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)]
     then = period(weather.index)
     text = (
         f"The model learned from {counted(len(F), 'record')}{f' {when}' if when else ''}"
-        f"{f', usually {step} apart' if step else ''}, with {counted(T.shape[1], 'temperature')} and "
+        f"{f', usually {step} apart' if step else ''}, with {counted(sensors.shape[1], 'temperature')}"
+        f"{', with lags,' if has_lags else ''} and "
         f"{counted(F.shape[1], 'natural frequency', 'natural frequencies')} each."
     )
     simulated = f"The simulated weather has {counted(len(weather), 'record')}{f' {then}' if then else ''}."
     parts = [
-        paragraphs(text, simulated),
-        table("Temperatures.", ["Sensor", "Lowest", "Mean", "Highest", "Missing"], _ranges(T, "°C", 3)),
+        paragraphs(text, simulated, "A lag is the temperature of a sensor some time before." if has_lags else ""),
+        table("Temperatures.", ["Sensor", "Lowest", "Mean", "Highest", "Missing"], _ranges(sensors, "°C", 3)),
         paragraphs(
             "A mode is one shape in which the structure vibrates; each has its own natural frequency, in vibrations "
             "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
@@ -129,6 +133,18 @@ def _doubts(report: Any) -> list[str]:
     if report.n_unconverged:
         doubts.append(f"The stiffnesses of {counted(report.n_unconverged, 'record')} could not be found exactly.")
     return doubts
+
+
+def _sensors(T: pd.DataFrame) -> pd.DataFrame:
+    """One column for each sensor: lags, which `~skthermo.preprocessing.LagFeatures` calls sensor_lag1, are counted."""
+    columns: dict[str, list[tuple[int, str]]] = {}
+    for name in T.columns:
+        lagged = re.fullmatch(r"(.+)_lag(\d+)", name)
+        sensor, lag = (lagged[1], int(lagged[2])) if lagged else (name, -1)
+        columns.setdefault(sensor, []).append((lag, name))
+    shown = {min(found)[1]: (sensor, len(found) - 1) for sensor, found in columns.items()}
+    names = [f"{sensor}, with {counted(n, 'lag')}" if n else first for first, (sensor, n) in shown.items()]
+    return T[list(shown)].set_axis(names, axis=1)
 
 
 def _ranges(values: pd.DataFrame, unit: str, digits: int) -> list[list[str]]:
