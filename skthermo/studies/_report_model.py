@@ -142,9 +142,10 @@ def _sensors(T: pd.DataFrame) -> pd.DataFrame:
         lagged = re.fullmatch(r"(.+)_lag(\d+)", name)
         sensor, lag = (lagged[1], int(lagged[2])) if lagged else (name, -1)
         columns.setdefault(sensor, []).append((lag, name))
-    shown = {min(found)[1]: (sensor, len(found) - 1) for sensor, found in columns.items()}
-    names = [f"{sensor}, with {counted(n, 'lag')}" if n else first for first, (sensor, n) in shown.items()]
-    return T[list(shown)].set_axis(names, axis=1)
+    shown = [min(found)[1] for found in columns.values()]
+    n_lags = [sum(lag > 0 for lag, _ in found) if len(found) > 1 else 0 for found in columns.values()]
+    whole = zip(columns, shown, n_lags, strict=True)
+    return T[shown].set_axis([f"{name}, with {counted(n, 'lag')}" if n else first for name, first, n in whole], axis=1)
 
 
 def _ranges(values: pd.DataFrame, unit: str, digits: int) -> list[list[str]]:

@@ -51,7 +51,7 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.tags, self.text = [], [], ""
+        self.open, self.tags, self.text, self.cells, self.heads = [], [], "", [], []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -68,6 +68,9 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] not in ("style", "title"):
             self.text += data
+            texts = {"td": self.cells, "th": self.heads}.get(self.open[-1])
+            if texts is not None:
+                texts.append(data)
 
     def all(self, tag):
         return [attributes for name, attributes in self.tags if name == tag]

@@ -45,7 +45,7 @@ def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
 def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     both = study(fem, [*sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]])
     both.run(WEATHER)
-    with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase"):
+    with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase.*as rare as for the healthy"):
         curve = both.minimum_detectable_damage(method="curve")
     assert 0.1 < curve.loc[("bottom", "data-informed"), "mdd"] < 0.3
     unknown = curve.loc[("vertical", "data-informed")]
@@ -53,6 +53,29 @@ def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     with pytest.warns(UserWarning, match=r"families \['vertical'\] have candidates without a gain"):
         table = what_to_add(both, WEATHER, modes=[], baseline_factors=(2,))
     assert np.isfinite(table.set_index("family")["gain"]["bottom"])
+
+
+def test_a_blind_detector_is_said_to_be_blind(fem):
+    blind = study(fem, sweep(fem, (0.05, 0.1), ["bottom"]))
+    results = blind.run(WEATHER)
+    for rate, cause in (
+        (results["rate"][0], "as rare as for the healthy structure"),
+        (0.0, "expected some records in alarm"),
+    ):
+        results["rate"] = rate
+        with pytest.warns(UserWarning, match=f"{cause}.*outliers of the baseline raise the threshold") as caught:
+            minimum = blind.minimum_detectable_damage(method="curve")
+        assert len(caught) == 1
+        assert minimum["mdd"].isna().all()
+
+
+def test_one_warning_counts_the_families_whose_curves_lie_beside_their_points(fem):
+    both = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"]))
+    results = both.run(WEATHER)
+    results.loc[results["measure"] == "POD", "rate"] = [0.3, 0.35, 0.99] * 2
+    with pytest.warns(UserWarning, match="of 3 tested severities.*1 times more for other families") as caught:
+        both.minimum_detectable_damage(method="curve")
+    assert len(caught) == 1
 
 
 def test_errors_name_the_family_with_damage_and_strengthening(fem):

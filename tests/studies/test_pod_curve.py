@@ -1,5 +1,7 @@
 """Curves of the probability of detection, against statsmodels and closed forms."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.special import expit, logit
@@ -84,7 +86,7 @@ def test_separated_severities_give_a_bracket(detected, between):
 
 
 def test_nothing_detected_has_no_upper_end():
-    with pytest.warns(UserWarning, match=r"a90 lies above 0\.3"):
+    with pytest.warns(UserWarning, match=r"a90 lies above 0\.3; expected some records in alarm.*outliers"):
         curve = pod_curve(SEVERITIES, np.zeros(5), RECORDS)
     assert curve.bracket[0] == 0.3
     assert np.isnan(curve.bracket[1])
@@ -129,6 +131,34 @@ def test_impossible_questions_are_errors():
         curve.severity_at(90)
     with pytest.raises(ValueError, match="expected the sign"):
         curve.predict(-0.2)
+
+
+def warned_share(pod, n_records, n_draws=300):
+    """Share of binomial data of which the curve is said to miss the points."""
+    random, n_warned = np.random.RandomState(0), 0
+    for _ in range(n_draws):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            curve = pod_curve(SEVERITIES, random.binomial(n_records, pod), np.full(5, n_records))
+        texts = [str(warning.message) for warning in caught if "outside the bounds of" in str(warning.message)]
+        assert len(texts) == (curve.n_missed > 0)
+        assert all(f"outside the bounds of {curve.n_missed} of 5 tested" in text for text in texts)
+        n_warned += len(texts)
+    return n_warned / n_draws
+
+
+@pytest.mark.parametrize("n_records", [30, 300, 3000])
+def test_a_curve_that_fits_gives_no_warning(n_records):
+    assert warned_share(expit(-6 + 30 * SEVERITIES), n_records) <= 0.01
+
+
+def test_false_alarms_bend_the_curve_too_little_to_matter():
+    assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000) <= 0.01
+
+
+@pytest.mark.parametrize("pod", [[0.05, 0.6, 0.65, 0.7, 0.98], [0.3, 0.35, 0.4, 0.97, 0.98]])
+def test_a_curve_beside_its_points_is_said(pod):
+    assert warned_share(pod, 500) >= 0.99
 
 
 @pytest.mark.parametrize("log", [False, True])

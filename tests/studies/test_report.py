@@ -1,14 +1,16 @@
 """The report for owners: a sound page that says what the study found, whatever names the data have."""
 
 import re
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo.datasets import kw51_structure
+from skthermo.preprocessing import LagFeatures
 from skthermo.studies import (
     DetectabilityStudy,
     ProgressiveDamage,
@@ -18,6 +20,7 @@ from skthermo.studies import (
     report,
     sweep,
 )
+from skthermo.studies._report_identified import identified_sentences
 from skthermo.studies._report_page import STYLE
 from tests.studies.report_pages import HOSTILE, MODES, QUOTED, SENSOR, Page, fitted_chain, run_study
 
@@ -121,16 +124,55 @@ def test_what_cannot_be_identified_is_said(study, identified, tmp_path):
     changes = {"confused": [(HOSTILE, "deck")], "unseen": ["piers"], "misfit_p_value": 0.01}
     table = identified.table.reindex([*identified.table.index, "piers"])
     table["significant"] = False
-    likeness = identified.similarity
-    doubtful = SimpleNamespace(**{"table": table, "shifts": identified.shifts, "similarity": likeness, **changes})
+    doubtful = replace(identified, table=table, **changes)
     text = Page(report(study, tmp_path / "a.html", identified=doubtful).read_text(encoding="utf-8")).text
     assert f"{HOSTILE} and deck cannot be told apart" in text
     assert "Damage in piers cannot be seen" in text
     assert "something else has changed too" in text
     assert "No group is clearly damaged." in text
-    doubtful.misfit_p_value, doubtful.confused, doubtful.unseen = np.nan, [], []
+    doubtful = replace(doubtful, misfit_p_value=np.nan, confused=[], unseen=[])
     text = Page(report(study, tmp_path / "a.html", identified=doubtful).read_text(encoding="utf-8")).text
     assert "no more modes than groups" in text
+
+
+def test_what_damage_does_not_explain_is_said_where_damage_is_named(study, identified, tmp_path):
+    table, shifts = identified.table.copy(), identified.shifts.copy()
+    table["severity"], table["standard_error"], table["significant"] = [0.149, 0.003], [0.0005, 0.001], True
+    shifts["measured"] = shifts["explained"] + [0, 5, 0] * shifts["standard_error"]
+    misfit = replace(identified, table=table, shifts=shifts, misfit_p_value=3e-5)
+    page = Page(report(study, tmp_path / "a.html", identified=misfit).read_text(encoding="utf-8"))
+    headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
+    assert "Damage of these groups does not explain all shifts" in headline
+    assert f"{HOSTILE} has lost 14.9\xa0% of its stiffness (± 0.1\xa0%), if nothing else has changed." in headline
+    assert f"It is doubtful whether {QUOTED} is damaged: a loss of 0.3\xa0% (± 0.2\xa0%)" in headline
+    assert [cell for cell in page.cells if cell.startswith(("yes", "doubtful"))] == [
+        "yes, if nothing else has changed",
+        "doubtful",
+    ]
+    warned = page.text[page.text.rindex("Warnings") :]
+    assert "Identified damage: damage of these groups does not explain the shifts (probability 3e-05)" in warned
+    explained = identified_sentences(replace(misfit, misfit_p_value=0.5))
+    assert f"{QUOTED} has lost 0.3\xa0% of its stiffness (± 0.2\xa0%)." in explained
+    assert not [sentence for sentence in explained if "doubtful" in sentence or "not explain" in sentence]
+
+
+def test_lags_are_no_sensors(tmp_path):
+    fem, T, F = fitted_chain(n_records=60)
+    lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), T.rename(columns={SENSOR: "deck"})], axis=1)
+    lagged["deck_lag2"], lagged["north_lag3"] = T[SENSOR].shift(2).bfill(), T[SENSOR].shift(3).bfill()
+    study = run_study(clone(fem).fit(lagged, F), lagged, [Scenario("healthy")])
+    page = Page(report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
+    assert "with 3\xa0temperatures, with lags, and 3\xa0natural frequencies each" in page.text
+    sensors = page.heads[page.heads.index("Sensor") :]
+    assert [sensor for sensor in sensors if "deck" in sensor or "north" in sensor or SENSOR in sensor] == [
+        f"{SENSOR}, with 1\xa0lag",
+        "deck, with 1\xa0lag",
+        "north_lag3",
+    ]
+
+
+def test_the_time_to_the_first_alarm_says_when_it_begins(page):
+    assert "with the first record of the simulated weather, 2024-01-01 00:00." in page.text
 
 
 def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
@@ -162,7 +204,7 @@ def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     assert study.warnings_ == [str(warning.message) for warning in caught]
     text = Page(report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
     assert all(warning in text for warning in study.warnings_)
-    assert "gave no warning" not in text
+    assert "There was no warning" not in text
 
 
 def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(file, study, identified, tmp_path):

@@ -50,7 +50,7 @@ def test_only_html_is_not_escaped():
     assert isinstance(inner, Html)
 
 
-def finding(severities, rates, n_records=200):
+def finding(severities, rates, n_records=200, false_alarms=None):
     """The finding for one family with given rates, with Wald bounds."""
     error = 2 * np.sqrt(np.multiply(rates, np.subtract(1, rates)) / n_records)
     rows = {
@@ -67,7 +67,11 @@ def finding(severities, rates, n_records=200):
         assert (family, source) == ("deck", SOURCE)
         return pod_curve(severities, np.multiply(rates, n_records), np.full(len(rates), n_records))
 
-    study = SimpleNamespace(results_=pd.DataFrame(rows), pod_curve=curve)
+    results = pd.DataFrame(rows)
+    if false_alarms is not None:
+        healthy = {"source": SOURCE, "measure": "PFA", "rate": false_alarms, "highest": false_alarms + 0.01}
+        results = pd.concat([pd.DataFrame([healthy]), results], ignore_index=True)
+    study = SimpleNamespace(results_=results, pod_curve=curve)
     return findings_of(study, SOURCE)
 
 
@@ -100,6 +104,24 @@ def test_severities_that_determine_no_curve():
     assert "Only one severity" in single.sentence()
     (falling,) = finding([0.1, 0.2, 0.3], [0.5, 0.4, 0.3])
     assert "does not increase with severity" in falling.sentence()
+
+
+def test_a_curve_beside_its_points_is_doubtful():
+    (found,) = finding([0.02, 0.05, 0.1, 0.3], [0.05, 0.6, 0.65, 0.97], 2000)
+    assert found.curve.n_missed == 2
+    assert "doubtful, because the curve lies outside the bounds of 2 of 4 tested severities" in found.sentence()
+    assert found.curve_cell.endswith("(doubtful)")
+    (found,) = finding([0.1, 0.2, 0.3], [0.3, 0.88, 0.99])
+    assert "doubtful" not in found.sentence() + found.curve_cell
+
+
+@pytest.mark.parametrize("rates", [[0.0, 0.0, 0.0], [0.01, 0.01, 0.01], [0.0, 0.01, 0.02]])
+def test_a_detector_that_sees_no_damage_is_called_so(rates):
+    (blind,) = finding([0.1, 0.2, 0.3], rates, false_alarms=0.01)
+    assert "Alarms are as rare as for the healthy structure" in blind.sentence()
+    assert blind.curve_cell == "no curve"
+    (seeing,) = finding([0.1, 0.2, 0.3], [0.01, 0.01, 0.3], false_alarms=0.01)
+    assert "as rare as" not in seeing.sentence()
 
 
 def test_strengthening_is_called_so():
