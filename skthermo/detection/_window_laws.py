@@ -1,6 +1,7 @@
 """Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -137,7 +138,10 @@ class CountLaw:
     @classmethod
     def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "CountLaw":
         """Learned from the records in some rows."""
-        detector = MahalanobisDetector(contamination, threshold="quantile").fit(windows.rows[rows])
+        detector = MahalanobisDetector(contamination, threshold="quantile")
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"\d+ of \d+ (baseline )?values")  # the whole baseline has been checked
+            detector.fit(windows.rows[rows])
         n = int(np.median(windows.sizes))
         if m is not None and m > n:
             raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")

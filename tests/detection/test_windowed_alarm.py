@@ -107,6 +107,15 @@ def test_the_correlation_in_a_window_is_that_of_its_pairs():
 
 
 @pytest.mark.parametrize("rule", [*RULES, "cusum"])
+def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
+    baseline = X.copy()
+    baseline.iloc[700, 1] = 900.0
+    with pytest.warns(UserWarning) as record:
+        WindowedAlarm(8, rule=rule).fit(baseline)
+    assert ["column 'f2'" in str(one.message) for one in record if "absurdly far" in str(one.message)] == [True]
+
+
+@pytest.mark.parametrize("rule", [*RULES, "cusum"])
 def test_the_farther_the_records_the_higher_the_index_of_windows_with_gaps(rule):
     alarm = WindowedAlarm(8, rule=rule).fit(X)
     indices = [alarm.damage_index(HOLED[:200] + scale * X.std()).to_numpy() for scale in (3, 6, 12, 50, 200, 1e5)]
