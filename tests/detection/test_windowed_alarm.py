@@ -110,7 +110,7 @@ def test_the_correlation_in_a_window_is_that_of_its_pairs():
 def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
-    with pytest.warns(UserWarning) as record:
+    with pytest.warns(match="absurdly far") as record:
         WindowedAlarm(8, rule=rule).fit(baseline)
     assert ["column 'f2'" in str(one.message) for one in record if "absurdly far" in str(one.message)] == [True]
 
