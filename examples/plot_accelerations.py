@@ -8,7 +8,7 @@ known: from accelerations of one year to an FE model that knows the effect of te
 model with one that learned from the true frequencies.
 
 The guide for your own records is :doc:`/guide/accelerations`.
-Run it with ``python examples/plot_accelerations.py`` after ``pip install "skthermo[plot,oma]"``; a year takes about a
+Run it with ``python examples/plot_accelerations.py`` after ``pip install ".[plot,oma]"``; a year takes about a
 minute, and ``--seeds 5`` repeats it for four more. It needs two files beside it:
 :download:`accelerations_recipes.py` simulates the accelerations, :download:`page_recipes.py` has the options and the
 folder for figures.

@@ -1,6 +1,7 @@
 """Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,8 +19,8 @@ from skthermo.detection._windows import NUMBERS, FadingWindows, Windows
 NEGLIGIBLE = 1e-15
 """Modes whose records have faded to a smaller sum of squared weights are missing."""
 
-SMALLEST = 1e-300
-"""Probabilities are not followed below this."""
+SMALLEST = 1e-50
+"""Indices of windows that are less likely grow in proportion to their records', as they do far out."""
 
 
 class WindowLaw(Protocol):
@@ -137,7 +138,10 @@ class CountLaw:
     @classmethod
     def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> "CountLaw":
         """Learned from the records in some rows."""
-        detector = MahalanobisDetector(contamination, threshold="quantile").fit(windows.rows[rows])
+        detector = MahalanobisDetector(contamination, threshold="quantile")
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"\d+ of \d+ (baseline )?values")  # the whole baseline has been checked
+            detector.fit(windows.rows[rows])
         n = int(np.median(windows.sizes))
         if m is not None and m > n:
             raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")
@@ -156,7 +160,11 @@ class CountLaw:
         m = np.maximum(np.rint(self.m * count / self.n), 1).astype(int)
         value = -np.take_along_axis(np.sort(-single, axis=1), np.minimum(m, single.shape[1])[:, np.newaxis] - 1, axis=1)
         value, partial = value[:, 0], (count != self.n) & (count > 0)
-        m, count = m[partial], count[partial]
-        chance = np.maximum(betainc(m, count - m + 1, chi.sf(value[partial], n_modes)), SMALLEST)
-        value[partial] = chi.isf(np.maximum(betaincinv(self.m, self.n - self.m + 1, chance), SMALLEST), n_modes)
+        value[partial] = self._equally_likely(value[partial], m[partial], count[partial], n_modes)
         return value
+
+    def _equally_likely(self, value: Array, m: NDArray[np.intp], count: NDArray[np.intp], n_modes: int) -> Array:
+        """Indices in a full window that are as unlikely as these, the m-th of ``count``."""
+        farthest = chi.isf(betaincinv(m, count - m + 1, SMALLEST), n_modes)
+        chance = np.maximum(betainc(m, count - m + 1, chi.sf(np.minimum(value, farthest), n_modes)), SMALLEST)
+        return np.maximum(value / farthest, 1.0) * chi.isf(betaincinv(self.m, self.n - self.m + 1, chance), n_modes)

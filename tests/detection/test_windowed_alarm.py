@@ -106,6 +106,23 @@ def test_the_correlation_in_a_window_is_that_of_its_pairs():
 # m of n records
 
 
+@pytest.mark.parametrize("rule", [*RULES, "cusum"])
+def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
+    baseline = X.copy()
+    baseline.iloc[700, 1] = 900.0
+    with pytest.warns(match="absurdly far") as record:
+        WindowedAlarm(8, rule=rule).fit(baseline)
+    assert ["column 'f2'" in str(one.message) for one in record if "absurdly far" in str(one.message)] == [True]
+
+
+@pytest.mark.parametrize("rule", [*RULES, "cusum"])
+def test_the_farther_the_records_the_higher_the_index_of_windows_with_gaps(rule):
+    alarm = WindowedAlarm(8, rule=rule).fit(X)
+    indices = [alarm.damage_index(HOLED[:200] + scale * X.std()).to_numpy() for scale in (3, 6, 12, 50, 200, 1e5)]
+    assert np.isfinite(indices).all()
+    assert (np.diff(indices, axis=0)[:, 8:] > 0).all()
+
+
 @settings(max_examples=8, deadline=None)
 @given(st.integers(1, 12), st.data())
 def test_alarms_are_where_m_of_n_records_are_above_the_threshold(n, data):
