@@ -3,7 +3,7 @@
 import pandas as pd
 from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import Pipeline, make_pipeline
-from z24_recipes import FREQUENCIES, PAVEMENT, SCALES, Records, boosting, bridge_model, chain, compensate
+from z24_recipes import FREQUENCIES, SCALES, Records, boosting, bridge_model, chain, compensate
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import BiasAligner
@@ -33,19 +33,6 @@ def changes(measured, names):
     residuals, _ = compensate(measured, TemperatureMapper(), targets=names)
     relative = (100 * r / (m[names] - r) for m, r in zip(measured, residuals, strict=True))
     return Records(*(frame.groupby(frame.index.floor("D")).mean() for frame in relative))
-
-
-def change_table(measured, names):
-    """Changes of the parameters on damaged days, beside the scatter of healthy days."""
-    days = changes(measured, names)
-    frozen = measured.baseline[PAVEMENT].groupby(measured.baseline.index.floor("D")).mean() < FROST
-    scatter = {
-        "scatter, frosty days": days.baseline[frozen].std(),
-        "scatter, other days": days.baseline[~frozen].std(),
-        "mean, hold-out days": days.later.mean(),
-    }
-    damaged = days.damaged.set_axis(days.damaged.index.strftime("damaged, %d %b"))
-    return pd.concat([pd.DataFrame(scatter).T, damaged]), days, scatter["scatter, other days"]
 
 
 def identify(bridge):

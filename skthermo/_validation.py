@@ -28,6 +28,8 @@ if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit a
     def _fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[Method], Method]: ...
 
     class TransformerMixin:
+        """Transformers of which frames give frames, and arrays give arrays."""
+
         @overload
         def fit_transform(self, X: pd.DataFrame, y: Any = None) -> pd.DataFrame: ...
         @overload

@@ -79,9 +79,9 @@ def identified_sentences(identified: Any) -> list[str]:
     sentences = sentences or ["No group is clearly damaged."]
     if identified.is_unexplained:
         sentences.insert(0, _misfit(identified))
-    p_value = float(getattr(identified, "p_value", np.nan))
-    if np.isfinite(p_value):
-        sentences.append(f"The probability that a healthy structure shows such shifts is {probability(p_value)}.")
+    if np.isfinite(identified.p_value):
+        chance = probability(identified.p_value)
+        sentences.append(f"The probability that a healthy structure shows such shifts is {chance}.")
     return sentences
 
 

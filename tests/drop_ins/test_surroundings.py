@@ -12,13 +12,6 @@ pytestmark = pytest.mark.filterwarnings("default")  # what other packages warn o
 PAGE = "drop_ins.rst"
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The working directory, for what recipes write."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def test_mlflow(folder):
     mlflow = pytest.importorskip("mlflow")
     for needed in ("sqlalchemy", "alembic"):
