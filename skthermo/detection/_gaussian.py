@@ -94,6 +94,13 @@ def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
     return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
 
 
+def check_not_empty(rows: Array) -> None:
+    """Refuse modes that no row has."""
+    empty = np.isnan(rows).all(axis=0)
+    if empty.any():
+        raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(rows)} rows")
+
+
 def check_invertible(covariance: Array, rows: Array, size: Array | None = None) -> Array:
     """Standard deviations of the modes, if no mode is constant or a combination of others.
 

@@ -12,7 +12,7 @@ from skthermo._arrays import Array
 from skthermo._validation import HasMethods, StrOptions
 from skthermo._warnings import warn_user
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._gaussian import Gaussian, check_invertible, patterns, precisions
+from skthermo.detection._gaussian import Gaussian, check_invertible, check_not_empty, patterns, precisions
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
@@ -186,9 +186,7 @@ class MahalanobisDetector(DamageDetector):
 
 def _most_likely(F: Array) -> EmpiricalCovariance:
     """Mean and covariance of rows with or without gaps."""
-    empty = np.isnan(F).all(axis=0)
-    if empty.any():
-        raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(F)} rows")
+    check_not_empty(F)
     together = ~np.isnan(F).T @ ~np.isnan(F)
     if not together.all():
         first, second = np.argwhere(~together)[0]

@@ -10,6 +10,7 @@ from skthermo._arrays import Array
 from skthermo._validation import Interval, StrOptions
 from skthermo._weather import correlation_time
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._gaussian import check_not_empty
 from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection._window_laws import CountLaw, MeanLaw, SumLaw
 from skthermo.detection._windows import FadingWindows, Windows
@@ -134,6 +135,7 @@ class WindowedAlarm(DamageDetector):
     def _learn(self, windows: Windows | FadingWindows) -> Array:
         n_rows, index = len(windows.rows), np.full(len(windows.rows), np.nan)
         law = LAWS[self.rule]
+        check_not_empty(windows.rows)
         width = self.width_ = self.window if self.rule == "ewma" else windows.longest
         if n_rows < 2 * width:
             raise ValueError(

@@ -107,6 +107,12 @@ def test_the_correlation_in_a_window_is_that_of_its_pairs():
 
 
 @pytest.mark.parametrize("rule", [*RULES, "cusum"])
+def test_a_mode_without_a_value_is_refused(rule):
+    with pytest.raises(ValueError, match=r"modes \[1\] \(counted from 0\) are NaN in all 1500 rows"):
+        WindowedAlarm(8, rule=rule).fit(X.assign(f2=np.nan))
+
+
+@pytest.mark.parametrize("rule", [*RULES, "cusum"])
 def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
