@@ -33,15 +33,19 @@ class KW51Monitoring(Monitoring):
     is_published: bool | None
 
 
-class TrussCampaign(Monitoring):
-    """What `make_truss_campaign` returns."""
+class Campaign(Monitoring):
+    """Simulated records, with what they were simulated from."""
 
     clean_frequencies: pd.DataFrame
     theta: pd.DataFrame
     model: AffineModel
 
 
-class KW51Campaign(TrussCampaign):
+class TrussCampaign(Campaign):
+    """What `make_truss_campaign` returns."""
+
+
+class KW51Campaign(Campaign):
     """What `make_kw51_campaign` returns; ``shapes`` are there if they were asked for."""
 
     damping: pd.DataFrame
