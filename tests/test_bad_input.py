@@ -18,6 +18,7 @@ from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 
 import skthermo
+from skthermo._arguments import check_bounds, check_dofs, check_noise, check_prior, check_theta
 from skthermo.datasets import (
     kw51_structure,
     load_z24,
@@ -39,11 +40,6 @@ from skthermo.fem import (
     Spring,
     Structure,
     add_noise,
-    check_bounds,
-    check_dofs,
-    check_noise,
-    check_prior,
-    check_theta,
     evaluate,
     linearise,
     load_affine,

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo.datasets._kw51_changes import stiffness_factors
 from skthermo.datasets._kw51_monitoring import (
@@ -22,7 +23,6 @@ from skthermo.datasets._kw51_simulation import simulate
 from skthermo.datasets._kw51_truth import thermal_multipliers, truth_model
 from skthermo.datasets._kw51_weather import N_HOURS, draw_weather
 from skthermo.datasets._results import KW51Campaign
-from skthermo.fem import check_noise
 
 
 def make_kw51_campaign(

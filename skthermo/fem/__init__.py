@@ -1,7 +1,5 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
-from skthermo.fem._bounds import check_bounds, check_prior
-from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -10,13 +8,12 @@ from skthermo.fem._protocol import (
     LocalModel,
     ModalModel,
 )
-from skthermo.fem._theta import check_theta
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
-from skthermo.fem.sampling import add_noise, check_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
+from skthermo.fem.sampling import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 
 __all__ = [
     "AffineModel",
@@ -37,11 +34,6 @@ __all__ = [
     "Spring",
     "Structure",
     "add_noise",
-    "check_bounds",
-    "check_dofs",
-    "check_noise",
-    "check_prior",
-    "check_theta",
     "evaluate",
     "evaluate_modes",
     "linearise",

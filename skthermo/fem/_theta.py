@@ -4,9 +4,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, real_array
+from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 
 ROWS_PER_CHUNK = 256
@@ -16,66 +15,6 @@ ROWS_PER_CHUNK = 256
 def nominal_theta(n_parameters: int) -> Array:
     """One row of ones: every parameter at its nominal value."""
     return np.ones((1, n_parameters))
-
-
-def check_theta(
-    theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: bool = False, one_row: bool = False
-) -> Array:
-    """Rows of finite, positive multipliers, one column for each parameter.
-
-    Parameters
-    ----------
-    theta : array-like or DataFrame of shape (n_samples, n_parameters) or (n_parameters,)
-        Multipliers of the nominal values. A frame's columns must be the parameters' names
-        in their order; a vector is one row.
-    parameter_names : sequence of str
-        The parameters.
-    allow_nan : bool, default=False
-        Whether NaN is allowed for unknown values.
-    one_row : bool, default=False
-        Whether exactly one row is expected.
-
-    Returns
-    -------
-    ndarray of shape (n_samples, n_parameters)
-        The multipliers, a vector as one row.
-
-    Raises
-    ------
-    ValueError
-        If the width or the names differ, a value is not finite and positive, or there are
-        several rows where one is expected.
-
-    Examples
-    --------
-    >>> from skthermo.fem import check_theta
-    >>> check_theta([1.0, 0.9], ["E_deck", "E_arch"])
-    array([[1. , 0.9]])
-    >>> check_theta([[1.0, 0.9], [1.0, -0.1]], ["E_deck", "E_arch"])
-    Traceback (most recent call last):
-    ...
-    ValueError: theta must be finite and positive; row 1, parameter 'E_arch' is -0.1 (1 such values in all)
-    """
-    names = list(parameter_names)
-    if hasattr(theta, "columns") and list(theta.columns) != names:
-        raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
-    values = real_array(theta, "theta")
-    rows = values[np.newaxis] if values.ndim == 1 else values
-    if rows.ndim != 2 or rows.shape[1] != len(names):
-        raise ValueError(
-            f"theta has shape {values.shape}; expected (n_samples, {len(names)}), "
-            f"a column for each of the parameters {names}"
-        )
-    wrong = ~(np.isfinite(rows) & (rows > 0)) & ~(allow_nan & np.isnan(rows))
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        raise ValueError(
-            f"theta must be finite and positive; row {row}, parameter {names[column]!r} "
-            f"is {rows[row, column]} ({np.count_nonzero(wrong)} such values in all)"
-        )
-    if one_row and len(rows) != 1:
-        raise ValueError(f"theta has {len(rows)} rows; expected one")
-    return rows
 
 
 def warn_of_failures(theta: Array, solved: Array) -> None:

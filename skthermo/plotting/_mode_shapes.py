@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array
-from skthermo.fem import ModalModel, Structure, check_theta
+from skthermo.fem import ModalModel, Structure
 from skthermo.plotting._axes import Axes, panels
 from skthermo.plotting._members import (
     Cell,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
-from skthermo.fem import check_noise
 
 STEP = 1e-3
 """Step of differences in severity."""

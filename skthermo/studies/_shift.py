@@ -6,8 +6,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
-from skthermo.fem import check_noise
 from skthermo.studies._chain import healthy_frequencies
 
 N_PERIODS, MOST_PERIODS = 12, 60

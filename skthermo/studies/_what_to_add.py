@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import clone
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._frames import check_same_rows, column_names
 from skthermo._threads import single_blas_thread
 from skthermo._warnings import warn_user
 from skthermo._warnings_once import warnings_once, without_warnings
-from skthermo.fem import check_noise
 from skthermo.studies._candidate import Arrangement, longer
 from skthermo.studies._scenario import Scenario
 from skthermo.studies._study import DetectabilityStudy

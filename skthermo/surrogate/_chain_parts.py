@@ -8,11 +8,12 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
+from skthermo._arguments import check_bounds
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._models import check_model
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
-from skthermo.fem import check_bounds, linearise
+from skthermo.fem import linearise
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._mapper import TemperatureMapper

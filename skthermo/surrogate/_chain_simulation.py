@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array, MatrixLike, as_floats, as_random_state, real_array
 from skthermo._frames import check_same_rows, frame_like
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
-from skthermo.fem import check_noise
 from skthermo.surrogate._simulator import Simulator
 
 LARGE_FACTOR = 10.0

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Bounds
 from skthermo._frames import frame_like
 from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context
-from skthermo.fem import FEModel, check_theta
+from skthermo.fem import FEModel
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._refinement import Refinement
 from skthermo.surrogate._simulated_training import SimulatedTraining

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
+from skthermo._arguments import check_bounds
 from skthermo._arrays import Bounds
 from skthermo._io import lock
-from skthermo.fem import FEModel, check_bounds, sample, share_reordered
+from skthermo.fem import FEModel, sample, share_reordered
 
 ORDER_CHECKS = 256
 

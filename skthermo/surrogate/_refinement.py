@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
+from skthermo._arguments import check_bounds, check_noise, check_prior
 from skthermo._arrays import Array
-from skthermo.fem import check_bounds, check_noise, check_prior
 from skthermo.surrogate._posterior import Objective, Prior
 from skthermo.surrogate._refine import refine
 from skthermo.surrogate._shape_inputs import ShapeInputs

@@ -9,8 +9,9 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from skthermo._arguments import check_dofs
 from skthermo._arrays import Array, real_array
-from skthermo.fem import check_dofs, evaluate_modes, shape_components
+from skthermo.fem import evaluate_modes, shape_components
 
 NODE = 1e-6
 """Largest component at the sensors, as a share of the largest of the shape, below which a mode does not move them."""

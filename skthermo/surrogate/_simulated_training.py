@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_bounds, check_noise
 from skthermo._arrays import Array
 from skthermo._models import check_model
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
-from skthermo.fem import check_bounds, check_noise, evaluate
+from skthermo.fem import evaluate
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._inverse_inputs import InverseInputs
 from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations

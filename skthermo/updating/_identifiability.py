@@ -10,9 +10,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array
 from skthermo._models import check_model
-from skthermo.fem import FEModel, check_noise, shape_jacobian
+from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_dofs
 from skthermo._arrays import Array, real_array
-from skthermo.fem import check_dofs
 
 
 @dataclass

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array, real_array
 from skthermo._models import check_model
-from skthermo.fem import FEModel, check_theta, evaluate
+from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
 """Relative step of central differences at which rounding takes half of the digits of a frequency."""

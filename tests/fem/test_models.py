@@ -12,7 +12,8 @@ from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from skthermo.datasets import make_truss
-from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, check_noise, mac, sample
+from skthermo._arguments import check_noise
+from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, mac, sample
 
 
 def big_model(n_dof, reach=1):

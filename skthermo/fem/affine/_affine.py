@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
-from skthermo.fem._theta import check_theta, nominal_theta
+from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import (

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_array
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads
 from skthermo._warnings import warn_user
-from skthermo.fem._theta import check_theta, warn_of_failures
+from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._interventions import Interventions
 from skthermo.fem.affine._read_terms import check_different, check_modes

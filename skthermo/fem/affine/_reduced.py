@@ -5,9 +5,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_bounds, check_theta
 from skthermo._arrays import Array, Bounds, RandomState
-from skthermo.fem._bounds import check_bounds
-from skthermo.fem._theta import check_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._basis import Basis, grow_basis, projected_core
 from skthermo.fem.affine._core import AffineCore

@@ -6,8 +6,8 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_dofs
 from skthermo._arrays import Array
-from skthermo.fem._dofs import check_dofs
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._terms import DenseTerms
 from skthermo.fem.modal import shape_derivatives

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array, real_array
 from skthermo._warnings import warn_user
-from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, check_theta, failures_named, warn_of_failures
+from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
 

@@ -5,10 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_dofs, check_theta
 from skthermo._arrays import Array
-from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import LocalModel
-from skthermo.fem._theta import check_theta
 from skthermo.fem.modal._beside_modes import solve_beside_modes
 from skthermo.fem.modal._dense import hertz
 from skthermo.fem.modal._matrices import ParametrisedMatrix

@@ -4,7 +4,7 @@ from skthermo.fem.sampling._evaluate import evaluate
 from skthermo.fem.sampling._evaluate_modes import evaluate_modes
 from skthermo.fem.sampling._linearise import linearise
 from skthermo.fem.sampling._linearise_modes import linearise_modes
-from skthermo.fem.sampling._noise import add_noise, check_noise
+from skthermo.fem.sampling._noise import add_noise
 from skthermo.fem.sampling._sample import sample
 
-__all__ = ["add_noise", "check_noise", "evaluate", "evaluate_modes", "linearise", "linearise_modes", "sample"]
+__all__ = ["add_noise", "evaluate", "evaluate_modes", "linearise", "linearise_modes", "sample"]

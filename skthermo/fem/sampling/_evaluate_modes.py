@@ -8,12 +8,12 @@ import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_dofs, check_theta
 from skthermo._arrays import Array
 from skthermo._models import check_model
 from skthermo._threads import map_on_blas_threads
-from skthermo.fem._dofs import check_dofs
 from skthermo.fem._protocol import BatchModel, ModalModel
-from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta, warn_of_failures
+from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 from skthermo.fem.sampling._evaluate import check_n_jobs, check_shape, solve_chunk
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array
 from skthermo._models import check_model
 from skthermo.fem._protocol import FEModel
-from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta
+from skthermo.fem._theta import ROWS_PER_CHUNK
 from skthermo.fem.sampling._evaluate import check_n_jobs, check_shape, evaluate, solve_chunk
 
 

@@ -7,10 +7,11 @@ import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import check_theta
 from skthermo._arrays import Array
 from skthermo._models import check_model
 from skthermo.fem._protocol import ModalModel
-from skthermo.fem._theta import ROWS_PER_CHUNK, check_theta
+from skthermo.fem._theta import ROWS_PER_CHUNK
 from skthermo.fem.sampling._evaluate import check_n_jobs, solve_chunk
 from skthermo.fem.sampling._evaluate_modes import evaluate_modes
 from skthermo.fem.sampling._linearise import check_step, linearise

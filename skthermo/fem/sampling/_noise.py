@@ -3,42 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import check_noise
 from skthermo._arrays import RandomState, as_random_state, real_array
-
-
-def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
-    """Relative standard deviation of every mode.
-
-    Parameters
-    ----------
-    noise : float or array-like of shape (n_modes,)
-        Relative standard deviation, below 1; 0.01 means 1 %.
-    n_modes : int
-        Number of modes.
-
-    Returns
-    -------
-    ndarray of shape (n_modes,)
-        Relative standard deviations.
-
-    Raises
-    ------
-    ValueError
-        If the shape is neither () nor (n_modes,), or a value is negative, 1 or more, or not a real number.
-
-    Examples
-    --------
-    >>> from skthermo.fem import check_noise
-    >>> check_noise(0.01, 3)
-    array([0.01, 0.01, 0.01])
-    """
-    array = real_array(noise, "noise")
-    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
-        raise ValueError(
-            f"noise is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
-            f"a number or one for each of the {n_modes} modes"
-        )
-    return np.broadcast_to(array, (n_modes,))
 
 
 def add_noise(

@@ -1,0 +1,115 @@
+"""Checks of theta, bounds, priors, noise and degrees of freedom.
+
+Each returns its argument as an array, or raises a ValueError that says what was got and what was expected.
+"""
+
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import Array, Bounds, by_parameter, real_array
+
+
+def check_theta(
+    theta: ArrayLike, parameter_names: Sequence[str], *, allow_nan: bool = False, one_row: bool = False
+) -> Array:
+    """Rows of finite, positive multipliers, one column for each parameter."""
+    names = list(parameter_names)
+    if hasattr(theta, "columns") and list(theta.columns) != names:
+        raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
+    values = real_array(theta, "theta")
+    rows = values[np.newaxis] if values.ndim == 1 else values
+    if rows.ndim != 2 or rows.shape[1] != len(names):
+        raise ValueError(
+            f"theta has shape {values.shape}; expected (n_samples, {len(names)}), "
+            f"a column for each of the parameters {names}"
+        )
+    wrong = ~(np.isfinite(rows) & (rows > 0)) & ~(allow_nan & np.isnan(rows))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"theta must be finite and positive; row {row}, parameter {names[column]!r} "
+            f"is {rows[row, column]} ({np.count_nonzero(wrong)} such values in all)"
+        )
+    if one_row and len(rows) != 1:
+        raise ValueError(f"theta has {len(rows)} rows; expected one")
+    return rows
+
+
+def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
+    """Lowest and highest multiplier of every parameter."""
+    names = list(parameter_names)
+    if isinstance(bounds, Mapping):
+        widths = by_parameter(bounds, names, "bounds")
+        return np.vstack([check_bounds(_pair(width, name), [name]) for name, width in zip(names, widths, strict=True)])
+    array = real_array(bounds, "bounds")
+    if array.ndim == 0:
+        if not 0 < array < 1:
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
+        return np.tile([1 - array, 1 + array], (len(names), 1))
+    if array.shape != (len(names), 2):
+        raise ValueError(
+            f"bounds has shape {array.shape}; expected a half-width or ({len(names)}, 2), lowest and highest "
+            f"multipliers of {names}, or a mapping of these names"
+        )
+    for name, (lowest, highest) in zip(names, array, strict=True):
+        if not 0 < lowest < highest < np.inf:
+            raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected 0 < lowest < highest")
+    return array
+
+
+def check_prior(prior: ArrayLike | Mapping[str, float], parameter_names: Sequence[str]) -> Array:
+    """Standard deviation of the prior of every parameter."""
+    names = list(parameter_names)
+    given = by_parameter(prior, names, "prior") if isinstance(prior, Mapping) else prior
+    deviations = real_array(given, "prior")
+    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & np.isfinite(deviations)).all():
+        raise ValueError(
+            f"prior is {deviations}; expected relative standard deviations above 0, a number or one for each of {names}"
+        )
+    return np.broadcast_to(deviations, (len(names),))
+
+
+def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
+    """Relative standard deviation of every mode."""
+    array = real_array(noise, "noise")
+    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
+        raise ValueError(
+            f"noise is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
+            f"a number or one for each of the {n_modes} modes"
+        )
+    return np.broadcast_to(array, (n_modes,))
+
+
+def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
+    """Different degrees of freedom of a model."""
+    try:
+        array = np.asarray(dofs)
+    except ValueError as error:  # rows of different length
+        raise ValueError(f"dofs is {dofs!r:.200}; expected integers in one row") from error
+    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
+    outside = array[(array < 0) | (array >= n_dof)]
+    if outside.size:
+        raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
+    values, counts = np.unique(array, return_counts=True)
+    if (counts > 1).any():
+        raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
+    return array.astype(np.intp)
+
+
+def _pair(width: Any, name: str) -> Any:
+    """A half-width, or lowest and highest as the only row."""
+    if np.ndim(width) == 0:
+        if not (isinstance(width, Real) and 0 < float(width) < 1):
+            raise ValueError(
+                f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
+                "highest)"
+            )
+        return width
+    if np.shape(width) != (2,):
+        raise ValueError(f"bounds of parameter {name!r} are {width!r}; expected a half-width or (lowest, highest)")
+    return [width]
