@@ -117,3 +117,8 @@ def as_random_state(seed: Any) -> np.random.RandomState:
             f"random_state is {seed!r}; expected None, an integer from 0 to {2**32 - 1} or a numpy.random.RandomState "
             "(generator.integers(2**31) draws an integer from a numpy.random.Generator)"
         ) from error
+
+
+def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """At most that many of the rows, spread evenly over them."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]

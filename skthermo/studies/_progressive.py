@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo.studies._row_times import row_times, time_of
+from skthermo._times import row_times, time_of
 from skthermo.studies._state import State, check_name, only_group, severities_of
 
 

@@ -7,8 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._times import row_times, time_of
 from skthermo.studies._intervals import rate_of
-from skthermo.studies._row_times import row_times, time_of
 from skthermo.studies._state import State
 
 

@@ -11,8 +11,8 @@ from scipy.stats import qmc
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
-from skthermo.datasets import make_truss
 from skthermo._arguments import check_noise
+from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, mac, sample
 
 

@@ -17,7 +17,7 @@ from skthermo.fem.sampling._evaluate import check_n_jobs, check_shape, evaluate,
 
 
 def linearise(
-    model: FEModel, theta: ArrayLike, *, step: float = 0.001, n_jobs: int | None = None
+    model: FEModel, theta: ArrayLike, *, relative: bool = False, step: float = 0.001, n_jobs: int | None = None
 ) -> tuple[Array, Array]:
     """Frequencies of many rows of parameters, and their derivatives.
 
@@ -28,6 +28,8 @@ def linearise(
         differences.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
+    relative : bool, default=False
+        Whether to return d ln f / d ln theta in place of d f / d theta.
     step : float, default=0.001
         Relative step of central differences.
     n_jobs : int, optional
@@ -38,7 +40,7 @@ def linearise(
     frequencies : ndarray of shape (n_samples, n_modes)
         In Hz; NaN in rows with NaN.
     jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-        Derivatives d f / d theta in Hz; NaN in rows with NaN.
+        Derivatives d f / d theta in Hz or, if ``relative``, d ln f / d ln theta; NaN in rows with NaN.
 
     Raises
     ------
@@ -52,9 +54,9 @@ def linearise(
 
     >>> from skthermo.fem import AffineModel, linearise
     >>> model = AffineModel({("k",): [[400.0]]}, [[1.0]], n_modes=1)
-    >>> frequencies, jacobian = linearise(model, [[1.0], [4.0]])
-    >>> (jacobian[:, 0, 0] / frequencies[:, 0]).round(6)
-    array([0.5  , 0.125])
+    >>> frequencies, jacobian = linearise(model, [[1.0], [4.0]], relative=True)
+    >>> jacobian[:, 0, 0].round(6)
+    array([0.5, 0.5])
     """
     check_model(model)
     rows = check_theta(theta, model.parameter_names, allow_nan=True)
@@ -72,6 +74,8 @@ def linearise(
         slopes = exact(rows[known]) if exact else central_differences(model, rows[known], step, n_jobs)
     frequencies[known] = check_shape(solved, frequencies[known].shape, "the model's frequencies")
     jacobian[known] = check_shape(slopes, jacobian[known].shape, "the model's derivatives")
+    if relative:
+        jacobian *= rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
     return frequencies, jacobian
 
 
