@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._io import MemoryLimit, read_matlab_values, read_only_member
+from skthermo._io import read_matlab
 from skthermo._warnings import warn_user
 from skthermo.datasets._kw51_fields import (
     check_finite,
@@ -113,11 +113,9 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
     if (size := file.stat().st_size) > LARGEST_FILE:
         raise ValueError(f"{file}: {size / 1e6:.0f} MB; expected at most {LARGEST_FILE / 1e6:.0f} MB")
-    stored, limit = file.read_bytes(), MemoryLimit(size)
-    is_zip = stored.startswith(b"PK\x03\x04") or file.suffix.lower() == ".zip"
-    content = read_only_member(stored, ".mat", str(file), limit) if is_zip else stored
-    data = _data(read_matlab_values(content, str(file), limit), file)
-    if not is_zip:
+    data = _data(read_matlab(file), file)
+    stored = file.read_bytes()
+    if stored[126:128] in (b"IM", b"MI"):
         return KW51Monitoring(**data, is_published=None)
     md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
     if md5 != PUBLISHED_MD5:
