@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from skthermo._io import _child
+from skthermo._io._child import read
 
+CHILD = Path(__file__).with_name("_child.py")
 LEAST_MEMORY = 256_000_000
 TIMES_THE_FILE = 10
 EXPECTED = "ten times the size of the file or 256 MB (a sound file can be saved without compression)"
@@ -43,7 +44,7 @@ def read_half(file: Path) -> Any:
 
 
 def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
-    """What files hold; each comes with its form, one of ``_child.READERS``.
+    """What files hold; each comes with its form, one of the child's ``READERS``.
 
     Raises
     ------
@@ -74,14 +75,14 @@ def _run(job: str, output: Any, seconds: float) -> str:
     """Run the child; how it ended."""
     if not sys.executable or getattr(sys, "frozen", False):  # no interpreter that could run a script
         for file, form in json.loads(job)["files"]:
-            pickle.dump(_child.read(file, form), output)
+            pickle.dump(read(file, form), output)
         return "failed"
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    command = [sys.executable, "-P", _child.__file__]
+    command = [sys.executable, "-P", str(CHILD)]
     try:
         done = subprocess.run(
             command, input=job, stdout=output, stderr=subprocess.PIPE, text=True, env=environment, timeout=seconds

@@ -14,7 +14,8 @@ from sklearn.utils import Bunch
 
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from skthermo.preprocessing._assignment import MISSED, assign, shape_agreement
+from skthermo.preprocessing.tracking._assignment import MISSED, assign
+from skthermo.preprocessing.tracking._reference import shape_agreement
 from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)
