@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from skthermo._arrays import Array
-from skthermo.detection._gaussian import Mask, patterns
+from skthermo._arrays import Array, patterns
+from skthermo.detection._gaussian import Mask
 
 CHANCE = 0.95
 """Groups of rows get factors of their own only if they differ by more than chance would with this probability."""

@@ -45,7 +45,7 @@ class ReferenceModes(NamedTuple):
             warn_user(
                 f"{similar.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
                 f"frequency can lie within max_shift={max_shift:g} of both, and "
-                f"{'no shapes are given' if self.shapes is None else by}; expected a smaller max_shift, or more sensors",
+                f"{'no shapes are given' if self.shapes is None else by}; expected a smaller max_shift or more sensors",
                 "modes that can be confused",
             )
 
