@@ -12,6 +12,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 
 @pytest.fixture
-def in_process(monkeypatch):
+def in_process(request, monkeypatch):
     """Files are read in this process, as in a frozen program, which saves half a second for each."""
-    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    if getattr(request, "param", True):
+        monkeypatch.setattr(sys, "frozen", True, raising=False)

@@ -1,5 +1,7 @@
 """Synthetic monitoring of the 28-bar truss."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Synthetic monitoring of the railway bridge KW51: retrofit, drift, damage, noise and gaps."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from numbers import Real
 from typing import Any

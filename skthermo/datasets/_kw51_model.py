@@ -1,5 +1,7 @@
 """FE model of the railway bridge KW51: structure, parameters, sensors; `make_kw51` explains the assumptions."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any

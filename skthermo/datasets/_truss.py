@@ -1,5 +1,7 @@
 """The 28-bar planar truss."""
 
+from __future__ import annotations
+
 import json
 from importlib.resources import files
 

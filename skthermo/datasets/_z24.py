@@ -1,5 +1,7 @@
 """Monitoring of the Z24 bridge."""
 
+from __future__ import annotations
+
 import csv
 from os import PathLike
 from pathlib import Path

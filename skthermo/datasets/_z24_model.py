@@ -1,5 +1,7 @@
 """The Z24 bridge as a stick of beams on springs."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from itertools import pairwise
 from math import ceil

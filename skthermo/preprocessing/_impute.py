@@ -1,5 +1,7 @@
 """Fills gaps in monitoring records."""
 
+from __future__ import annotations
+
 from typing import Any, overload
 
 import numpy as np
@@ -109,7 +111,7 @@ class KNNGapImputer(KNNImputer):
             keep_empty_features=keep_empty_features,
         )
 
-    def fit(self, X: ArrayLike, y: None = None) -> "KNNGapImputer":
+    def fit(self, X: ArrayLike, y: None = None) -> KNNGapImputer:
         """Store the records among which neighbours are searched.
 
         Parameters

@@ -1,5 +1,7 @@
 """FE models that other programs have exported as matrices."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import reduce

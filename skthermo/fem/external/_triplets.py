@@ -1,5 +1,7 @@
 """Matrices that FE programs write as text, one entry a line."""
 
+from __future__ import annotations
+
 from os import PathLike
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Assigns the poles that operational modal analysis finds in each record to reference modes."""
 
+from __future__ import annotations
+
 from datetime import timedelta
 from numbers import Real
 from typing import Any
@@ -130,7 +132,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         self.close = close
 
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any = None, y: None = None) -> "ModeTracker":
+    def fit(self, X: Any = None, y: None = None) -> ModeTracker:
         """Read the reference.
 
         Parameters
