@@ -40,6 +40,8 @@ DAMPING_BY_KELVIN, DAMPING_SCATTER = 0.006, 0.25
 
 SHAPE_NOISE = 0.01
 
+YEAR = 8766.0  # hours
+
 
 def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours without temperature: until the sensor was installed, and a few blocks later."""
@@ -68,9 +70,6 @@ def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.c
     level = SHAPE_NOISE * np.sqrt((clean**2).mean(axis=2, keepdims=True))
     noisy = (clean + level * (noise[0] + 1j * noise[1])) * phase
     return noisy / np.linalg.norm(noisy, axis=2, keepdims=True)
-
-
-YEAR = 8766.0  # hours
 
 
 def stiffness_factors(

@@ -23,77 +23,6 @@ DATES = (730486, 767011)  # 2000-01-01 and 2100-01-01
 FREQUENCIES, DAMPING_RATIOS, CELSIUS = (0.1, 100.0), (-1.0, 1.0), (-60.0, 80.0)  # what they may be
 STAND_FOR_MISSING = (-99, -999, -9999, -99999, 9999, 99999, 999999)
 
-
-def numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:
-    """An array of numbers."""
-    if not isinstance(value, np.ndarray):
-        raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
-    if np.iscomplexobj(value) and not complex_too:
-        raise ValueError(f"{what} has complex numbers; expected real ones")
-    return value
-
-
-def labels_of(value: Any, what: str) -> list[str]:
-    """Texts of a cell array, nested or not, or of the rows of a matrix of characters."""
-    labels = [text.strip() for text in _texts(value, what)]
-    are_names = all(label and label.isprintable() for label in labels)
-    if not are_names or len(set(labels)) != len(labels) or not 0 < len(labels) <= MOST_LABELS:
-        found = [label[:50] for label in labels[:50]]
-        raise ValueError(f"{what} has {len(labels)} names, {found}; expected 1 to {MOST_LABELS} that differ")
-    return labels
-
-
-def _texts(value: Any, what: str) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, list):
-        for part in value or [""]:  # MATLAB's empty text has no rows
-            yield from _texts(part, what)
-    else:
-        raise ValueError(f"{what} holds something else than texts; expected a cell array of names")
-
-
-def check_shape(values: NDArray, shape: tuple[int, ...], what: str) -> None:
-    """Raise an error for another shape than expected; MATLAB leaves out last axes of length one."""
-    if values.shape + (1,) * (len(shape) - values.ndim) != shape:
-        raise ValueError(
-            f"{what} has shape {values.shape}; expected {shape}, the records and modes of 'f' and the names in "
-            "'labels_m' and 'labels_env'"
-        )
-
-
-def check_possible(values: Array, columns: list[str], limits: list[tuple[float, float] | None], what: str) -> None:
-    """Raise an error for the first value that cannot be measured, such as -999; a column may have limits."""
-    wrong = np.isinf(values) | np.isin(values, STAND_FOR_MISSING)
-    for column, limit in enumerate(limits):
-        if limit:
-            wrong[:, column] |= (values[:, column] < limit[0]) | (values[:, column] > limit[1])
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        expected = "{:g} to {:g}".format(*limits[column]) if limits[column] else "a measured value"
-        raise ValueError(
-            f"{what}, row {row}, column {columns[column]!r} is {values[row, column]:g}; expected {expected}, or NaN "
-            "where it is missing"
-        )
-
-
-def time_of(numbers: Array, what: str) -> pd.DatetimeIndex:
-    """MATLAB date numbers as time stamps to the second; each may stand there once."""
-    wrong = ~((numbers >= DATES[0]) & (numbers < DATES[1]))
-    if wrong.any():
-        row = np.flatnonzero(wrong)[0]
-        raise ValueError(
-            f"{what}, row {row} is {numbers[row]}; expected a MATLAB date number from {DATES[0]} (year 2000) to "
-            f"{DATES[1]} (2100)"
-        )
-    seconds = np.rint((numbers - UNIX_EPOCH) * 86400).astype("datetime64[s]")
-    time = pd.DatetimeIndex(seconds.astype("datetime64[ns]"), name="time")
-    if time.has_duplicates:
-        row = np.flatnonzero(time.duplicated())[0]
-        raise ValueError(f"{what}, row {row} repeats {time[row]}; expected each time stamp once")
-    return time
-
-
 PUBLISHED_MD5 = "5cdb446519d1150228fab51b3a002239"
 MOST_MODES = 1000
 TEMPERATURES = ("tBD31A", "tVL")
@@ -207,22 +136,22 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
     missing = [name for name in FIELDS if name not in modes]
     if missing:
         raise ValueError(f"{file}: no field {missing} in 'modes'; found {sorted(modes)[:50]}")
-    sdn, f, xi, env = (numbers_of(modes[name], f"{file}: field {name!r}") for name in ("sdn", "f", "xi", "env"))
-    m = numbers_of(modes["m"], f"{file}: field 'm'", complex_too=True)
-    sensors, channels = (labels_of(modes[name], f"{file}: field {name!r}") for name in ("labels_m", "labels_env"))
+    sdn, f, xi, env = (_numbers_of(modes[name], f"{file}: field {name!r}") for name in ("sdn", "f", "xi", "env"))
+    m = _numbers_of(modes["m"], f"{file}: field 'm'", complex_too=True)
+    sensors, channels = (_labels_of(modes[name], f"{file}: field {name!r}") for name in ("labels_m", "labels_env"))
     if f.ndim != 2 or not f.size or f.shape[1] > MOST_MODES:
         raise ValueError(f"{file}: field 'f' has shape {f.shape}; expected records times at most {MOST_MODES} modes")
     n_records, n_modes = f.shape
-    check_shape(sdn.T if len(sdn) == 1 else sdn, (n_records, 1), f"{file}: field 'sdn'")
-    check_shape(xi, f.shape, f"{file}: field 'xi'")
-    check_shape(env, (n_records, len(channels)), f"{file}: field 'env'")
-    check_shape(m, (n_records, n_modes, len(sensors)), f"{file}: field 'm'")
+    _check_shape(sdn.T if len(sdn) == 1 else sdn, (n_records, 1), f"{file}: field 'sdn'")
+    _check_shape(xi, f.shape, f"{file}: field 'xi'")
+    _check_shape(env, (n_records, len(channels)), f"{file}: field 'env'")
+    _check_shape(m, (n_records, n_modes, len(sensors)), f"{file}: field 'm'")
     f_names, xi_names = ([f"{name}{number}" for number in range(1, n_modes + 1)] for name in ("f", "xi"))
-    check_possible(f, f_names, [FREQUENCIES] * n_modes, f"{file}: field 'f'")
-    check_possible(xi, xi_names, [DAMPING_RATIOS] * n_modes, f"{file}: field 'xi'")
+    _check_possible(f, f_names, [FREQUENCIES] * n_modes, f"{file}: field 'f'")
+    _check_possible(xi, xi_names, [DAMPING_RATIOS] * n_modes, f"{file}: field 'xi'")
     doubtful = np.isin(env, STAND_FOR_MISSING) & ~np.isin(channels, TEMPERATURES)
     limits = [CELSIUS if channel in TEMPERATURES else None for channel in channels]
-    check_possible(np.where(doubtful, np.nan, env), channels, limits, f"{file}: field 'env'")
+    _check_possible(np.where(doubtful, np.nan, env), channels, limits, f"{file}: field 'env'")
     if doubtful.any():
         row, column = np.argwhere(doubtful)[0]
         warn_user(
@@ -233,8 +162,8 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):
-            check_possible(part[:, :, number], f_names, [None] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
-    time = time_of(sdn.ravel(), f"{file}: field 'sdn'")
+            _check_possible(part[:, :, number], f_names, [None] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
+    time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
     return {
         "temperatures": pd.DataFrame(env, index=time, columns=channels),
         "frequencies": pd.DataFrame(f, index=time, columns=f_names),
@@ -243,6 +172,76 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
         "sensors": sensors,
         "state": state_of(time),
     }
+
+
+def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:
+    """An array of numbers."""
+    if not isinstance(value, np.ndarray):
+        raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
+    if np.iscomplexobj(value) and not complex_too:
+        raise ValueError(f"{what} has complex numbers; expected real ones")
+    return value
+
+
+def _labels_of(value: Any, what: str) -> list[str]:
+    """Texts of a cell array, nested or not, or of the rows of a matrix of characters."""
+    labels = [text.strip() for text in _texts(value, what)]
+    are_names = all(label and label.isprintable() for label in labels)
+    if not are_names or len(set(labels)) != len(labels) or not 0 < len(labels) <= MOST_LABELS:
+        found = [label[:50] for label in labels[:50]]
+        raise ValueError(f"{what} has {len(labels)} names, {found}; expected 1 to {MOST_LABELS} that differ")
+    return labels
+
+
+def _texts(value: Any, what: str) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list):
+        for part in value or [""]:  # MATLAB's empty text has no rows
+            yield from _texts(part, what)
+    else:
+        raise ValueError(f"{what} holds something else than texts; expected a cell array of names")
+
+
+def _check_shape(values: NDArray, shape: tuple[int, ...], what: str) -> None:
+    """Raise an error for another shape than expected; MATLAB leaves out last axes of length one."""
+    if values.shape + (1,) * (len(shape) - values.ndim) != shape:
+        raise ValueError(
+            f"{what} has shape {values.shape}; expected {shape}, the records and modes of 'f' and the names in "
+            "'labels_m' and 'labels_env'"
+        )
+
+
+def _check_possible(values: Array, columns: list[str], limits: list[tuple[float, float] | None], what: str) -> None:
+    """Raise an error for the first value that cannot be measured, such as -999; a column may have limits."""
+    wrong = np.isinf(values) | np.isin(values, STAND_FOR_MISSING)
+    for column, limit in enumerate(limits):
+        if limit:
+            wrong[:, column] |= (values[:, column] < limit[0]) | (values[:, column] > limit[1])
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        expected = "{:g} to {:g}".format(*limits[column]) if limits[column] else "a measured value"
+        raise ValueError(
+            f"{what}, row {row}, column {columns[column]!r} is {values[row, column]:g}; expected {expected}, or NaN "
+            "where it is missing"
+        )
+
+
+def _time_of(numbers: Array, what: str) -> pd.DatetimeIndex:
+    """MATLAB date numbers as time stamps to the second; each may stand there once."""
+    wrong = ~((numbers >= DATES[0]) & (numbers < DATES[1]))
+    if wrong.any():
+        row = np.flatnonzero(wrong)[0]
+        raise ValueError(
+            f"{what}, row {row} is {numbers[row]}; expected a MATLAB date number from {DATES[0]} (year 2000) to "
+            f"{DATES[1]} (2100)"
+        )
+    seconds = np.rint((numbers - UNIX_EPOCH) * 86400).astype("datetime64[s]")
+    time = pd.DatetimeIndex(seconds.astype("datetime64[ns]"), name="time")
+    if time.has_duplicates:
+        row = np.flatnonzero(time.duplicated())[0]
+        raise ValueError(f"{what}, row {row} repeats {time[row]}; expected each time stamp once")
+    return time
 
 
 def state_of(time: pd.DatetimeIndex) -> pd.Series:

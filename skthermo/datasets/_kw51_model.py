@@ -41,6 +41,50 @@ STEEL = {"E": STEEL_E, "G": STEEL_E / (2 + 2 * NU), "density": STEEL_DENSITY, "I
 STATIONS, LINES, SIDES = range(N_BAYS + 1), range(N_PANELS + 1), (0, N_PANELS)
 ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * x for x in PIPES)})
 
+SIDE_LINES = {"A": 0, "C": N_PANELS}
+DECK_SENSORS = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
+ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}
+"""Stations of the arch."""
+
+THERMAL = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
+PARAMETERS = {
+    "E_bot": "bottom",
+    "E_arc": "arch",
+    "E_br": "braces",
+    "E_con": "connections",
+    "E_pip": "pipes",
+    "E_b": "ballast",
+    "A_c": ("A", "connections", "stiffness"),
+    "A_p": ("A", "pipes", "stiffness"),
+    "I_33p": ("I_yy", "pipes"),
+    "I_22p": ("I_zz", "pipes"),
+    "A_d": ("A", "braces", "stiffness"),
+    "I_33a": ("I_yy", "arch"),
+    "I_22a": ("I_zz", "arch"),
+    "A_a": ("A", "arch", "stiffness"),
+    "J_a": ("J", "arch"),
+    "M_a": ("mass", "arch"),
+    "I_33g": ("I_yy", "girders"),
+    "I_22g": ("I_zz", "girders"),
+    "M_g": ("mass", "girders"),
+    "A_tb": ("A", "transverse_beams", "stiffness"),
+    "I_22s": ("I_zz", "stiffeners"),
+}
+UPDATED = {
+    "E_bot": 1.3,
+    "E_arc": 0.9,
+    "E_br": 0.9,
+    "E_con": 0.9,
+    "E_pip": 0.942523,
+    "A_c": 1.5,
+    "I_22p": 0.5,
+    "A_d": 1.031471,
+    "I_22a": 1.128122,
+    "A_a": 1.016123,
+    "M_a": 0.711763,
+}
+"""Multipliers of the updated model: the optimum of the third fit of examples/plot_kw51_updating.py."""
+
 
 def kw51_structure() -> Structure:
     """Nodes, members, supports and groups of the model `make_kw51`.
@@ -161,46 +205,6 @@ def membranes(part: str, **properties: float) -> dict[Node, Membrane]:
         for s in STATIONS[:-1]
         for n in LINES[:-1]
     }
-
-
-THERMAL = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
-PARAMETERS = {
-    "E_bot": "bottom",
-    "E_arc": "arch",
-    "E_br": "braces",
-    "E_con": "connections",
-    "E_pip": "pipes",
-    "E_b": "ballast",
-    "A_c": ("A", "connections", "stiffness"),
-    "A_p": ("A", "pipes", "stiffness"),
-    "I_33p": ("I_yy", "pipes"),
-    "I_22p": ("I_zz", "pipes"),
-    "A_d": ("A", "braces", "stiffness"),
-    "I_33a": ("I_yy", "arch"),
-    "I_22a": ("I_zz", "arch"),
-    "A_a": ("A", "arch", "stiffness"),
-    "J_a": ("J", "arch"),
-    "M_a": ("mass", "arch"),
-    "I_33g": ("I_yy", "girders"),
-    "I_22g": ("I_zz", "girders"),
-    "M_g": ("mass", "girders"),
-    "A_tb": ("A", "transverse_beams", "stiffness"),
-    "I_22s": ("I_zz", "stiffeners"),
-}
-UPDATED = {
-    "E_bot": 1.3,
-    "E_arc": 0.9,
-    "E_br": 0.9,
-    "E_con": 0.9,
-    "E_pip": 0.942523,
-    "A_c": 1.5,
-    "I_22p": 0.5,
-    "A_d": 1.031471,
-    "I_22a": 1.128122,
-    "A_a": 1.016123,
-    "M_a": 0.711763,
-}
-"""Multipliers of the updated model: the optimum of the third fit of examples/plot_kw51_updating.py."""
 
 
 def make_kw51(
@@ -335,12 +339,6 @@ def updated_model(structure: Structure, parameters: Mapping[str, Any], n_modes: 
     model = structure.assemble(bound, n_modes=n_modes, track=True)
     theta = [UPDATED.get(name, 1.0) for name in model.parameter_names]
     return model.rescaled(theta).with_parameters(list(parameters))
-
-
-SIDE_LINES = {"A": 0, "C": N_PANELS}
-DECK_SENSORS = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
-ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}
-"""Stations of the arch."""
 
 
 def kw51_sensors() -> dict[str, int]:

@@ -41,6 +41,18 @@ FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.5, 1.0, 2.0  # stiffer by (rat
 MOISTURE = 0.0018  # standard deviation of the ballast's mass
 SLIDING, ROCKING = 1e7, 3e7  # N/m and N m/rad at each bearing
 
+STIFFENED = {"arch_connections": 0.906, "deck_connections": 0.430}
+ADDED = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and connection
+PROGRESS = pd.DataFrame(
+    {"mass": [0.0, 0.0, 0.5, 0.5, 0.5, 1.0], "stiffness": [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]},
+    index=pd.to_datetime(["2019-05-15", "2019-06-06", "2019-06-20", "2019-06-28", "2019-09-06", "2019-09-16"]),
+)
+
+TOLERANCE = 1e-4  # errors were found to be below 1e-5 at simulated states
+LASTING = 500  # hours
+NO_MASS = 1e-9  # multipliers are positive
+ROWS = 200  # whose shapes are in memory together
+
 
 def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
     """Multipliers of the parameters ``TRUTH`` in every hour."""
@@ -89,14 +101,6 @@ def truth_model() -> AffineModel:
     return updated_model(truth_structure(), TRUTH, 6)
 
 
-STIFFENED = {"arch_connections": 0.906, "deck_connections": 0.430}
-ADDED = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and connection
-PROGRESS = pd.DataFrame(
-    {"mass": [0.0, 0.0, 0.5, 0.5, 0.5, 1.0], "stiffness": [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]},
-    index=pd.to_datetime(["2019-05-15", "2019-06-06", "2019-06-20", "2019-06-28", "2019-09-06", "2019-09-16"]),
-)
-
-
 def joint_masses() -> dict[Hashable, PointMass]:
     """A point mass at every joint."""
     joints = [node for node in kw51_structure().nodes if node[0] == "joint"]
@@ -117,12 +121,6 @@ def progress_of(index: pd.DatetimeIndex, retrofit: bool) -> pd.DataFrame:
     knots = (PROGRESS.index - index[0]) / pd.Timedelta(hours=1)
     hours = np.arange(len(index))
     return pd.DataFrame({name: np.interp(hours, knots, shares) for name, shares in PROGRESS.items()}, index)
-
-
-TOLERANCE = 1e-4  # errors were found to be below 1e-5 at simulated states
-LASTING = 500  # hours
-NO_MASS = 1e-9  # multipliers are positive
-ROWS = 200  # whose shapes are in memory together
 
 
 def simulate(
