@@ -49,7 +49,7 @@ def test_records_are_those_of_the_bridge(campaign):
 
 def test_one_seed_gives_one_campaign(campaign, unchanged):
     again = make_kw51_campaign(n_hours=2000, random_state=0)
-    changed = make_kw51_campaign(n_hours=2000, noise=0.0, damage={"pipes": 0.1}, random_state=0)
+    changed = make_kw51_campaign(n_hours=2000, noise=0.0, damage={"braces": 0.2}, random_state=0)
     for name in ("temperatures", "frequencies", "damping", "theta", "clean_frequencies"):
         assert_frame_equal(again[name], campaign[name][:2000], check_exact=True)
     for other in (changed, unchanged):

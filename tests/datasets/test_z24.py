@@ -172,7 +172,7 @@ def test_damaged_and_truncated_tables_never_become_nonsense(csv_file, cut, posit
 
 
 @IN_A_CHILD
-@settings(FUZZ, max_examples=3)
+@settings(FUZZ, max_examples=2)
 @given(cut=st.integers(0, 10_000), position=st.integers(0, 10_000), byte=st.integers(0, 255))
 @pytest.mark.parametrize("form", ["mat_file", "packed_file"])
 def test_damaged_and_truncated_files_never_become_nonsense(form, request, cut, position, byte):

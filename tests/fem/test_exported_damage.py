@@ -44,7 +44,7 @@ def outcome(path, n_modes=4):
             return str(error)
 
 
-FUZZ = settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=2, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
