@@ -73,20 +73,16 @@ def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
 
 def _run(job: str, output: Any, seconds: float) -> str:
     """Run the child; how it ended."""
-    if not sys.executable or getattr(sys, "frozen", False):  # no interpreter that could run a script
+    name = Path(sys.executable or "").name.lower()
+    if getattr(sys, "frozen", False) or not name.startswith(("python", "pypy")):  # a program that embeds Python
         for file, form in json.loads(job)["files"]:
             pickle.dump(read(file, form), output)
         return "failed"
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
-    command = [sys.executable, "-P", str(CHILD)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command, pipes = [sys.executable, "-P", str(CHILD)], {"stdout": output, "stderr": subprocess.PIPE}
     try:
-        done = subprocess.run(
-            command, input=job, stdout=output, stderr=subprocess.PIPE, text=True, env=environment, timeout=seconds
-        )
+        done = subprocess.run(command, input=job.encode(), env=environment, timeout=seconds, check=False, **pipes)
     except subprocess.TimeoutExpired:
         return f"took more than {seconds:.0f} s"
-    return f"ended the process with exit code {done.returncode} {done.stderr[-300:].strip()}".strip()
+    return f"ended the process with exit code {done.returncode} {done.stderr[-300:].decode(errors='replace')}".strip()

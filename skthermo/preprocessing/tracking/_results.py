@@ -12,7 +12,7 @@ from skthermo.preprocessing.tracking._poles import Poles
 from skthermo.preprocessing.tracking._reference import ReferenceModes, shape_agreement
 
 FEW_RECORDS = 20  # too few for a warning that a mode is missing
-NEAR = 0.02  # relative difference in frequency of a pole that is probably the mode's own
+NEAR_FREQUENCY = 0.02  # relative difference in frequency of a pole that is probably the mode's own
 
 
 class TrackedModes(Bunch):
@@ -161,7 +161,7 @@ def _warn_of_other_shapes(
     """One warning for modes that most records lack although they have a pole at the frequency: its shape differs."""
     free = np.flatnonzero(is_free)
     record = poles.record[free]
-    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < NEAR
+    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < NEAR_FREQUENCY
     problems = []
     for j, name in enumerate(modes.names):
         near, n_missing = free[is_near[:, j] & ~found[record, j]], (~found[:, j]).sum()
@@ -169,8 +169,8 @@ def _warn_of_other_shapes(
         mac = shape_agreement(poles.shapes[near], modes.shapes[:, [j]], [])[0]
         if n_near >= FEW_RECORDS / 2 and n_near > n_missing / 2 and np.isfinite(mac).any():
             problems.append(
-                f"{n_near} of {n_missing} records without {name!r} have a pole within {NEAR:.0%} of its frequency, "
-                f"whose MAC with the reference is about {np.nanmedian(mac):.2f}"
+                f"{n_near} of {n_missing} records without {name!r} have a pole within {NEAR_FREQUENCY:.0%} of its "
+                f"frequency, whose MAC with the reference is about {np.nanmedian(mac):.2f}"
             )
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
