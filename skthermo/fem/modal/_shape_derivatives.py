@@ -3,14 +3,14 @@
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.modal._matrices import DenseMatrix
+from skthermo.fem._terms import DenseTerms
 
 NUDGE = 1e-9
 """Share of the stiffness that is added where a repeated eigenvalue makes the equations singular."""
 
 
 def shape_derivatives(
-    stiffness: DenseMatrix, mass: DenseMatrix, theta: Array, eigenvalues: Array, shapes: Array
+    stiffness: DenseTerms, mass: DenseTerms, theta: Array, eigenvalues: Array, shapes: Array
 ) -> Array:
     """Derivatives of mode shapes of unit modal mass, (n_samples, n, n_modes, n_parameters).
 
