@@ -4,8 +4,7 @@ import numpy as np
 
 from skthermo._arrays import Array
 from skthermo.fem import FEModel
-from skthermo.updating._comparison import PairedModes, paired_modes
-from skthermo.updating._information import tangent_derivatives, tangents
+from skthermo.updating._comparison import PairedModes, paired_modes, tangent_derivatives, tangents
 from skthermo.updating._measured import Measured
 
 

@@ -1,7 +1,6 @@
-"""Tables and warnings about the result of model updating."""
+"""Tables and warnings about the result of an updating."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import cast
 
 import numpy as np
@@ -9,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.fem import CallableModel, FEModel, ModalModel, share_reordered
+from skthermo.fem import FEModel, ModalModel, share_reordered
 from skthermo.updating._comparison import macs, paired_modes
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome
@@ -67,18 +66,6 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
             optima.append(theta)
         numbers[i] = near[0]
     return table.assign(optimum=numbers)
-
-
-def rescaled(model: FEModel, theta: Array) -> FEModel:
-    """A model whose nominal state is the given model at theta."""
-    if hasattr(model, "rescaled"):
-        return model.rescaled(theta)
-    function = partial(_frequencies_from, model, theta)
-    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
-
-
-def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
-    return model.frequencies(origin * theta)
 
 
 def unfinished(outcome: Outcome, residuals: Residuals) -> str:
