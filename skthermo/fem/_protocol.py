@@ -1,5 +1,7 @@
 """The interface of FE models: required and optional methods."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
@@ -137,7 +139,7 @@ class DamageableModel(FEModel, Protocol):
     def groups(self) -> Mapping[str, Any]:
         """The damage groups by name."""
 
-    def damaged(self, damage: Mapping[str, float]) -> "DamageableModel":
+    def damaged(self, damage: Mapping[str, float]) -> DamageableModel:
         """A new model with the stiffness of each group times (1 - severity).
 
         Parameters

@@ -19,10 +19,10 @@ from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 
-COLLINEAR = 0.99
+COLLINEAR_COSINE = 0.99
 """Cosine between two parameters' effects at and above which they cannot be told apart."""
 
-WELL_KNOWN = 0.1
+ACCURATE = 0.1
 """Largest relative standard deviation of the estimates of a recommended subset."""
 
 
@@ -213,7 +213,7 @@ def _deviations(rows: Array, level: float) -> Array:
 def _recommended(rows: Array, ranking: NDArray[np.intp], level: float) -> NDArray[np.intp]:
     """Longest prefix of the ranking whose parameters can be estimated well together."""
     for size in range(len(ranking), 0, -1):
-        if (_deviations(rows[:, ranking[:size]], level) <= WELL_KNOWN).all():
+        if (_deviations(rows[:, ranking[:size]], level) <= ACCURATE).all():
             return ranking[:size]
     return ranking[:0]
 
@@ -223,6 +223,6 @@ def collinear_groups(rows: Array) -> list[NDArray[np.intp]]:
     lengths = np.linalg.norm(rows, axis=0)
     nonzero = np.flatnonzero(lengths > 0)
     directions = rows[:, nonzero] / lengths[nonzero]
-    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR), directed=False)[1]
+    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR_COSINE), directed=False)[1]
     groups = (nonzero[labels == label] for label in np.unique(labels))
     return [group for group in groups if len(group) > 1]

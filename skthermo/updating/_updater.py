@@ -21,7 +21,14 @@ from skthermo._frames import column_names
 from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
 from skthermo.fem import CallableModel, FEModel
-from skthermo.updating._diagnostics import doubtful_fits, false_matches, modes_table, starts_table, unfinished
+from skthermo.updating._diagnostics import (
+    doubtful_frequencies,
+    doubtful_parameters,
+    false_matches,
+    modes_table,
+    starts_table,
+    unfinished,
+)
 from skthermo.updating._identifiability import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
@@ -217,7 +224,8 @@ class ModelUpdater(BaseEstimator):
             reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
-        bounds, prior = self._read_bounds(), self._read_prior()
+        bounds = self._read_bounds()
+        prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
         n_parameters = len(bounds)
         if prior is None and n_parameters > measured.n_residuals:
             warnings.warn(
@@ -243,14 +251,9 @@ class ModelUpdater(BaseEstimator):
         self.table_ = modes_table(model, measured, best.theta)
         doubts = [*false_matches(model, measured, best.theta)]
         if best.success:
-            doubts += doubtful_fits(
-                measured,
-                self.table_,
-                best.theta,
-                bounds,
-                self.covariance_ if prior is None else None,
-                self.model.parameter_names,
-            )
+            covariance = self.covariance_ if prior is None else None
+            doubts += doubtful_parameters(self.model.parameter_names, best.theta, bounds, covariance)
+            doubts += doubtful_frequencies(measured, self.table_)
         else:
             doubts.append(unfinished(best, residuals))
         for message in doubts:
@@ -286,9 +289,6 @@ class ModelUpdater(BaseEstimator):
             if not lowest <= 1 <= highest:
                 raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected them to contain 1")
         return bounds
-
-    def _read_prior(self) -> Array | None:
-        return None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
 
     def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
         lowest, highest = bounds.T

@@ -25,8 +25,8 @@ from skthermo.fem.modal import LocalModes
 class AffineBase(ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
-    A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and
-    `_bounds_warning` are for models that are solved on a basis, within a box.
+    A subclass stores ``_parameter_names``, ``_groups`` and ``_core``. ``_basis`` and `_bounds_warning` are for models
+    that are solved on a basis, within a box.
     """
 
     _parameter_names: tuple[str, ...]

@@ -33,21 +33,11 @@ CHUNK_BYTES = 2**25
 
 @dataclass(frozen=True, eq=False)
 class NominalModes:
-    """The healthy nominal modes, which the columns of a tracking model follow.
+    """The healthy nominal modes, which the columns of a tracking model follow."""
 
-    Attributes
-    ----------
-    weighted_shapes : ndarray of shape (n, n_modes)
-        M phi, with the nominal mass M and shapes phi of unit modal mass.
-    mass_coefficients : ndarray of shape (n_mass_terms,)
-        Coefficient of each mass term in M.
-    repeated : ndarray of bool of shape (n_modes, n_modes)
-        Which of the modes share a repeated frequency.
-    """
-
-    weighted_shapes: Array
-    mass_coefficients: Array
-    repeated: NDArray[np.bool_]
+    weighted_shapes: Array  # M phi with the nominal mass M and shapes phi of unit modal mass, (n, n_modes)
+    mass_coefficients: Array  # of each mass term in M
+    repeated: NDArray[np.bool_]  # which modes share a repeated frequency, (n_modes, n_modes)
 
     def __post_init__(self) -> None:
         for array in (self.weighted_shapes, self.mass_coefficients, self.repeated):
@@ -74,10 +64,8 @@ class AffineCore:
     nominal: NominalModes
     ranks: NDArray[np.intp]
     track: bool
-    available: int
-    """How many modes the mass allows and the solver finds."""
-    healthy: "AffineCore | None" = None
-    """The core whose nominal modes define the columns, if it is not this one."""
+    available: int  # how many modes the mass allows and the solver finds
+    healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
 
     @classmethod
     def from_terms(

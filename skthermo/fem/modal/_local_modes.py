@@ -1,5 +1,7 @@
 """Modes at one theta and their derivatives."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
