@@ -38,6 +38,21 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
         ("shape derivative of tracked modes", "model.local_modes(row, follow=True)", "model.local_modes(row)"),
     ],
+    ("_differences.py", "fem/test_linearise.py"): [
+        ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
+    ],
+    ("fem/sampling/_linearise.py", "fem/test_linearise.py"): [
+        ("relative derivatives", "jacobian * rows[:, np.newaxis] / freq", "jacobian / freq"),
+    ],
+    ("fem/sampling/_linearise.py", "fem/test_modes_at_sensors.py"): [
+        ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
+    ],
+    ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
+        ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
+    ],
+    ("fem/affine/_reduced.py", "fem/test_reduced.py"): [
+        ("box of a rescaled model", "_bounds=self._bounds / row.T", "_bounds=self._bounds"),
+    ],
     ("fem/affine/_core.py", "fem/test_laws.py"): [
         ("mass in the jacobian", "gradient -= eigenvalues", "gradient += eigenvalues"),
     ],
@@ -47,10 +62,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_comparison.py", "updating/test_pairing.py"): [
         ("pairing where sensors are few", "NOMINAL_SHARE = 0.25", "NOMINAL_SHARE = 0.0"),
     ],
-    ("updating/_information.py", "updating/test_updater.py"): [
+    ("updating/_comparison.py", "updating/test_updater.py"): [
         ("derivative of tangents", "d_along / along**2", "d_along / along"),
     ],
-    ("updating/_information.py", "updating/test_sensitivity.py"): [
+    ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
+        ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
@@ -60,19 +76,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
         ("information of shapes", "np.sqrt(2 * max(len(slopes) - 1, 1))", "np.sqrt(max(len(slopes) - 1, 1))"),
     ],
-    ("updating/_sensitivity.py", "updating/test_search.py"): [
-        ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
-    ],
-    ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
-        ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
-    ],
     ("updating/_measured.py", "updating/test_updater_errors.py"): [
         ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
     ],
     ("updating/_optimise.py", "updating/test_search.py"): [
         ("convergence beside failures", "success = bool(result.success) and", "success = bool(result.success) or"),
     ],
-    ("updating/_report.py", "updating/test_updater.py"): [
+    ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
     ("surrogate/_posterior.py", "surrogate/test_refinement.py"): [
