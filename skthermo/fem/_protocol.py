@@ -127,10 +127,6 @@ class DamageableModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     groups : mapping of str
         The damage groups.
     """
@@ -155,14 +151,10 @@ class DamageableModel(FEModel, Protocol):
 
 
 class LocalModel(FEModel, Protocol):
-    """An FE model that gives everything about its modes at one theta, for model updating.
+    """An FE model that gives its modes at one theta with their derivatives, as model updating needs them.
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     n_dof : int
         Number of degrees of freedom.
     track : bool
@@ -178,7 +170,7 @@ class LocalModel(FEModel, Protocol):
         """Whether a column follows its mode rather than its rank."""
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
-        """Modes at one theta, with what their derivatives need.
+        """Modes at one theta, and their derivatives on demand.
 
         Parameters
         ----------
@@ -199,10 +191,6 @@ class BatchModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     rows_per_chunk : int
         How many rows are solved together.
     prefer : str

@@ -105,7 +105,7 @@ class AffineTerms(ABC):
         """The matrices of the terms."""
 
     def with_constant(self, matrix: Matrix) -> "AffineTerms":
-        """These terms and one more, constant one."""
+        """These terms and a further, constant one."""
         exponents = np.vstack([self.exponents, np.zeros_like(self.exponents[:1])])
         return type(self).from_matrices([*self.each_matrix, matrix], exponents).scaled(np.append(self.factors, 1.0))
 

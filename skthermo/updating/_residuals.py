@@ -42,7 +42,7 @@ class Residuals:
 
 
 class Point:
-    """Residuals at one theta, and their derivatives when asked for."""
+    """Residuals at one theta, and their derivatives on demand."""
 
     def __init__(self, residuals: Residuals, theta: Array, modes: PairedModes):
         self._residuals = residuals

@@ -29,7 +29,7 @@ enough."""
 
 
 class Basis(NamedTuple):
-    """Basis vectors (n_dof, n) and the core on them; largest relative error of a frequency at the check points."""
+    """Basis vectors (n_dof, n), the core on them, and its largest relative error of a frequency at the check points."""
 
     vectors: Array
     core: AffineCore
@@ -77,7 +77,7 @@ def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
 
 
 def own_stream(seed: RandomState) -> np.random.RandomState:
-    """Random numbers that are not those of a sample drawn with the same seed."""
+    """A random stream that differs from that of a sample drawn with the same seed."""
     return np.random.RandomState(as_random_state(seed).randint(2**32, size=8, dtype=np.uint32))
 
 
