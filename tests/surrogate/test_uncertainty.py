@@ -12,12 +12,12 @@ from sklearn.base import clone
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
+from skthermo.surrogate._residuals import WeatherResiduals
 
 from skthermo._weather import correlation_time, order_statistic
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
-from skthermo.surrogate._residuals import WeatherResiduals
 from tests.surrogate.chains import F, T, inverse
 from tests.surrogate.chains import chain as any_chain
 

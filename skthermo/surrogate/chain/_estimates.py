@@ -1,29 +1,29 @@
-"""Private steps of `DataInformedFEM`: fill gaps, invert, report; predict parameters, solve, undo the alignment."""
+"""Parameters behind the training records, and what M2 learns of them."""
 
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from sklearn.multioutput import MultiOutputRegressor
 
-from skthermo._arrays import Array, as_columns, as_floats
-from skthermo._frames import frame_like
-from skthermo._regressors import weights_for
-from skthermo._validation import check_is_fitted, validate_data
-from skthermo._warnings import warn_each, warn_user
-from skthermo._weather import TrainingRange
-from skthermo.surrogate._chain_parts import learn_frequencies, refining_step
-from skthermo.surrogate._chain_shapes import shape_warnings, steps_without_prior, with_shapes
-from skthermo.surrogate._inverse import InverseSurrogate
-from skthermo.surrogate._mapper_inputs import last_step, mapper_inputs
-from skthermo.surrogate._refined_inverse import unconverged
-from skthermo.surrogate._report import fit_report
-from skthermo.surrogate._simulator import Simulator, tolerance
-from skthermo.surrogate._spread_rows import spread_rows
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import column_names, frame_like
+from skthermo._pipelines import last_step
+from skthermo._warnings import warn_user
+from skthermo.fem import linearise, shape_components
+from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._standardiser import FrequencyCoordinates
+from skthermo.surrogate.chain._parts import inputs_of_last_step, surrogates_in
+from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
-MARGIN, LEAST_MARGIN = 0.25, 0.05
-"""Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
+ROWS_PER_EFFECTIVE_ROW = 10
+"""Training rows per effective row of a prediction: mappers have tens of degrees of freedom."""
 
-FARTHEST = 5.0
+LARGEST_STEP = 5.0
 """Largest step of ln theta that takes the prior's shrinkage out."""
 
 NOT_NOISE = 0.1
@@ -32,127 +32,171 @@ NOT_NOISE = 0.1
 SCARCE = 0.25
 """Mean weight of records with gaps below which a warning is given: four of six modes missing in each, say."""
 
-POSSIBLE = (1e-6, 1e6)
-"""Range of multipliers; outside it rounding errors swamp the model's matrices."""
+FEW_SHAPES = 0.5
+"""Share of measured modes with a complete shape below which a warning is given."""
+
+UNLIKE = 5.0
+"""Distance of median components from those of the model, in deviations of the noise, that gives a warning."""
 
 
-class ChainSteps:
-    """Private steps that the public methods of the chain call."""
+@dataclass(frozen=True)
+class Estimates:
+    """What M1 finds for each training record.
 
-    def _temperatures(self, X: ArrayLike) -> Any:
-        """Temperatures, checked; a frame stays a frame."""
-        check_is_fitted(self)
-        return frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+    Attributes
+    ----------
+    theta : ndarray of shape (n_samples, n_parameters)
+        The parameters.
+    residuals : ndarray of shape (n_samples, n_modes) or None
+        ln f measured minus ln f of the model; None without refining, as are the others.
+    weights : ndarray of shape (n_samples,) or None
+        Posterior precision as a share of that of a record with all modes.
+    n_unconverged : int or None
+        Number of rows whose refinement has not converged.
+    """
 
-    def _predict_theta(self, X: ArrayLike) -> NDArray[np.float64]:
-        T = self._temperatures(X)
-        message = self.training_range_.warning(mapper_inputs(self.mapper_, T))
-        if message:
-            warn_user(message, "foreign weather")
-        theta, impossible = self._possible(self.mapper_.predict(T))
-        if impossible.any():
-            row = np.flatnonzero(impossible)[0]
+    theta: Array
+    residuals: Array | None = None
+    weights: Array | None = None
+    n_unconverged: int | None = None
+
+    @classmethod
+    def of(cls, inverse: Any, aligned: Any, parameter_names: list[str]) -> "Estimates":
+        """What a fitted inverse finds for aligned records, with warnings where they tell little."""
+        last = refining_step(inverse)
+        if last is None:
+            theta = as_floats(inverse.transform(aligned))
+            if theta.shape[1] != len(parameter_names):
+                raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {parameter_names}")
+            return cls(theta)
+        found = last.invert(inputs_of_last_step(inverse, aligned))
+        last.warn_of(found)
+        weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
+        if weight < SCARCE:
             warn_user(
-                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
-                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
-                "impossible parameters",
+                f"because of their gaps, records tell on average {weight:.0%} of what complete ones would tell "
+                "about the parameters, and predictions are drawn towards the model's nominal state; expected more "
+                "modes a record, imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
+                "scarce modes",
             )
-        return theta
+        return cls(as_floats(found.theta), found.residuals, found.weight, int(unconverged(found).sum()))
 
-    def _possible(self, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
-        theta = as_columns(theta).copy()
-        impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
-        theta[impossible] = np.nan
-        return theta, impossible
+    def targets(self, inverse: Any, mapper: Any) -> Array:
+        """What M2 learns: theta or, in coordinates of frequencies, theta without the shrinkage of the inverse's prior.
 
-    def _simulator(self, learned: NDArray[np.float64]) -> Simulator:
-        """The model and, with ``reduce``, its reduced model for a box around the training parameters."""
-        tol = tolerance(self.model, self.reduce)
-        if tol is None:
-            return Simulator(self.model)
-        lowest, highest = np.nanmin(learned, axis=0), np.nanmax(learned, axis=0)
-        margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
-        box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
-        return Simulator.within(self.model, box, tol, random_state=0)
-
-    def _report(self, T: Any, F: Any, theta: NDArray[np.float64]) -> None:
-        """Store the report of the fit, and give its warnings."""
-        inputs = mapper_inputs(self.mapper_, T)
-        trained = ~(np.isnan(as_floats(inputs)).any(axis=1) | np.isnan(theta).any(axis=1))
-        self.training_range_ = TrainingRange.of(inputs, trained)
-        rows = spread_rows(trained)
-        learned = self._possible(self.mapper_.predict(T))[0]
-        self.simulator_ = self._simulator(learned)
-        predicted = self.simulator_.frequencies(learned[rows], self.n_jobs, warn=False)
-        predicted = as_floats(self.aligner_.inverse_transform(predicted))
-        last = last_step(self.inverse_)
-        self.report_ = fit_report(
-            self.model,
-            T,
-            F,
-            theta,
-            as_floats(inputs),
-            trained,
-            self.box_,
-            rows,
-            predicted,
-            self._n_unconverged,
-            last.round_trip() if isinstance(last, InverseSurrogate) else None,
-        )
-        warn_each(self.report_.warnings())
-
-    def _completed(self, T: Any, F: Any) -> Any:
-        """Frequencies with gaps filled by the imputer, if there is one."""
-        if self.imputer_ is None:
-            return F
-        n_sensors, n_modes = T.shape[1], F.shape[1]
-        values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-        return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
-
-    def _fit_inverse(self, F: Any, shapes: ArrayLike | None) -> tuple[Array, Array | None, Array | None]:
-        """Fit aligner and M1: parameters of the training data, residuals and weights where they are refined."""
-        aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
-        self.inverse_.fit(aligned)
-        last, self._n_unconverged = refining_step(self.inverse_), None
-        if shapes is not None and last is not None:
-            warn_each(shape_warnings(last, aligned))
-        if last is not None:
-            found = last.invert(mapper_inputs(self.inverse_, aligned))
-            last.warn_of(found)
-            weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
-            if weight < SCARCE:
-                warn_user(
-                    f"because of their gaps, records tell on average {weight:.0%} of what complete ones would tell "
-                    "about the parameters, and predictions are drawn towards the model's nominal state; expected more "
-                    "modes a record, imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
-                    "scarce modes",
-                )
-            self._n_unconverged = int(unconverged(found).sum())
-            return as_floats(found.theta), found.residuals, found.weight if self.weighted else None
-        theta = as_floats(self.inverse_.transform(aligned))
-        if theta.shape[1] != len(self.parameter_names_):
-            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {self.parameter_names_}")
-        return theta, None, None
-
-    def _fit_mapper(self, T: Any, theta: Array, residuals: Array | None, weights: Array | None) -> Array:
-        """Fit M2; the parameters that it has learned.
-
-        In coordinates of frequencies it learns what the prior of the inverse keeps from the parameters, too: one more
-        Gauss-Newton step, hardly damped, with the derivatives that define these coordinates. Parameters that hardly
-        move the frequencies may then scatter widely, but not their effects, which are all that the mapper sees.
-        Combinations of parameters that do not move them at all stay where they are.
+        One more Gauss-Newton step, hardly damped, with the derivatives that define these coordinates takes the
+        shrinkage out. Parameters that hardly move the frequencies may then scatter widely, but not their effects, which
+        are all that the mapper sees. Combinations of parameters that do not move them at all stay where they are.
         """
-        last = refining_step(self.inverse_)
-        if self.coordinates == "frequencies" and last is not None:
-            n_rows = np.count_nonzero(~np.isnan(theta).any(axis=1))
-            inverse = learn_frequencies(self.mapper_, last, n_rows)
-            if inverse is not None:
-                noise = np.where(np.abs(residuals) < NOT_NOISE, residuals, 0.0)
-                if last.shape_inputs_ is None:
-                    steps = noise / last.scatter_ @ inverse.T
-                else:
-                    steps = np.where(noise.any(axis=1)[:, np.newaxis], steps_without_prior(last, theta, n_rows), 0.0)
-                theta = theta * np.exp(np.clip(steps, -FARTHEST, FARTHEST))
-        self.mapper_.fit(T, frame_like(T, theta, self.parameter_names_), **weights_for(self.mapper_, weights))
-        return theta
+        last = refining_step(inverse)
+        if last is None or self.residuals is None:
+            return self.theta
+        n_rows = np.count_nonzero(~np.isnan(self.theta).any(axis=1))
+        coordinates = learn_in_frequencies(mapper, last, n_rows)
+        if coordinates is None:
+            return self.theta
+        noise = np.where(np.abs(self.residuals) < NOT_NOISE, self.residuals, 0.0)
+        if last.shape_inputs_ is None:
+            undamped = replace(coordinates, damping=coordinates.damping / ROWS_PER_EFFECTIVE_ROW)
+            steps = noise / last.scatter_ @ undamped.inverse.T
+        else:
+            steps = last.refinement_.steps_without_prior(self.theta, last.scatter_, n_rows)
+            steps = np.where(noise.any(axis=1)[:, np.newaxis], steps, 0.0)
+        return self.theta * np.exp(np.clip(steps, -LARGEST_STEP, LARGEST_STEP))
+
+
+def refining_step(inverse: Any) -> InverseSurrogate | None:
+    """The fitted `InverseSurrogate` that an inverse is or ends with, if it refines its estimates."""
+    last = last_step(inverse)
+    return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+
+
+def learn_in_frequencies(mapper: Any, inverse: InverseSurrogate, n_rows: int) -> FrequencyCoordinates | None:
+    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies, and return these.
+
+    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, and the
+    prior of the parameters does the damping. None if there is no such mapper, if it is fitted to one parameter at a
+    time, if it has coordinates already, or if the nominal state has no solution.
+    """
+    mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
+    is_free = all(part.coordinates is None for part in mappers)
+    if not mappers or not is_free or isinstance(last_step(mapper), MultiOutputRegressor):
+        return None
+    jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))), relative=True)[1][0]
+    sensitivities = jacobian / inverse.scatter_[:, np.newaxis]
+    if not np.isfinite(sensitivities).all():
+        return None
+    damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_EFFECTIVE_ROW / n_rows
+    coordinates = FrequencyCoordinates(sensitivities, damping)
+    for part in mappers:
+        part.set_params(coordinates=coordinates)
+    return coordinates
+
+
+def shape_inputs_of(inverse: Any) -> ShapeInputs | None:
+    """How an inverse reads shapes; None for one without ``dofs``."""
+    part = next((part for part in surrogates_in(inverse) if part.dofs is not None), None)
+    return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
+
+
+def with_shapes(inverse: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    """Frequencies with the columns of shapes that an inverse expects; NaN there without shapes.
+
+    Raises
+    ------
+    ValueError
+        If shapes are given to an inverse without ``dofs``, or have another size.
+    """
+    inputs = shape_inputs_of(inverse)
+    if inputs is None:
+        if shapes is not None:
+            raise ValueError("shapes are given, but the inverse has no dofs; expected InverseSurrogate(dofs=...)")
+        return F
+    components = np.full((len(F), inputs.n_columns - inputs.n_modes), np.nan)
+    if shapes is not None:
+        components = shape_components(shapes, inputs.reference)
+        if len(components) != len(F):
+            raise ValueError(f"shapes have {len(components)} rows and frequencies {len(F)}; expected the same number")
+    modes = [str(name) for name in column_names(F, "f")]
+    if hasattr(F, "columns"):
+        F = F.set_axis(modes, axis=1)
+    names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
+    return frame_like(F, np.hstack([as_floats(F), components]), names)
+
+
+def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
+    """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+    inverse = refining_step(inverse)
+    if inverse is None:
+        return
+    inputs, values = inverse.shape_inputs_, as_floats(aligned)
+    n_modes, n_sensors = inputs.n_modes, inputs.n_sensors
+    components = values[:, n_modes:].reshape(len(values), n_modes, n_sensors)
+    found = ~np.isnan(values[:, :n_modes])
+    n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
+    names = column_names(aligned, "f")[:n_modes]
+    if n_shapes < FEW_SHAPES * found.sum():
+        yield (
+            "few shapes",
+            f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the {n_sensors} "
+            "sensors; the other shapes are not used: expected dofs without sensors that failed",
+        )
+    if not n_shapes or "shapes" not in inverse.samples_:
+        return
+    possible = shape_components(inverse.samples_.shapes.swapaxes(1, 2), inputs.reference).reshape(
+        -1, n_modes, n_sensors
+    )
+    lowest, highest = possible.min(axis=0), possible.max(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a mode without any shape
+        median = np.nanmedian(components, axis=0)
+    excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
+    mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
+    if excess[mode, sensor] > UNLIKE:
+        yield (
+            "shapes unlike the model's",
+            f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
+            f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} to "
+            f"{highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, with the "
+            "signs and gains of the model's axes, or a shape_noise that covers the model's error",
+        )

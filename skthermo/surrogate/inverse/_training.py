@@ -1,32 +1,82 @@
-"""The part of the inverse surrogate that simulates what it learns from."""
+"""Simulations that the inverse surrogate learns from."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import Bunch
 
 from skthermo._arguments import check_bounds, check_noise
 from skthermo._arrays import Array
-from skthermo._models import check_model
-from skthermo._validation import check_is_fitted
 from skthermo._warnings import warn_user
-from skthermo.fem import evaluate
 from skthermo.surrogate._box import Box
-from skthermo.surrogate._inverse_inputs import InverseInputs
-from skthermo.surrogate._memory import ORDER_CHECKS, remembered_simulations
-from skthermo.surrogate._refined_inverse import RefinedInverse
 from skthermo.surrogate._simulator import Simulator, tolerance
+from skthermo.surrogate.inverse._memory import ORDER_CHECKS, remembered_simulations
 
 MANY_REORDERED = 0.1
 """Share of simulations with modes in another order above which a warning is given. A share of 5 % does not harm the
 truss's results; 29 % doubles the error of Z24."""
-
 
 MIDDLE = (0.5, 99.5)
 """Percentiles of the records' parameters that a narrower box is made for: a few wrong records do not widen it."""
 
 LEAST_HALF_WIDTH = 0.02
 """Smallest half-width of a narrower box, as a share of its middle."""
+
+
+@dataclass(frozen=True)
+class SimulatedTraining:
+    """Samples that an `InverseSurrogate` learns from.
+
+    Attributes
+    ----------
+    box : Box
+        Where the parameters are drawn.
+    samples : Bunch
+        ``theta``, ``frequencies`` and, with ``dofs``, ``shapes``.
+    simulator : Simulator
+        The model and, with ``reduce``, its reduced model.
+    """
+
+    box: Box
+    samples: Bunch
+    simulator: Simulator
+
+    @classmethod
+    def of(cls, inverse: Any, random: np.random.RandomState) -> "SimulatedTraining":
+        """Samples within the bounds of an `InverseSurrogate`, with warnings about modes that cannot be told apart."""
+        model, names = inverse.model, tuple(inverse.model.parameter_names)
+        check_noise(inverse.noise, model.n_modes)
+        if len(names) > model.n_modes:
+            warn_user(
+                f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
+                f"expected more modes{'' if np.all(inverse.noise) else ', or the noise of the measurement'}: the prior "
+                "decides between them",
+                "few modes",
+            )
+        box = Box(check_bounds(inverse.bounds, names), names)
+        tol = tolerance(model, inverse.reduce)
+        samples, share_reordered, reduced = _draw(inverse, model, inverse.bounds, random, tol=tol, fixed_seed=0)
+        if share_reordered > MANY_REORDERED:
+            warn_user(
+                f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
+                "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
+                "order of modes",
+            )
+        return cls(box, samples, Simulator(model, reduced, box.bounds))
+
+    def narrower(self, inverse: Any, random: np.random.RandomState, estimates: Array) -> "SimulatedTraining":
+        """As many samples from the part of the box where records have their parameters, as far as estimates tell."""
+        n_known = np.count_nonzero(~np.isnan(estimates).any(axis=1))
+        if n_known < 2:
+            raise ValueError(
+                f"narrow_bounds is set, but fit got {n_known} records with all modes; expected at least 2, whose "
+                "parameters the bounds are narrowed to"
+            )
+        box = Box(narrower(self.box.bounds, estimates), self.box.names)
+        model = self.simulator.reduced or self.simulator.model
+        samples = _draw(inverse, model, box.bounds, random, tol=None, fixed_seed=1)[0]
+        return SimulatedTraining(box, samples, self.simulator)
 
 
 def narrower(bounds: Array, theta: Array) -> Array:
@@ -37,93 +87,12 @@ def narrower(bounds: Array, theta: Array) -> Array:
     return np.column_stack([np.maximum(middle - half, bounds[:, 0]), np.minimum(middle + half, bounds[:, 1])])
 
 
-class SimulatedTraining(InverseInputs, RefinedInverse):
-    """The part of `InverseSurrogate` that draws its samples, and checks what it has learned from them."""
-
-    narrow_bounds: bool
-    parameter_names_: list[str] | None
-
-    def round_trip(self) -> Array:
-        """Relative errors of the model's nominal frequencies after inversion and another solution.
-
-        Such an error goes into everything that is simulated with the parameters found.
-
-        Returns
-        -------
-        ndarray of shape (n_modes,)
-            At the nominal state or, where that is outside the box of the samples, at the nearest one inside.
-
-        Raises
-        ------
-        ValueError
-            If the estimator has no model.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skthermo.datasets import make_truss
-        >>> from skthermo.surrogate import InverseSurrogate
-        >>> inverse = InverseSurrogate(make_truss(), refine=0, random_state=0).fit()
-        >>> bool(1e-4 < np.abs(inverse.round_trip()).max() < 1e-2)
-        True
-        """
-        check_is_fitted(self)
-        if self.model is None:
-            raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
-        state = np.ones((1, self.n_parameters_))
-        nominal = self._of_parameters(state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
-        theta = self._estimate(nominal)[0]
-        if self.n_steps_:
-            theta = self.refinement_.refined(nominal, theta, self.scatter_).theta
-        return (evaluate(self.model, theta) / nominal[:, : self.model.n_modes] - 1)[0]
-
-    def _simulate(self, X: Any, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
-        check_model(self.model)
-        model = self.model
-        self._check_columns(X)
-        check_noise(self.noise, model.n_modes)
-        n_parameters = len(model.parameter_names)
-        if n_parameters > model.n_modes:
-            warn_user(
-                f"{n_parameters} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
-                f"expected more modes{'' if np.all(self.noise) else ', or the noise of the measurement'}: the prior "
-                "decides between them",
-                "few modes",
-            )
-        self.box_ = Box(check_bounds(self.bounds, model.parameter_names), tuple(model.parameter_names))
-        is_remembered = self.memory is not None and self.random_state is None
-        seed = 0 if is_remembered else random.randint(np.iinfo(np.int32).max)
-        tol = tolerance(self.model, self.reduce)
-        drawn, share_reordered, reduced = remembered_simulations(
-            self.memory, model, self.bounds, self.n_samples, tol, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
-        )
-        if share_reordered > MANY_REORDERED:
-            warn_user(
-                f"modes change their order in {share_reordered:.1%} of {min(self.n_samples, ORDER_CHECKS)} samples of "
-                "the box, and the model sorts them: expected narrower bounds, or a model with track=True",
-                "order of modes",
-            )
-        self.samples_ = drawn
-        self.simulator_ = Simulator(model, reduced, self.box_.bounds)
-        self.parameter_names_ = list(model.parameter_names)
-        self.y_is_vector_ = False
-        return self._noisy(drawn, random), drawn.theta
-
-    def _simulate_narrower(self, X: ArrayLike | None, random: np.random.RandomState) -> tuple[NDArray, NDArray]:
-        """Samples from the part of the box where the records have their parameters."""
-        estimates = np.empty((0, 1)) if X is None else self._estimate(self._read_inputs(X))[0]
-        n_known = np.count_nonzero(~np.isnan(estimates).any(axis=1))
-        if n_known < 2:
-            raise ValueError(
-                f"narrow_bounds is set, but fit got {n_known} records with all modes; expected at least 2, whose "
-                "parameters the bounds are narrowed to"
-            )
-        names = tuple(self.model.parameter_names)
-        self.box_ = Box(narrower(self.box_.bounds, estimates), names)
-        is_remembered = self.memory is not None and self.random_state is None
-        seed = 1 if is_remembered else random.randint(np.iinfo(np.int32).max)
-        model = self.simulator_.reduced or self.model
-        self.samples_ = remembered_simulations(
-            self.memory, model, self.box_.bounds, self.n_samples, None, dofs=self.dofs, n_jobs=self.n_jobs, seed=seed
-        )[0]
-        return self._noisy(self.samples_, random), self.samples_.theta
+def _draw(
+    inverse: Any, model: Any, bounds: Any, random: np.random.RandomState, *, tol: float | None, fixed_seed: int
+) -> tuple[Bunch, float, Any]:
+    """Samples, share with modes in another order, reduced model; always the same with a memory and without a seed."""
+    is_remembered = inverse.memory is not None and inverse.random_state is None
+    seed = fixed_seed if is_remembered else random.randint(np.iinfo(np.int32).max)
+    return remembered_simulations(
+        inverse.memory, model, bounds, inverse.n_samples, tol, dofs=inverse.dofs, n_jobs=inverse.n_jobs, seed=seed
+    )

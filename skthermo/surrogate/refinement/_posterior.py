@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.surrogate._shape_misfit import MeasuredShapes
+from skthermo.surrogate.refinement._shapes import MeasuredShapes
 
 Linearise = Callable[[Array], tuple[Array, ...]]
-"""Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters) at theta; where shapes are
-measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d theta."""
+"""Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters) at theta; where shapes
+are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta."""
 
 REACH = 3.0
 """Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
@@ -92,13 +92,10 @@ class Objective:
 
     def at(self, x: Array) -> "Local":
         """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
-        theta = np.exp(x)
-        (frequencies, jacobian, *modes), missing = self.linearise(theta), self.missing
-        sensitivity = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
+        (frequencies, sensitivity, *modes), missing = self.linearise(np.exp(x)), self.missing
         residual = self.log_measured - np.log(frequencies)
         if self.shapes is not None:
-            shapes, slopes = modes
-            misfit, change = self.shapes.misfit(shapes, slopes * theta[:, np.newaxis, np.newaxis])
+            misfit, change = self.shapes.misfit(*modes)
             residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
         residual = np.where(missing, 0.0, residual)
         distance = (x - self.prior.mean) / self.prior.width

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.surrogate._posterior import Local, Objective, deviations
+from skthermo.surrogate.refinement._posterior import Local, Objective, deviations
 
 SMALL_STEP = 1e-6
 """A Gauss-Newton step of ln theta below which a row has converged."""
