@@ -112,7 +112,7 @@ class Simulator:
     def linearise(
         self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None
     ) -> tuple[Array, ...]:
-        """Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters), without warnings.
+        """Frequencies, (n_samples, n_modes), and d ln f / d ln theta, (n_samples, n_modes, n_parameters), quietly.
 
         With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d ln theta.
         """
