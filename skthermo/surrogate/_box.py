@@ -1,11 +1,13 @@
 """The box of parameters that an inverse was trained in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arguments import check_bounds
+from skthermo._arrays import Array, Bounds
 
 NEAR = 2.0
 """Half-widths from the middle of the box up to which parameters count as near it; a surrogate extrapolates well
@@ -21,6 +23,11 @@ class Box:
 
     bounds: Array
     names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, bounds: Bounds, names: Sequence[str]) -> "Box":
+        """The box of bounds in any of the ways that an estimator takes them."""
+        return cls(check_bounds(bounds, names), tuple(names))
 
     @property
     def near(self) -> Array:

@@ -25,13 +25,7 @@ MARGIN_OF_SEVERITY = 0.02
 
 
 def tolerance(model: FEModel, reduce: bool | float) -> float | None:
-    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
-
-    Raises
-    ------
-    ValueError
-        If the model cannot be reduced.
-    """
+    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction."""
     if not reduce:
         return None
     if not hasattr(model, "reduced"):
@@ -44,17 +38,7 @@ def tolerance(model: FEModel, reduce: bool | float) -> float | None:
 
 @dataclass(frozen=True)
 class Simulator:
-    """An FE model and, where there is one, its reduced model for a box.
-
-    Attributes
-    ----------
-    model : FE model
-        The full one.
-    reduced : FE model or None
-        The reduced model, which gives the same frequencies within the box.
-    box : ndarray of shape (n_parameters, 2) or None
-        Bounds of that box.
-    """
+    """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2)."""
 
     model: FEModel
     reduced: Any = None

@@ -12,12 +12,8 @@ from skthermo._arrays import Array
 class FrequencyCoordinates:
     """Coordinates z = A ln theta: the changes of ln f that belong to changes of ln theta, to first order.
 
-    Attributes
-    ----------
-    sensitivities : ndarray of shape (n_modes, n_parameters)
-        The matrix A, derivatives d ln f / d ln theta in units of any scale.
-    damping : float or ndarray of shape (n_parameters,)
-        What damped least squares adds to the diagonal of A'A to find ln theta again.
+    ``sensitivities`` is A, (n_modes, n_parameters): d ln f / d ln theta in units of any scale. ``damping``, a number or
+    (n_parameters,), is what damped least squares adds to the diagonal of A'A to find ln theta again.
     """
 
     sensitivities: Array
@@ -35,16 +31,8 @@ class FrequencyCoordinates:
 class Standardiser:
     """z = (A x - mean) / scale, of x or of log x, and the inverse.
 
-    Attributes
-    ----------
-    mean, scale : ndarray of shape (n_coordinates,)
-        Mean and standard deviation of A x.
-    log : bool
-        Whether logarithms are taken; the inverse then gives positive values.
-    middle : ndarray of shape (n_columns,)
-        Mean of x, which the inverse keeps in directions that A does not see.
-    coordinates : FrequencyCoordinates or None
-        They hold the matrix A; None is the identity.
+    ``coordinates`` hold the matrix A; without them it is the identity. ``middle`` is the mean of x, which the inverse
+    keeps in directions that A does not see.
     """
 
     mean: Array

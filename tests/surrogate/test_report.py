@@ -12,12 +12,12 @@ import pytest
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
-from skthermo.surrogate._report import mode_warnings
 
 from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z24
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate.chain._fit_report import mode_warnings
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)

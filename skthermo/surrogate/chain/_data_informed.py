@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arguments import check_bounds, check_noise
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._regressors import weights_for
@@ -34,7 +34,7 @@ from skthermo.metrics import complete_r2
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
-from skthermo.surrogate.chain._fit_report import FitReport, mode_warnings
+from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, read_records, surrogates_in
 from skthermo.surrogate.chain._residuals import WeatherResiduals
 from skthermo.surrogate.chain._training_records import TrainingRecords
@@ -203,11 +203,12 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
-        self.box_ = self._box()
+        inverse = next(surrogates_in(self.inverse_), None)
+        self.box_ = None if inverse is None else Box.of(inverse.bounds, self.parameter_names_)
         if shapes is None and shape_inputs_of(self.inverse_) is not None:
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes)")
         warn_each(mode_warnings(self.model, F))
-        estimates = self._fit_inverse(self._completed(T, F), shapes)
+        estimates = self._fit_inverse(T, F, shapes)
         self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
         targets = estimates.targets(self.inverse_, self.mapper_)
         weights = weights_for(self.mapper_, estimates.weights)
@@ -217,7 +218,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
         self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
         learned = possible(self.mapper_.predict(T))[0]
         self.simulator_ = Simulator.around(self.model, learned, self.reduce)
-        self.report_ = FitReport.of(self, estimates, learned)
+        self.report_ = report_of(self, estimates, learned)
         warn_each(self.report_.warnings())
         return self
 
@@ -641,24 +642,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
         tags.target_tags.single_output = False
         return tags
 
-    def _box(self) -> Box | None:
-        """Bounds of the first `InverseSurrogate` in the inverse."""
-        inverse = next(surrogates_in(self.inverse_), None)
-        if inverse is None:
-            return None
-        names = tuple(inverse.model.parameter_names)
-        return Box(check_bounds(inverse.bounds, names), names)
-
-    def _completed(self, T: Any, F: Any) -> Any:
-        """Frequencies with gaps filled by the imputer, if there is one."""
-        if self.imputer_ is None:
-            return F
-        n_sensors, n_modes = T.shape[1], F.shape[1]
-        values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-        return frame_like(F, values[:, n_sensors : n_sensors + n_modes], self.mode_names_)
-
-    def _fit_inverse(self, F: Any, shapes: ArrayLike | None) -> Estimates:
-        """Fit aligner and M1; what they find for the training records."""
+    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Estimates:
+        """Fill gaps, fit aligner and M1; what they find for the training records."""
+        if self.imputer_ is not None:
+            values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
+            F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
         aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
         self.inverse_.fit(aligned)
         if shapes is not None:

@@ -41,18 +41,10 @@ UNLIKE = 5.0
 
 @dataclass(frozen=True)
 class Estimates:
-    """What M1 finds for each training record.
+    """What M1 finds for each training record: parameters and, where it refines, how well they are known.
 
-    Attributes
-    ----------
-    theta : ndarray of shape (n_samples, n_parameters)
-        The parameters.
-    residuals : ndarray of shape (n_samples, n_modes) or None
-        ln f measured minus ln f of the model; None without refining, as are the others.
-    weights : ndarray of shape (n_samples,) or None
-        Posterior precision as a share of that of a record with all modes.
-    n_unconverged : int or None
-        Number of rows whose refinement has not converged.
+    ``residuals``, (n_samples, n_modes), are ln f measured minus ln f of the model; ``weights`` the posterior precision
+    as a share of that of a record with all modes.
     """
 
     theta: Array

@@ -103,50 +103,6 @@ class FitReport(SavesFrames):
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
 
-    @classmethod
-    def of(cls, chain: Any, estimates: Estimates, learned: Array) -> FitReport:
-        """The report of a chain that is fitted otherwise.
-
-        Parameters
-        ----------
-        chain : DataInformedFEM
-            With all other attributes.
-        estimates : Estimates
-            What the inverse found.
-        learned : ndarray of shape (n_samples, n_parameters)
-            Parameters that the mapper gives for the training weather.
-
-        Returns
-        -------
-        FitReport
-            Findings.
-        """
-        records, box, theta = chain.records_, chain.box_, estimates.theta
-        names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
-        rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-        measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
-        predicted = as_floats(chain.aligner_.inverse_transform(predicted))
-        means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
-        errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
-        outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
-        known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
-        last = last_step(chain.inverse_)
-        round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
-        return cls(
-            n_rows=len(theta),
-            n_trained=int(records.trained.sum()),
-            left_out=left_out(records, theta),
-            offsets=mode_offsets(chain.model, records.frequencies),
-            n_outside=None if box is None else int(outside.any(axis=1).sum()),
-            outside=pd.Series(outside[known].mean(axis=0), index=names),
-            deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
-            errors=pd.DataFrame(errors, index=modes),
-            n_scored=len(rows),
-            n_unconverged=estimates.n_unconverged,
-            round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
-            scatter=pd.Series(100 * scatter, index=modes),
-        )
-
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
         return "\n".join([*self._sentences(), "", *tables])
@@ -218,6 +174,35 @@ class FitReport(SavesFrames):
                 f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
                 "refines its estimates, narrow_bounds=True, or more samples",
             )
+
+
+def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
+    """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
+    records, box, theta = chain.records_, chain.box_, estimates.theta
+    names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
+    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
+    measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
+    predicted = as_floats(chain.aligner_.inverse_transform(predicted))
+    means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
+    errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
+    outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
+    known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
+    last = last_step(chain.inverse_)
+    round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
+    return FitReport(
+        n_rows=len(theta),
+        n_trained=int(records.trained.sum()),
+        left_out=left_out(records, theta),
+        offsets=mode_offsets(chain.model, records.frequencies),
+        n_outside=None if box is None else int(outside.any(axis=1).sum()),
+        outside=pd.Series(outside[known].mean(axis=0), index=names),
+        deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
+        errors=pd.DataFrame(errors, index=modes),
+        n_scored=len(rows),
+        n_unconverged=estimates.n_unconverged,
+        round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
+        scatter=pd.Series(100 * scatter, index=modes),
+    )
 
 
 def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:

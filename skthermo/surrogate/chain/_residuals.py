@@ -32,16 +32,9 @@ records goes on while it lasts."""
 class WeatherResiduals:
     """Relative residuals of records in order of time, and the weather of each.
 
-    Attributes
-    ----------
-    weather : ndarray of shape (n_records, n_inputs)
-        Inputs of the temperature mapper, lags included.
-    values : ndarray of shape (n_records, n_modes)
-        Measured frequencies over out-of-fold predictions, minus 1; NaN where a mode is missing.
-    own : ndarray of shape (n_records, n_modes)
-        The same residuals from predictions of the mapper that learned from all records.
-    folds : ndarray of shape (n_records,)
-        The period of time of each record.
+    ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
+    n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
+    mapper that learned from all records. ``folds`` are the periods of time.
     """
 
     weather: Array

@@ -21,20 +21,10 @@ N_FOLDS = 5
 
 @dataclass
 class TrainingRecords(SavesFrames):
-    """Records that `DataInformedFEM.fit` was given, and what M2 learned from.
+    """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
-    Attributes
-    ----------
-    temperatures, frequencies : DataFrame or ndarray
-        In the order of `fit`.
-    inputs : ndarray of shape (n_samples, n_inputs)
-        Inputs of M2, lags included.
-    targets : ndarray of shape (n_samples, n_parameters)
-        Parameters that M2 learned.
-    weights : ndarray of shape (n_samples,) or None
-        Weights of the rows in `fit` of M2.
-    residuals : WeatherResiduals or None
-        Residuals out of fold, once they have been computed.
+    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, and ``weights`` those of the
+    rows, or None. ``residuals`` are out of fold, and None until they have been computed.
     """
 
     temperatures: Any

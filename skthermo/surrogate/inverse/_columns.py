@@ -19,17 +19,7 @@ from skthermo.surrogate.refinement import ShapeInputs
 
 @dataclass(frozen=True)
 class InverseColumns:
-    """How an `InverseSurrogate` reads, names and computes its columns.
-
-    Attributes
-    ----------
-    model : FE model or None
-        None where the inverse learns from given frequencies and parameters.
-    shapes : ShapeInputs or None
-        The columns of shapes, if there are any.
-    n_jobs : int or None
-        Number of parallel jobs when the model is solved.
-    """
+    """How an `InverseSurrogate` reads, names and computes its columns: frequencies and, perhaps, shapes."""
 
     model: Any
     shapes: ShapeInputs | None

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_bounds, check_noise
+from skthermo._arguments import check_noise
 from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 from skthermo.surrogate._box import Box
@@ -26,16 +26,9 @@ LEAST_HALF_WIDTH = 0.02
 
 @dataclass(frozen=True)
 class SimulatedTraining:
-    """Samples that an `InverseSurrogate` learns from.
+    """Samples that an `InverseSurrogate` learns from: ``theta``, ``frequencies`` and, with ``dofs``, ``shapes``.
 
-    Attributes
-    ----------
-    box : Box
-        Where the parameters are drawn.
-    samples : Bunch
-        ``theta``, ``frequencies`` and, with ``dofs``, ``shapes``.
-    simulator : Simulator
-        The model and, with ``reduce``, its reduced model.
+    The box is where theta is drawn; the simulator holds the model and, with ``reduce``, its reduced model.
     """
 
     box: Box
@@ -54,9 +47,9 @@ class SimulatedTraining:
                 "decides between them",
                 "few modes",
             )
-        box = Box(check_bounds(inverse.bounds, names), names)
+        box = Box.of(inverse.bounds, names)
         tol = tolerance(model, inverse.reduce)
-        samples, share_reordered, reduced = _draw(inverse, model, inverse.bounds, random, tol=tol, fixed_seed=0)
+        samples, share_reordered, reduced = _draw(inverse, model, box, random, tol=tol, fixed_seed=0)
         if share_reordered > MANY_REORDERED:
             warn_user(
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
@@ -75,7 +68,7 @@ class SimulatedTraining:
             )
         box = Box(narrower(self.box.bounds, estimates), self.box.names)
         model = self.simulator.reduced or self.simulator.model
-        samples = _draw(inverse, model, box.bounds, random, tol=None, fixed_seed=1)[0]
+        samples = _draw(inverse, model, box, random, tol=None, fixed_seed=1)[0]
         return SimulatedTraining(box, samples, self.simulator)
 
 
@@ -88,11 +81,10 @@ def narrower(bounds: Array, theta: Array) -> Array:
 
 
 def _draw(
-    inverse: Any, model: Any, bounds: Any, random: np.random.RandomState, *, tol: float | None, fixed_seed: int
+    inverse: Any, model: Any, box: Box, random: np.random.RandomState, *, tol: float | None, fixed_seed: int
 ) -> tuple[Bunch, float, Any]:
     """Samples, share with modes in another order, reduced model; always the same with a memory and without a seed."""
     is_remembered = inverse.memory is not None and inverse.random_state is None
     seed = fixed_seed if is_remembered else random.randint(np.iinfo(np.int32).max)
-    return remembered_simulations(
-        inverse.memory, model, bounds, inverse.n_samples, tol, dofs=inverse.dofs, n_jobs=inverse.n_jobs, seed=seed
-    )
+    settings = (box.bounds, inverse.n_samples, tol, inverse.dofs, inverse.n_jobs, seed)
+    return remembered_simulations(inverse.memory, model, *settings)

@@ -1,7 +1,7 @@
 """Posterior modes of ln theta given ln f, all rows at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,18 +64,8 @@ class Prior:
 class Objective:
     """Half of the squared misfits of ln f, of shapes and of ln theta, in standard deviations of noise and prior.
 
-    Attributes
-    ----------
-    linearise : callable
-        Frequencies and derivatives.
-    log_measured : ndarray of shape (n_samples, n_modes)
-        ln f, NaN where a mode is missing.
-    noise : ndarray of shape (n_samples, n_observations)
-        Standard deviations of ln f and, mode by mode, of the components of shapes of unit length.
-    prior : Prior
-        Of ln theta.
-    shapes : MeasuredShapes, optional
-        Where shapes are measured too.
+    ``log_measured`` is NaN where a mode is missing; ``noise``, (n_samples, n_observations), holds standard deviations
+    of ln f and, mode by mode, of the components of shapes of unit length.
     """
 
     linearise: Linearise
@@ -107,12 +97,11 @@ class Objective:
     def of(self, rows: NDArray) -> "Objective":
         """The objective of some rows."""
         shapes = None if self.shapes is None else self.shapes.of(rows)
-        return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior, shapes)
+        return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], shapes=shapes)
 
     def without_shapes(self) -> "Objective":
         """The objective of frequencies alone."""
-        noise = self.noise[:, : self.log_measured.shape[1]]
-        return Objective(self.linearise, self.log_measured, noise, self.prior)
+        return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], shapes=None)
 
     def with_modes(self, order: NDArray) -> "Objective":
         """The objective with the measured modes in another order."""
@@ -120,7 +109,7 @@ class Objective:
         n_modes, n_observations = self.log_measured.shape[1], self.noise.shape[1]
         later = np.arange(n_modes, n_observations).reshape(n_modes, -1)[order]
         noise = self.noise[:, np.append(order, later)]
-        return Objective(self.linearise, self.log_measured[:, order], noise, self.prior, shapes)
+        return replace(self, log_measured=self.log_measured[:, order], noise=noise, shapes=shapes)
 
 
 @dataclass

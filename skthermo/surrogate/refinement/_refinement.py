@@ -40,22 +40,9 @@ def unconverged(found: Bunch) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Refinement:
-    """Posterior modes of the parameters of measured frequencies.
+    """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
-    Attributes
-    ----------
-    simulator : Simulator
-        Gives frequencies and derivatives.
-    noise : ndarray of shape (n_modes,)
-        Relative standard deviations of the frequencies.
-    prior : Prior
-        Of ln theta.
-    n_steps : int
-        Largest number of steps for each row.
-    n_jobs : int or None
-        Number of parallel jobs.
-    shapes : ShapeInputs or None
-        How mode shapes beside the frequencies are read.
+    ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
     """
 
     simulator: Simulator

@@ -18,14 +18,8 @@ NODE = 1e-6
 class ShapeInputs:
     """Columns of frequencies, and of the components of mode shapes, mode by mode.
 
-    Attributes
-    ----------
-    dofs : ndarray of int of shape (n_sensors,)
-        Degrees of freedom of the sensors.
-    reference : ndarray of shape (n_sensors, n_modes)
-        Nominal shapes there, which set the signs.
-    noise : ndarray of shape (n_modes,)
-        Standard deviations of a component as a share of the root mean square of its shape's.
+    ``dofs`` are the sensors' degrees of freedom, ``reference`` the nominal shapes there, (n_sensors, n_modes), which
+    set the signs, and ``noise`` standard deviations of components as a share of their shape's root mean square.
     """
 
     dofs: NDArray[np.intp]
@@ -34,14 +28,7 @@ class ShapeInputs:
 
     @classmethod
     def of(cls, model: Any, dofs: ArrayLike, noise: ArrayLike) -> "ShapeInputs":
-        """For a model and sensors.
-
-        Raises
-        ------
-        ValueError
-            If the model gives no shapes, ``dofs`` are not different degrees of freedom of it, a mode does not move
-            them, or the noise is not positive.
-        """
+        """The columns for a model and sensors, which must be able to see each mode."""
         if not hasattr(model, "modes"):
             raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
         shapes = np.asarray(model.modes(np.ones((1, len(model.parameter_names))))[1])[0]
