@@ -91,7 +91,7 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If a column is NaN in every row that has a weight.
+            If a column is NaN in every row, or in every row that has a weight.
         """
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
         weights = None

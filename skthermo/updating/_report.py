@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._frames import look_like_radians
 from skthermo.fem import CallableModel, FEModel, ModalModel, share_reordered
 from skthermo.updating._comparison import macs, paired_modes
 from skthermo.updating._measured import Measured
@@ -139,7 +140,7 @@ def doubtful_fits(
     far = table["error_after"].abs() > LARGE_ERROR
     if far.any():
         ratios = table["measured"] / table["after"]
-        units = " (rad/s instead of Hz?)" if (ratios / (2 * np.pi) - 1).abs().max() < LARGE_ERROR / 100 else ""
+        units = " (rad/s instead of Hz?)" if look_like_radians(ratios, LARGE_ERROR / 100) else ""
         yield (
             f"the updated model misses {table.index[far].tolist()} by more than {LARGE_ERROR:g} %{units}: expected "
             "frequencies in Hz, in the order of the model's modes"

@@ -82,8 +82,8 @@ def test_chain_gives_rows_with_gaps_less_weight_if_the_inverse_refines():
             TRUSS,
             inverse=InverseSurrogate(TRUSS, Ridge(), noise=0.01, n_samples=50, refine=refine, random_state=0),
             mapper=TemperatureMapper(Spy()),
-        ).fit(T, year)
-        for refine in (None, 0)
+        ).fit(T, records)
+        for refine, records in ((None, year), (0, F))
     )
     some = year.notna().any(axis=1).to_numpy()
     given_weights = weighted.mapper_.regressor_.weights_
