@@ -17,8 +17,7 @@ from skthermo._frames import column_names
 FAR = 0.25
 """A temperature farther outside the range of training than this many times its width counts as unknown weather."""
 
-EXPLAINED = 0.99
-"""Share of the variance of the weather that its coordinates keep."""
+EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ NEAR = 2.0
 """Half-widths from the middle of the box up to which parameters count as near it; a surrogate extrapolates well
 there."""
 
-MANY = 0.05
-"""Share of rows far outside the box that gives a warning."""
+MANY = 0.05  # share of rows far outside the box that gives a warning
 
 
 @dataclass(frozen=True)

@@ -11,17 +11,14 @@ from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
-MANY_ROWS = 2000
-"""Number of rows from which a full sparse model takes minutes."""
-
+MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
 
 DEFAULT_TOLERANCE = 1e-5
 
 MARGIN, LEAST_MARGIN = 0.25, 0.05
 """Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
 
-MARGIN_OF_SEVERITY = 0.02
-"""Margin of severities around those asked for, within which a reduced model is accurate."""
+MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
 def tolerance(model: FEModel, reduce: bool | float) -> float | None:

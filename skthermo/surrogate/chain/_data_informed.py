@@ -39,12 +39,8 @@ from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, re
 from skthermo.surrogate.chain._residuals import WeatherResiduals
 from skthermo.surrogate.chain._training_records import TrainingRecords
 
-LARGE_FACTOR = 10.0
-"""Factor of a parameter that was perhaps meant in percent."""
-
-POSSIBLE = (1e-6, 1e6)
-"""Range of multipliers; outside it rounding errors swamp the model's matrices."""
-
+LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
+POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 

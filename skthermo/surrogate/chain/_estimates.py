@@ -20,23 +20,12 @@ from skthermo.surrogate.chain._parts import inputs_of_last_step, surrogates_in
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
-ROWS_PER_EFFECTIVE_ROW = 10
-"""Training rows per effective row of a prediction: mappers have tens of degrees of freedom."""
-
-LARGEST_STEP = 5.0
-"""Largest step of ln theta that takes the prior's shrinkage out."""
-
-NOT_NOISE = 0.1
-"""Relative residual of a frequency from which it is that of a wrong model or a wrong record."""
-
-SCARCE = 0.25
-"""Mean weight of records with gaps below which a warning is given: four of six modes missing in each, say."""
-
-FEW_SHAPES = 0.5
-"""Share of measured modes with a complete shape below which a warning is given."""
-
-UNLIKE = 5.0
-"""Distance of median components from those of the model, in deviations of the noise, that gives a warning."""
+ROWS_PER_EFFECTIVE_ROW = 10  # training rows per effective row of a prediction: mappers have tens of degrees of freedom
+LARGEST_STEP = 5.0  # largest step of ln theta that takes the prior's shrinkage out
+NOT_NOISE = 0.1  # relative residual of a frequency from which it is that of a wrong model or a wrong record
+SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
+FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
+UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
 
 
 @dataclass(frozen=True)

@@ -23,28 +23,15 @@ from skthermo.updating import cramer_rao
 
 LEAST_SCATTER = 1e-12
 
-MOST_SCORED = 365
-"""Largest number of rows that errors are computed for."""
-
+MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10
 
-WORSE_THAN_MEAN = 1.2
-"""Ratio of the chain's error to that of the training mean from which a warning is given."""
-
-UNSEEN = 0.1
-"""Percent of a frequency below which single records from ambient vibration show nothing."""
-
-LARGE_OFFSET = 15.0
-"""Difference in percent between a measured mode and the model's above which a warning is given."""
-
-SMALL_OFFSET = 5.0
-"""Percent by which a mode may differ from the model's without being taken for another one."""
-
-ABSURD = 2.0
-"""Times the median of its mode, or its inverse, from which a frequency counts as absurd."""
-
-CLEARLY_BETTER = 0.25
-"""Modes count as swapped if another order reduces the squared offsets to this share or less."""
+WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
+UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
+LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
+SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
+ABSURD = 2.0  # times the median of its mode, or its inverse, from which a frequency counts as absurd
+CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
 @dataclass(frozen=True, repr=False)

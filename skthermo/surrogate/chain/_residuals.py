@@ -11,18 +11,10 @@ from sklearn.pipeline import Pipeline
 from skthermo._arrays import Array
 from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
 
-DRAWN_FROM = 25
-"""Number of records with the most similar weather that noise is drawn from."""
-
-SPREAD_OF = 100
-"""Number of records with the most similar weather whose residuals give the spread."""
-
-COMPARED_WITH = 50
-"""Least number of records with the most similar weather whose mean a residual is compared with."""
-
-OVERFITTED = 0.9
-"""Ratio of a mapper's own median residual to that out of fold, below which it has learned noise."""
-
+DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
+SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
+COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
+OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
 records goes on while it lasts."""

@@ -12,8 +12,7 @@ from sklearn.utils.validation import check_memory
 from skthermo._io import lock
 from skthermo.fem import sample, share_reordered
 
-ORDER_CHECKS = 256
-"""Number of samples whose modes are looked at for another order."""
+ORDER_CHECKS = 256  # number of samples whose modes are looked at for another order
 
 
 def remembered_simulations(memory: str | Memory | None, model: Any, *settings: Any) -> tuple[Bunch, float, Any]:

@@ -20,8 +20,7 @@ truss's results; 29 % doubles the error of Z24."""
 MIDDLE = (0.5, 99.5)
 """Percentiles of the records' parameters that a narrower box is made for: a few wrong records do not widen it."""
 
-LEAST_HALF_WIDTH = 0.02
-"""Smallest half-width of a narrower box, as a share of its middle."""
+LEAST_HALF_WIDTH = 0.02  # smallest half-width of a narrower box, as a share of its middle
 
 
 @dataclass(frozen=True)

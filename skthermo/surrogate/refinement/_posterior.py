@@ -13,14 +13,11 @@ Linearise = Callable[[Array], tuple[Array, ...]]
 """Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters) at theta; where shapes
 are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta."""
 
-REACH = 3.0
-"""Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
-
+REACH = 3.0  # Half-widths of the box, in ln theta, from its middle to the limits of an estimate
 LEAST_DAMPING = 1e-14
 """Share of the diagonal added to precision matrices, which rounding would else make singular far from any solution."""
 
-LONGEST_STEP = 0.5
-"""Largest change of ln theta in one step."""
+LONGEST_STEP = 0.5  # largest change of ln theta in one step
 
 
 def deviations(information: Array) -> Array:

@@ -6,12 +6,8 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.surrogate.refinement._posterior import Local, Objective, deviations
 
-SMALL_STEP = 1e-6
-"""A Gauss-Newton step of ln theta below which a row has converged."""
-
-SMALL_SHARE = 1e-3
-"""The same as a share of the posterior standard deviation."""
-
+SMALL_STEP = 1e-6  # a Gauss-Newton step of ln theta below which a row has converged
+SMALL_SHARE = 1e-3  # the same as a share of the posterior standard deviation
 SMALL_GAIN = 1e-10
 """The share of the objective that a Gauss-Newton step would gain, below which rounding errors hide it."""
 
@@ -22,8 +18,7 @@ SOME_MISFIT, LARGE_MISFIT = 0.5, 3.0
 """Residuals, root mean square in standard deviations of the noise: above the first, another order of modes is tried
 where two are close; above the second, a row starts again at the middle of the box."""
 
-CLOSE = 0.1
-"""Difference of ln f up to which two neighbouring modes may have crossed."""
+CLOSE = 0.1  # difference of ln f up to which two neighbouring modes may have crossed
 
 
 def refine(

@@ -24,12 +24,8 @@ FAR_OUTSIDE = 2 * np.sqrt(3)
 
 TINY_SHARE = 1e-12
 
-LARGEST_SCATTER = 0.02
-"""Scatter above which a misfit counts as a wrong model rather than noise."""
-
-ASSUMED_SCATTER = 1e-3
-"""Noise on which standard deviations are based where it is neither given nor can be estimated."""
-
+LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model rather than noise
+ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
 ROWS_FOR_SCATTER = 365
 
 
