@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from skthermo._arguments import check_bounds
 from skthermo._arrays import Array, Bounds
 
-NEAR = 2.0
-"""Half-widths from the middle of the box up to which parameters count as near it; a surrogate extrapolates well
-there."""
+NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
 
-MANY = 0.05  # share of rows far outside the box that gives a warning
+MANY_FAR_ROWS = 0.05  # share of rows far outside the box that gives a warning
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,8 @@ class Box:
     def near(self) -> Array:
         """Bounds of the region in or near the box; all positive."""
         middle, half = self.bounds.mean(axis=1), np.diff(self.bounds, axis=1)[:, 0] / 2
-        lowest = np.maximum(middle - NEAR * half, self.bounds[:, 0] / 2)
-        return np.column_stack([lowest, middle + NEAR * half])
+        lowest = np.maximum(middle - NEAR_HALF_WIDTHS * half, self.bounds[:, 0] / 2)
+        return np.column_stack([lowest, middle + NEAR_HALF_WIDTHS * half])
 
     def outside(self, theta: Array) -> NDArray[np.bool_]:
         """Which parameters of each row are outside the box; NaN is not."""
@@ -48,7 +46,7 @@ class Box:
         known = ~np.isnan(theta).any(axis=1)
         far = far[known]
         rows = far.any(axis=1)
-        if not rows.size or rows.mean() <= MANY:
+        if not rows.size or rows.mean() <= MANY_FAR_ROWS:
             return ""
         worst = int(far.sum(axis=0).argmax())
         values = theta[known][far[:, worst], worst]

@@ -92,6 +92,17 @@ def test_chain_gives_rows_with_gaps_less_weight_if_the_inverse_refines():
     assert alike.mapper_.regressor_.weights_ is None
 
 
+def test_the_mapper_learns_parameters_without_the_shrinkage_of_the_prior():
+    truth = 0.85 * np.exp(-0.002 * (T.to_numpy()[:, :1] - 10)) * np.ones(4)
+    clean = TRUSS.frequencies(truth)
+    inverse = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.03, n_samples=50, random_state=0)
+    chain = DataInformedFEM(TRUSS, inverse=inverse, mapper=TemperatureMapper(LinearRegression()))
+    chain.fit(T.to_numpy(), add_noise(clean, 0.03, random_state=0))
+    biases = [(F / clean - 1).mean(axis=0) for F in (TRUSS.frequencies(chain.parameters_), chain.predict(T.to_numpy()))]
+    assert biases[0].min() > 0.004
+    assert np.abs(biases[1]).max() < 0.0035
+
+
 def mirror_image():
     """A beam on two springs that are mirror images, each a parameter."""
     section = {"E": 33e9, "G": 14e9, "A": 5.0, "I_yy": 1.6, "I_zz": 20.0, "J": 3.0, "density": 2500.0}

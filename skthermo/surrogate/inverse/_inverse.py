@@ -28,9 +28,7 @@ from skthermo.surrogate.inverse._training import SimulatedTraining
 from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
-
-MANY_UNCONVERGED = 0.01
-"""Share of rows that have not converged above which a warning is given; the report of a chain always counts them."""
+MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given
 
 
 class InverseSurrogate(TransformerMixin, MultiplierRegressor):
@@ -131,15 +129,12 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
 
     Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
     refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
-    a Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``). Alternating M1 with M2's predictions as
-    prior was tried; nested folds confirmed no gain.
+    a Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``).
 
     With ``dofs``, the regressor sees linear estimates of the parameters (ridge regression on noisy simulations) in
-    place of the many components of shapes. With the default network these do better than principal components, with
-    quadratic polynomials somewhat worse. Shapes scaled to unit length do as well as shapes scaled to the nominal ones,
-    or better. Refined on frequencies and shapes, errors of the truss's verticals are 39 % lower with four sensors than
-    from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of 30 %, noise of 0.1 % on
-    frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
+    place of the many components of shapes. Refined on frequencies and shapes, errors of the truss's verticals are 39 %
+    lower with four sensors than from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of
+    30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
 
     References
     ----------

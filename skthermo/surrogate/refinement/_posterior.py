@@ -13,9 +13,8 @@ Linearise = Callable[[Array], tuple[Array, ...]]
 """Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters) at theta; where shapes
 are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta."""
 
-REACH = 3.0  # Half-widths of the box, in ln theta, from its middle to the limits of an estimate
-LEAST_DAMPING = 1e-14
-"""Share of the diagonal added to precision matrices, which rounding would else make singular far from any solution."""
+REACH = 3.0  # half-widths of the box, in ln theta, from its middle to the limits of an estimate
+LEAST_DAMPING = 1e-14  # share of the diagonal added to precision matrices, which rounding could make singular
 
 LONGEST_STEP = 0.5  # largest change of ln theta in one step
 
@@ -38,11 +37,7 @@ class Prior:
 
     @classmethod
     def of_box(cls, bounds: Array, width: Array | None = None) -> "Prior":
-        """The prior of a box: about its middle and, without a width, with the variance of ln theta spread over it.
-
-        The middle is that of theta, which is 1 where bounds are a half-width: rows that tell nothing about a parameter
-        then have its nominal value.
-        """
+        """The prior about the middle of a box and, without a width, with the variance of ln theta spread over it."""
         lowest, highest = np.log(bounds).T
         mean, half = np.log(bounds.mean(axis=1)), (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)

@@ -26,9 +26,9 @@ def refine(
 ) -> tuple[Local, NDArray[np.bool_], NDArray[np.bool_]]:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start; rows that have converged, and stalled.
 
-    Other rows have only run out of steps. The frequencies of a model that sorts its modes have kinks where modes cross,
-    and rows may stall there; such rows are started again beyond the kink. Where two modes exchange their shapes, steps
-    may end among the wrong ones; rows with a large misfit start again at what frequencies alone say.
+    The frequencies of a model that sorts its modes have kinks where modes cross; rows that stall there start again
+    beyond the kink. Where two modes exchange their shapes, rows with a large misfit start again at what frequencies
+    alone say.
     """
     found, converged, stalled = minimise(objective, start.copy(), n_steps)
 
