@@ -34,15 +34,12 @@ def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
 
 
 def weights_for(estimator: BaseEstimator, sample_weight: Array | None) -> dict[str, Array]:
-    """Arguments of ``fit`` that give weights to an estimator, or to each step of a pipeline, that takes them."""
+    """Arguments of ``fit`` that give an estimator, or a pipeline's last step, its weights; none if it takes none."""
     if sample_weight is None:
         return {}
     if isinstance(estimator, Pipeline):
-        return {
-            f"{name}__{key}": value
-            for name, step in estimator.steps
-            for key, value in weights_for(step, sample_weight).items()
-        }
+        name, last = estimator.steps[-1]
+        return {f"{name}__{key}": value for key, value in weights_for(last, sample_weight).items()}
     if isinstance(estimator, MultiOutputRegressor):
         return weights_for(estimator.estimator, sample_weight)
     return {"sample_weight": sample_weight} if has_fit_parameter(estimator, "sample_weight") else {}

@@ -10,7 +10,6 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.fem import Beam, Spring, Structure, add_noise
 from skthermo.metrics import mape
-from skthermo.preprocessing import HingeFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
 from tests.surrogate.chains import TRUSS, F, T
@@ -56,13 +55,12 @@ def test_linear_mapper_does_not_depend_on_coordinates():
     np.testing.assert_allclose(turned.predict(T), plain.predict(T), rtol=1e-9)
 
 
-@pytest.mark.parametrize("regressor", [LinearRegression(), make_pipeline(HingeFeatures(), Ridge())])
 @pytest.mark.parametrize("coordinates", [None, FrequencyCoordinates(np.eye(4))], ids=["plain", "coordinates"])
-def test_weight_of_a_row_is_how_often_it_counts(regressor, coordinates):
+def test_weight_of_a_row_is_how_often_it_counts(coordinates):
     theta, weights = thetas(), np.random.default_rng(1).integers(0, 4, len(T))
 
     def fitted(rows, **options):
-        mapper = TemperatureMapper(regressor, coordinates=coordinates)
+        mapper = TemperatureMapper(LinearRegression(), coordinates=coordinates)
         return mapper.fit(T.to_numpy()[rows], theta[rows], **options).predict(T.to_numpy())
 
     weighted = fitted(np.arange(len(T)), sample_weight=weights)
