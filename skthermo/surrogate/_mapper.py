@@ -102,8 +102,8 @@ class TemperatureMapper(MultiplierRegressor):
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; a regressor whose ``fit`` takes no weights ignores them, and so do steps before it, such as
-            the knots of broken lines.
+            Weight of each row; a regressor whose ``fit`` takes no weights ignores them, and so do steps before it, as
+            that which places the knots of broken lines.
 
         Returns
         -------

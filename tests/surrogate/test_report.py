@@ -105,13 +105,13 @@ class TestWarningsOfFit:
             (T, F * 2 * np.pi, ["'f1' by .*rad/s instead of Hz", "far outside the bounds"]),
             (T, F * 1.5, ["'f1' by [+]5. %", "far outside the bounds"]),
             (
-                T,
-                F[["f1", "f2", "f3", "f5", "f4", "f6"]],
+                T[::3],
+                F[["f1", "f2", "f3", "f5", "f4", "f6"]][::3],
                 [r"\['f5', 'f4'\] look like other modes.*\[0, 1, 2, 4, 3, 5\]"],
             ),
             (
-                T,
-                F[["f1", "f2", "f4", "f3", "f5", "f6"]],
+                T[::3],
+                F[["f1", "f2", "f4", "f3", "f5", "f6"]][::3],
                 [r"\['f4', 'f3'\] look like other modes.*\[0, 1, 3, 2, 4, 5\]"],
             ),
             (T[:30], F[:30], ["30 complete rows train 4 parameters; expected at least 10"]),
