@@ -85,14 +85,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/_posterior.py", "surrogate/test_refinement.py"): [
+    ("surrogate/refinement/_posterior.py", "surrogate/test_refinement.py"): [
         ("width of the prior of a box", "half / np.sqrt(3)", "half"),
         ("pull of the prior", "+ distance / self.prior.width", "+ distance"),
         ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
         ("limits of estimates", "REACH = 3.0", "REACH = 1.0"),
         ("parameters at their limits", "held, fixed = held | beyond", "held, fixed = held"),
     ],
-    ("surrogate/_refine.py", "surrogate/test_refinement.py"): [
+    ("surrogate/refinement/_refine.py", "surrogate/test_refinement.py"): [
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         (
             "steps that fail",
@@ -101,7 +101,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ),
         ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
     ],
-    ("surrogate/_refinement.py", "surrogate/test_refinement.py"): [
+    ("surrogate/refinement/_refinement.py", "surrogate/test_refinement.py"): [
         ("rows that stall", "np.where(lost, guess, np.exp(found.x))", "np.exp(found.x)"),
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
@@ -110,10 +110,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
         ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
     ],
-    ("surrogate/_chain_steps.py", "surrogate/test_coordinates.py"): [
-        ("weights of the chain", "found.weight if self.weighted else None", "None"),
+    ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
+        ("relative derivatives of shapes", "slopes * theta[:, np.newaxis, np.newaxis]", "slopes"),
     ],
-    ("surrogate/_residuals.py", "surrogate/test_uncertainty.py"): [
+    ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
+        ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
+    ],
+    ("surrogate/chain/_estimates.py", "surrogate/test_coordinates.py"): [
+        ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
+        ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
+    ],
+    ("surrogate/chain/_residuals.py", "surrogate/test_uncertainty.py"): [
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
@@ -127,12 +134,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
         ("correlation time", "time += 2 * correlation", "time += correlation"),
     ],
-    ("surrogate/_chain_uncertainty.py", "surrogate/test_uncertainty.py"): [
-        ("periods of time", 'T.index.argsort(kind="stable")', "np.arange(len(T))"),
+    ("surrogate/chain/_training_records.py", "surrogate/test_uncertainty.py"): [
+        ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
+        ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),
     ],
     ("detection/_gaussian.py", "detection/test_gaps.py"): [
         ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array
 
 NEAR = 0.25
@@ -23,7 +24,7 @@ def likely_cause(shifts: pd.DataFrame) -> str:
     if np.isnan(rest).all():
         return ""
     ratios = 1 + known["measured"].to_numpy(dtype=float)
-    if (np.abs(ratios / (2 * np.pi) - 1) < NEAR).all():
+    if seem_rad_per_s(ratios, NEAR):
         return "the measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz"
     rose = (known["measured"] > CLEAR * known["standard_error"]).sum()
     worst = int(np.nanargmax(np.abs(rest)))

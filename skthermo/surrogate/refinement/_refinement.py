@@ -1,6 +1,6 @@
 """Estimates of the inverse surrogate, refined on the FE model."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -9,48 +9,36 @@ from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._arguments import check_bounds, check_noise, check_prior
-from skthermo._arrays import Array
-from skthermo.surrogate._posterior import Objective, Prior
-from skthermo.surrogate._refine import refine
-from skthermo.surrogate._shape_inputs import ShapeInputs
-from skthermo.surrogate._shape_misfit import MeasuredShapes
+from skthermo._arrays import Array, spread_evenly
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate._spread_rows import spread_rows
-
-DEFAULT_STEPS = 100
+from skthermo.surrogate.refinement._posterior import Objective, Prior
+from skthermo.surrogate.refinement._refine import refine
+from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
-"""Relative standard deviation of frequencies that count as exact. Where modes are missing, the parameters that fit the
-others lie on a curve, which steps cannot follow if nothing may leave it."""
+"""Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
+others, and this noise lets steps move along the curve of these parameters."""
 
-FAR, TINY = 2 * np.sqrt(3), 1e-12
-"""Prior's standard deviations that are two half-widths of a box, beyond which parameters are far outside it."""
+FAR_OUTSIDE = 2 * np.sqrt(3)
+"""Standard deviations of a box's prior that are two half-widths of the box; parameters beyond are far outside it."""
 
-LARGEST = 0.02
-"""Scatter above which a misfit counts as a wrong model rather than noise."""
+TINY_SHARE = 1e-12
 
-ASSUMED = 1e-3
-"""Noise on which standard deviations are based where it is neither given nor can be estimated."""
+LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model rather than noise
+ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
+ROWS_FOR_SCATTER = 365
+
+
+def unconverged(found: Bunch) -> NDArray[np.bool_]:
+    """Rows with frequencies whose refinement has not converged."""
+    return ~found.converged & (found.weight > 0)
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """Posterior modes of the parameters of measured frequencies.
+    """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
-    Attributes
-    ----------
-    simulator : Simulator
-        Gives frequencies and derivatives.
-    noise : ndarray of shape (n_modes,)
-        Relative standard deviations of the frequencies.
-    prior : Prior
-        Of ln theta.
-    n_steps : int
-        Largest number of steps for each row.
-    n_jobs : int or None
-        Number of parallel jobs.
-    shapes : ShapeInputs or None
-        Columns of mode shapes, where inputs have them beside frequencies.
+    ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
     """
 
     simulator: Simulator
@@ -123,9 +111,9 @@ class Refinement:
         The share of the prior's variance that a row explains is 1 - (deviation / width)^2. The variance of posterior
         modes is that share of the prior's; the variance of exact inversions is the prior's over that share.
         """
-        explained = np.maximum(1 - (deviations / self.prior.width) ** 2, TINY)
+        explained = np.maximum(1 - (deviations / self.prior.width) ** 2, TINY_SHARE)
         expected = self.prior.width * (np.sqrt(explained) if self.noise.all() else 1 / np.sqrt(explained))
-        return np.abs(x - self.prior.mean) > FAR * expected
+        return np.abs(x - self.prior.mean) > FAR_OUTSIDE * expected
 
     def estimated_scatter(self, inputs: Array, guess: Array) -> Array:
         """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
@@ -135,12 +123,28 @@ class Refinement:
         n_modes, n_parameters = len(self.noise), guess.shape[1]
         if self.noise.all():
             return self.noise
-        rows = spread_rows(~np.isnan(inputs).any(axis=1))
-        scatter = ASSUMED
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).any(axis=1)), ROWS_FOR_SCATTER)
+        scatter = ASSUMED_SCATTER
         if n_modes > n_parameters and rows.size:
             residuals = self.refined(inputs[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
             residuals = residuals[~np.isnan(residuals).any(axis=1)]
             if len(residuals) > n_parameters:
                 estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))
-                scatter = min(max(estimate, EXACT), LARGEST)
+                scatter = min(max(estimate, EXACT), LARGEST_SCATTER)
         return np.where(self.noise > 0, self.noise, scatter)
+
+    def steps_without_prior(self, theta: Array, scatter: Array, n_rows: int) -> Array:
+        """Steps of ln theta that take the prior's shrinkage out of posterior modes of frequencies and shapes.
+
+        At a posterior mode the derivatives of the observations times their residuals equal the pull of the prior. The
+        step is a Gauss-Newton step with the information of all observations at the nominal state, and with a prior as
+        weak as suits the mean of all records.
+        """
+        model, nominal = Simulator(self.simulator.model), np.ones((1, theta.shape[1]))
+        _, sensitivity, shapes, slopes = model.linearise(nominal, dofs=self.shapes.dofs)
+        units = MeasuredShapes(shapes.swapaxes(1, 2) / np.linalg.norm(shapes, axis=1)[:, :, np.newaxis])
+        rows = np.hstack([sensitivity, units.misfit(shapes, slopes)[1]])
+        weak = replace(self.prior, width=self.prior.width * np.sqrt(n_rows))
+        information = weak.information(rows, np.append(scatter, self.shapes.deviations)[np.newaxis])[0]
+        pull = (np.log(theta) - self.prior.mean) / self.prior.width**2
+        return np.linalg.solve(information, pull.T).T

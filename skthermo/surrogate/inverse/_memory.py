@@ -6,43 +6,23 @@ from typing import Any
 
 import joblib
 from joblib import Memory
-from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 from sklearn.utils.validation import check_memory
 
-from skthermo._arguments import check_bounds
-from skthermo._arrays import Bounds
 from skthermo._io import lock
-from skthermo.fem import FEModel, sample, share_reordered
+from skthermo.fem import sample, share_reordered
 
-ORDER_CHECKS = 256
+ORDER_CHECKS = 256  # number of samples whose modes are looked at for another order
 
 
-def remembered_simulations(
-    memory: str | Memory | None,
-    model: FEModel,
-    bounds: Bounds,
-    n_samples: int,
-    tol: float | None,
-    *,
-    dofs: ArrayLike | None = None,
-    n_jobs: int | None,
-    seed: int,
-) -> tuple[Bunch, float, Any]:
-    """`simulations`, read from the memory if stored there; of several processes only one makes them.
-
-    Raises
-    ------
-    ValueError
-        If the memory is a file, or the model has no hash by which its simulations could be found again.
-    """
-    bounds = check_bounds(bounds, model.parameter_names)
+def remembered_simulations(memory: str | Memory | None, model: Any, *settings: Any) -> tuple[Bunch, float, Any]:
+    """`simulations`, read from the memory if stored there; of several processes only one makes them."""
     try:
         memory = check_memory(memory)
     except OSError as error:
         raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
     if memory.location is None:
-        return simulations("", model, bounds, n_samples, tol, dofs, n_jobs, seed)
+        return simulations("", model, *settings)
     try:
         identity = joblib.hash(model, coerce_mmap=True)
     except PicklingError as error:
@@ -54,19 +34,11 @@ def remembered_simulations(
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / f"{identity}.lock", "w") as file:
         lock(file)
-        remembered = memory.cache(simulations, ignore=["model", "n_jobs"])
-        return remembered(identity, model, bounds, n_samples, tol, dofs, n_jobs, seed)
+        return memory.cache(simulations, ignore=["model", "n_jobs"])(identity, model, *settings)
 
 
 def simulations(
-    identity: str,
-    model: Any,
-    bounds: Any,
-    n_samples: int,
-    tol: float | None,
-    dofs: ArrayLike | None,
-    n_jobs: int | None,
-    seed: int,
+    identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, dofs: Any, n_jobs: Any, seed: int
 ) -> tuple[Bunch, float, Any]:
     """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None."""
     reduced = None if tol is None else model.reduced(bounds, tol=tol, random_state=seed)

@@ -1,4 +1,6 @@
-"""Report of a fit: its findings and warnings."""
+"""What the fit of a chain has found about its records: numbers and warnings."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,37 +9,30 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arguments import seem_rad_per_s
+from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names
+from skthermo._pipelines import last_step
 from skthermo._saved_frames import SavesFrames
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
-from skthermo.surrogate._box import Box
+from skthermo.surrogate.chain._estimates import Estimates
+from skthermo.surrogate.chain._training_records import TrainingRecords
+from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
-TINY = 1e-12
+LEAST_SCATTER = 1e-12
 
+MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10
 
-WORSE_THAN_MEAN = 1.2
-"""Ratio of the chain's error to that of the training mean from which a warning is given."""
-
-UNSEEN = 0.1
-"""Percent of a frequency below which single records from ambient vibration show nothing."""
-
-LARGE_OFFSET = 15.0
-"""Difference in percent between a measured mode and the model's above which a warning is given."""
-
-SMALL_OFFSET = 5.0
-"""Percent by which a mode may differ from the model's without being taken for another one."""
-
-ABSURD = 2.0
-"""Times the median of its mode, or its inverse, from which a frequency counts as absurd."""
-
-CLEARLY_BETTER = 0.25
-"""Modes count as swapped if another order reduces the squared offsets to this share or less."""
+WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
+UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
+LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
+SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
+ABSURD = 2.0  # times the median of its mode, or its inverse, from which a frequency counts as absurd
+CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
 @dataclass(frozen=True, repr=False)
@@ -169,39 +164,30 @@ class FitReport(SavesFrames):
             )
 
 
-def fit_report(
-    model: FEModel,
-    T: Any,
-    F: Any,
-    theta: Array,
-    inputs: Array,
-    trained: NDArray[np.bool_],
-    box: Box | None,
-    rows: NDArray[np.intp],
-    predicted: Array,
-    n_unconverged: int | None,
-    round_trip: Array | None,
-) -> FitReport:
-    """The report of a fit, from its records, estimates and the frequencies predicted for some rows."""
-    names = list(model.parameter_names)
-    measured = as_floats(F)[rows]
-    means = np.broadcast_to(np.nanmean(as_floats(F), axis=0), measured.shape)
+def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
+    """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
+    records, box, theta = chain.records_, chain.box_, estimates.theta
+    names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
+    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
+    measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
+    predicted = as_floats(chain.aligner_.inverse_transform(predicted))
+    means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
-    known = ~np.isnan(theta).any(axis=1)
-    scatter = np.nanstd(measured / predicted, axis=0)
-    modes = column_names(F, "f")
+    known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
+    last = last_step(chain.inverse_)
+    round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
     return FitReport(
         n_rows=len(theta),
-        n_trained=int(trained.sum()),
-        left_out=left_out(T, F, theta, inputs, trained),
-        offsets=mode_offsets(model, F),
+        n_trained=int(records.trained.sum()),
+        left_out=left_out(records, theta),
+        offsets=mode_offsets(chain.model, records.frequencies),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
-        deviations=pd.Series(smallest_deviations(model, theta[known], scatter), index=names),
+        deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
         errors=pd.DataFrame(errors, index=modes),
         n_scored=len(rows),
-        n_unconverged=n_unconverged,
+        n_unconverged=estimates.n_unconverged,
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
     )
@@ -209,14 +195,13 @@ def fit_report(
 
 def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     """Cramer-Rao deviations of ln theta from one record at the median parameters, given the scatter of each mode."""
-    middle = np.median(theta, axis=0)[np.newaxis]
-    frequencies, jacobian = linearise(model, middle)
-    sensitivity = jacobian[0] * middle / frequencies[0][:, np.newaxis]
-    return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, TINY) ** 2) @ sensitivity)))
+    sensitivity = linearise(model, np.median(theta, axis=0), relative=True)[1][0]
+    return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
-def left_out(T: Any, F: Any, theta: Array, inputs: Array, trained: NDArray[np.bool_]) -> pd.Series:
+def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     """Rows that do not train the mapper, by reason."""
+    T, F, inputs, trained = records.temperatures, records.frequencies, records.inputs, records.trained
     reasons = {}
     without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
     for what, table, default, rows in (("temperature", T, "T", ~trained), ("frequency", F, "f", without_theta)):
@@ -268,7 +253,7 @@ def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
             )
             return
     if len(far):
-        units = " (rad/s instead of Hz?)" if (np.abs(ratios / (2 * np.pi) - 1) < LARGE_OFFSET / 100).all() else ""
+        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
         yield (
             "offset of modes",

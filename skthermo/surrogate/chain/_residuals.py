@@ -1,6 +1,6 @@
 """Out-of-fold residuals of a chain, by weather: their spread, intervals, and realistic noise."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,18 +11,10 @@ from sklearn.pipeline import Pipeline
 from skthermo._arrays import Array
 from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
 
-DRAWN_FROM = 25
-"""Number of records with the most similar weather that noise is drawn from."""
-
-SPREAD_OF = 100
-"""Number of records with the most similar weather whose residuals give the spread."""
-
-COMPARED_WITH = 50
-"""Least number of records with the most similar weather whose mean a residual is compared with."""
-
-OVERFITTED = 0.9
-"""Ratio of a mapper's own median residual to that out of fold, below which it has learned noise."""
-
+DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
+SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
+COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
+OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1
 """Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
 records goes on while it lasts."""
@@ -32,16 +24,9 @@ records goes on while it lasts."""
 class WeatherResiduals:
     """Relative residuals of records in order of time, and the weather of each.
 
-    Attributes
-    ----------
-    weather : ndarray of shape (n_records, n_inputs)
-        Inputs of the temperature mapper, lags included.
-    values : ndarray of shape (n_records, n_modes)
-        Measured frequencies over out-of-fold predictions, minus 1; NaN where a mode is missing.
-    own : ndarray of shape (n_records, n_modes)
-        The same residuals from predictions of the mapper that learned from all records.
-    folds : ndarray of shape (n_records,)
-        The period of time of each record.
+    ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
+    n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
+    mapper that learned from all records. ``folds`` are the periods of time.
     """
 
     weather: Array
@@ -60,23 +45,30 @@ class WeatherResiduals:
         return self.coordinates.transform(self.weather)
 
     def spread(self, weather: Array) -> Array:
-        """Root mean square of the residuals in similar weather, (n_samples, n_modes)."""
-        return self._spread(weather, np.ones(len(self.values), dtype=bool))
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
+        return self._where_known(weather, lambda known: self._spread(known, np.ones(len(self.values), dtype=bool)))
 
     def expected(self, weather: Array) -> Array:
-        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes)."""
-        return self._similar_mean(self.own, weather, np.ones(len(self.own), dtype=bool))
+        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
+        everywhere = np.ones(len(self.own), dtype=bool)
+        return self._where_known(weather, lambda known: self._similar_mean(self.own, known, everywhere))
 
     def n_expected(self, weather: Array) -> Array:
-        """Number of records whose mean errs as much as that of the expected residuals of all rows, (n_modes,)."""
-        return self._n_similar(weather, np.ones(len(self.own), dtype=bool))
+        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,)."""
+        known = weather[~np.isnan(weather).any(axis=1)]
+        return self._n_similar(known, np.ones(len(self.own), dtype=bool)) if len(known) else np.zeros(self.n_modes)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes."""
+        return self.values.shape[1]
 
     def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
         """Residuals of each of some periods less those that the other periods have in similar weather.
 
-        With the number of records, (n_modes,), whose mean errs as much as what is subtracted does on average. One
-        mapper gives both, as for new records, so that its own error in such weather cancels; but where a mapper follows
-        its own records more closely than others, the residuals are those out of fold.
+        With the effective sample size, (n_modes,), of the mean of what is subtracted. One mapper gives both, as for new
+        records, so that its own error in such weather cancels; but where a mapper follows its own records more closely
+        than others, the residuals are those out of fold.
         """
         residuals = self.values if self._is_overfitted else self.own
         parts = []
@@ -103,11 +95,16 @@ class WeatherResiduals:
 
         A stationary bootstrap: each row takes the record after the one before it took or, where such a run ends, one
         of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
+        Rows of unknown weather are NaN.
         """
+        return self._where_known(weather, lambda known: self.noise[self._drawn(known, random_state)])
+
+    def _drawn(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+        """Positions of the records drawn for each row."""
         places, n_records = self.coordinates.transform(weather), len(self.places)
         near = nearest(self.places, places, DRAWN_FROM)[1]
         farthest = nearest(self.places, places, max(DRAWN_FROM, int(SIMILAR * n_records)))[0][:, -1]
-        ends = random_state.uniform(size=len(places)) < 1 / self._mean_run
+        ends = random_state.uniform(size=len(places)) < 1 / self._mean_block_length
         fresh = near[np.arange(len(places)), random_state.randint(near.shape[1], size=len(places))]
         taken = np.empty(len(places), dtype=int)
         record = n_records
@@ -117,7 +114,7 @@ class WeatherResiduals:
             if is_over or np.linalg.norm(self.places[record] - places[row]) > farthest[row]:
                 record = fresh[row]
             taken[row] = record
-        return self.noise[taken]
+        return taken
 
     @cached_property
     def noise(self) -> Array:
@@ -127,6 +124,14 @@ class WeatherResiduals:
         """
         similar = self._similar_mean(self.values, self.weather, np.ones(len(self.values), dtype=bool))
         return self.values - similar + self.expected(self.weather)
+
+    def _where_known(self, weather: Array, of_known: Callable[[Array], Array]) -> Array:
+        """Results for the rows of weather that are complete, NaN for others."""
+        known = ~np.isnan(weather).any(axis=1)
+        result = np.full((len(weather), self.n_modes), np.nan)
+        if known.any():
+            result[known] = of_known(weather[known])
+        return result
 
     def _similar_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """Mean of some records' values in weather most like that of each row, mode by mode."""
@@ -172,8 +177,8 @@ class WeatherResiduals:
         return scores
 
     @cached_property
-    def _mean_run(self) -> float:
-        """Mean length of the runs: twice the correlation time of what similar weather does not explain, less one."""
+    def _mean_block_length(self) -> float:
+        """Mean length of the runs: twice the correlation time of what similar weather does not explain, minus one."""
         near = nearest(self.places, self.places, SPREAD_OF)[1]
         filled = np.where(np.isnan(self.values), 0.0, self.values)
         means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)

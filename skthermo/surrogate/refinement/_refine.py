@@ -4,14 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.surrogate._posterior import Local, Objective, deviations
+from skthermo.surrogate.refinement._posterior import Local, Objective, deviations
 
-SMALL_STEP = 1e-6
-"""A Gauss-Newton step of ln theta below which a row has converged."""
-
-SMALL_SHARE = 1e-3
-"""The same as a share of the posterior standard deviation."""
-
+SMALL_STEP = 1e-6  # a Gauss-Newton step of ln theta below which a row has converged
+SMALL_SHARE = 1e-3  # the same as a share of the posterior standard deviation
 SMALL_GAIN = 1e-10
 """The share of the objective that a Gauss-Newton step would gain, below which rounding errors hide it."""
 
@@ -22,8 +18,7 @@ SOME_MISFIT, LARGE_MISFIT = 0.5, 3.0
 """Residuals, root mean square in standard deviations of the noise: above the first, another order of modes is tried
 where two are close; above the second, a row starts again at the middle of the box."""
 
-CLOSE = 0.1
-"""Difference of ln f up to which two neighbouring modes may have crossed."""
+CLOSE = 0.1  # difference of ln f up to which two neighbouring modes may have crossed
 
 
 def refine(
@@ -31,9 +26,9 @@ def refine(
 ) -> tuple[Local, NDArray[np.bool_], NDArray[np.bool_]]:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start; rows that have converged, and stalled.
 
-    Other rows have only run out of steps. The frequencies of a model that sorts its modes have kinks where modes cross,
-    and rows may stall there; such rows are started again beyond the kink. Where two modes exchange their shapes, steps
-    may end among the wrong ones; rows with a large misfit start again at what frequencies alone say.
+    The frequencies of a model that sorts its modes have kinks where modes cross; rows that stall there start again
+    beyond the kink. Where two modes exchange their shapes, rows with a large misfit start again at what frequencies
+    alone say.
     """
     found, converged, stalled = minimise(objective, start.copy(), n_steps)
 

@@ -1,26 +1,22 @@
 """Posterior modes of ln theta given ln f, all rows at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.surrogate._shape_misfit import MeasuredShapes
+from skthermo.surrogate.refinement._shapes import MeasuredShapes
 
 Linearise = Callable[[Array], tuple[Array, ...]]
-"""Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters) at theta; where shapes are
-measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d theta."""
+"""Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters) at theta; where shapes
+are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta."""
 
-REACH = 3.0
-"""Half-widths of the box, in ln theta, from its middle to the limits of an estimate."""
+REACH = 3.0  # half-widths of the box, in ln theta, from its middle to the limits of an estimate
+LEAST_DAMPING = 1e-14  # share of the diagonal added to precision matrices, which rounding could make singular
 
-LEAST_DAMPING = 1e-14
-"""Share of the diagonal added to precision matrices, which rounding would else make singular far from any solution."""
-
-LONGEST_STEP = 0.5
-"""Largest change of ln theta in one step."""
+LONGEST_STEP = 0.5  # largest change of ln theta in one step
 
 
 def deviations(information: Array) -> Array:
@@ -41,11 +37,7 @@ class Prior:
 
     @classmethod
     def of_box(cls, bounds: Array, width: Array | None = None) -> "Prior":
-        """The prior of a box: about its middle and, without a width, with the variance of ln theta spread over it.
-
-        The middle is that of theta, which is 1 where bounds are a half-width: rows that tell nothing about a parameter
-        then have its nominal value.
-        """
+        """The prior about the middle of a box and, without a width, with the variance of ln theta spread over it."""
         lowest, highest = np.log(bounds).T
         mean, half = np.log(bounds.mean(axis=1)), (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
@@ -64,18 +56,8 @@ class Prior:
 class Objective:
     """Half of the squared misfits of ln f, of shapes and of ln theta, in standard deviations of noise and prior.
 
-    Attributes
-    ----------
-    linearise : callable
-        Frequencies and derivatives.
-    log_measured : ndarray of shape (n_samples, n_modes)
-        ln f, NaN where a mode is missing.
-    noise : ndarray of shape (n_samples, n_observations)
-        Standard deviations of ln f and, mode by mode, of the components of shapes of unit length.
-    prior : Prior
-        Of ln theta.
-    shapes : MeasuredShapes, optional
-        Where shapes are measured too.
+    ``log_measured`` is NaN where a mode is missing; ``noise``, (n_samples, n_observations), holds standard deviations
+    of ln f and, mode by mode, of the components of shapes of unit length.
     """
 
     linearise: Linearise
@@ -92,13 +74,10 @@ class Objective:
 
     def at(self, x: Array) -> "Local":
         """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
-        theta = np.exp(x)
-        (frequencies, jacobian, *modes), missing = self.linearise(theta), self.missing
-        sensitivity = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
+        (frequencies, sensitivity, *modes), missing = self.linearise(np.exp(x)), self.missing
         residual = self.log_measured - np.log(frequencies)
         if self.shapes is not None:
-            shapes, slopes = modes
-            misfit, change = self.shapes.misfit(shapes, slopes * theta[:, np.newaxis, np.newaxis])
+            misfit, change = self.shapes.misfit(*modes)
             residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
         residual = np.where(missing, 0.0, residual)
         distance = (x - self.prior.mean) / self.prior.width
@@ -110,12 +89,11 @@ class Objective:
     def of(self, rows: NDArray) -> "Objective":
         """The objective of some rows."""
         shapes = None if self.shapes is None else self.shapes.of(rows)
-        return Objective(self.linearise, self.log_measured[rows], self.noise[rows], self.prior, shapes)
+        return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], shapes=shapes)
 
     def without_shapes(self) -> "Objective":
         """The objective of frequencies alone."""
-        noise = self.noise[:, : self.log_measured.shape[1]]
-        return Objective(self.linearise, self.log_measured, noise, self.prior)
+        return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], shapes=None)
 
     def with_modes(self, order: NDArray) -> "Objective":
         """The objective with the measured modes in another order."""
@@ -123,7 +101,7 @@ class Objective:
         n_modes, n_observations = self.log_measured.shape[1], self.noise.shape[1]
         later = np.arange(n_modes, n_observations).reshape(n_modes, -1)[order]
         noise = self.noise[:, np.append(order, later)]
-        return Objective(self.linearise, self.log_measured[:, order], noise, self.prior, shapes)
+        return replace(self, log_measured=self.log_measured[:, order], noise=noise, shapes=shapes)
 
 
 @dataclass

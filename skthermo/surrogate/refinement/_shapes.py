@@ -1,13 +1,10 @@
-"""Mode shapes as inputs of the inverse surrogate, beside frequencies."""
+"""Mode shapes as data beside frequencies: how their columns are read, and how they differ from computed ones."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.linear_model import Ridge
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from skthermo._arguments import check_dofs
 from skthermo._arrays import Array, real_array
@@ -21,14 +18,8 @@ NODE = 1e-6
 class ShapeInputs:
     """Columns of frequencies, and of the components of mode shapes, mode by mode.
 
-    Attributes
-    ----------
-    dofs : ndarray of int of shape (n_sensors,)
-        Degrees of freedom of the sensors.
-    reference : ndarray of shape (n_sensors, n_modes)
-        Nominal shapes there, which set the signs.
-    noise : ndarray of shape (n_modes,)
-        Standard deviations of a component as a share of the root mean square of its shape's.
+    ``dofs`` are the sensors' degrees of freedom, ``reference`` the nominal shapes there, (n_sensors, n_modes), which
+    set the signs, and ``noise`` standard deviations of components as a share of their shape's root mean square.
     """
 
     dofs: NDArray[np.intp]
@@ -37,14 +28,7 @@ class ShapeInputs:
 
     @classmethod
     def of(cls, model: Any, dofs: ArrayLike, noise: ArrayLike) -> "ShapeInputs":
-        """For a model and sensors.
-
-        Raises
-        ------
-        ValueError
-            If the model gives no shapes, ``dofs`` are not different degrees of freedom of it, a mode does not move
-            them, or the noise is not positive.
-        """
+        """The columns for a model and sensors, which must be able to see each mode."""
         if not hasattr(model, "modes"):
             raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
         shapes = np.asarray(model.modes(np.ones((1, len(model.parameter_names))))[1])[0]
@@ -106,27 +90,38 @@ class ShapeInputs:
         return self.normalised(np.hstack([inputs[:, : self.n_modes], inputs[:, self.n_modes :] + noise]))
 
 
-class ShapeScores:
-    """A few positive scores in place of many components: linear estimates of the parameters.
+@dataclass(frozen=True)
+class MeasuredShapes:
+    """Measured shapes u of unit length, (n_samples, n_modes, n_sensors), NaN where a mode is missing."""
 
-    Ridge regression of ln theta on ln f and the components learns from noisy simulations which combinations of
-    components tell about the parameters. A regressor then has n_modes + n_parameters inputs, however many sensors there
-    are.
-    """
+    units: Array
 
-    def __init__(self, n_modes: int, inputs: Array, theta: Array):
-        self._n_modes = n_modes
-        complete = ~(np.isnan(inputs).any(axis=1) | np.isnan(theta).any(axis=1))
-        self._linear = make_pipeline(StandardScaler(), Ridge())
-        self._linear.fit(self._columns(inputs[complete]), np.log(theta[complete]))
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Which components are missing, (n_samples, n_modes * n_sensors)."""
+        return np.isnan(self.units).reshape(len(self.units), -1)
 
-    def transform(self, inputs: Array) -> Array:
-        """Frequencies and scores, (n_samples, n_modes + n_parameters); NaN in rows that are not complete."""
-        scores = np.full((len(inputs), self._linear[-1].coef_.shape[0]), np.nan)
-        complete = ~np.isnan(inputs).any(axis=1)
-        if complete.any():
-            scores[complete] = np.exp(self._linear.predict(self._columns(inputs[complete])))
-        return np.hstack([inputs[:, : self._n_modes], scores])
+    def of(self, rows: NDArray) -> "MeasuredShapes":
+        """Some rows."""
+        return MeasuredShapes(self.units[rows])
 
-    def _columns(self, inputs: Array) -> Array:
-        return np.hstack([np.log(inputs[:, : self._n_modes]), inputs[:, self._n_modes :]])
+    def with_modes(self, order: NDArray) -> "MeasuredShapes":
+        """The measured modes in another order."""
+        return MeasuredShapes(self.units[:, order])
+
+    def misfit(self, shapes: Array, slopes: Array) -> tuple[Array, Array]:
+        """Differences u - v from computed shapes v of unit length, and the derivatives of v.
+
+        Computed shapes, (n_samples, n_sensors, n_modes), get the signs of the measured ones. Where a mode is missing,
+        the difference is 0.
+        """
+        phi, d_phi = shapes.swapaxes(1, 2), slopes.swapaxes(1, 2)
+        length = np.linalg.norm(phi, axis=2, keepdims=True)
+        v = phi / length
+        along = np.einsum("smd,smdp->smp", v, d_phi)
+        dv = (d_phi - v[:, :, :, np.newaxis] * along[:, :, np.newaxis]) / length[:, :, :, np.newaxis]
+        u = np.where(np.isnan(self.units), v, self.units)
+        signs = np.where(np.einsum("smd,smd->sm", u, v) < 0, -1.0, 1.0)[:, :, np.newaxis]
+        n_samples, n_parameters = len(u), slopes.shape[3]
+        residual = (u - signs * v).reshape(n_samples, -1)
+        return residual, (signs[:, :, :, np.newaxis] * dv).reshape(n_samples, -1, n_parameters)
