@@ -6,13 +6,13 @@ from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies._bounded_fit import fit_severities, p_of_damage, p_of_group, p_of_misfit, redrawn
-from skthermo.studies._comparison import Comparison, Part
-from skthermo.studies._effects import FrequencyEffects
-from skthermo.studies._groups import read_groups
-from skthermo.studies._separability import confused_groups, cosines, errors_alone, merge_confused
-from skthermo.studies._shape_effects import ShapeEffects
-from skthermo.studies._shift import covariance_of_record, measured_shift
+from skthermo.studies.identification._bounded_fit import fit_severities, p_of_damage, p_of_group, p_of_misfit, redrawn
+from skthermo.studies.identification._comparison import Comparison, Part
+from skthermo.studies.identification._frequency_effects import FrequencyEffects
+from skthermo.studies.identification._identify import read_groups
+from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone, merge_confused
+from skthermo.studies.identification._shape_effects import ShapeEffects
+from skthermo.studies.identification._shift import covariance_of_record, measured_shift
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::12]
