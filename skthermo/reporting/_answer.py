@@ -1,7 +1,5 @@
 """Sections of a report on the answer, and on what would be found and what not."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

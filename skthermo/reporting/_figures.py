@@ -1,7 +1,5 @@
 """Drawings of a report, as SVG within the page."""
 
-from __future__ import annotations
-
 import textwrap
 import warnings
 from collections.abc import Callable

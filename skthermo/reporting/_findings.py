@@ -1,7 +1,5 @@
 """What a study found for one family of scenarios, in numbers and in sentences."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from typing import Any
@@ -25,18 +23,8 @@ LEVEL = 0.9
 class Finding:
     """Smallest damage of one family of scenarios that is found reliably.
 
-    Attributes
-    ----------
-    family : str
-        Of the scenarios.
-    severities, rates : ndarray of shape (n_severities,)
-        Tested severities in ascending order of their magnitude, and shares of records in alarm.
-    smallest, lowest, highest : float
-        Tested severity from which on damage is found, and its bounds; NaN where none is.
-    curve : PODCurve or None
-        None where none can be fitted.
-    problem : str
-        Why not.
+    Severities are in ascending order of their magnitude; the smallest and its bounds are NaN where none is found. Where
+    no curve can be fitted, ``problem`` says why.
     """
 
     family: str

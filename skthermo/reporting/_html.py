@@ -1,7 +1,5 @@
 """HTML elements, in which all text is escaped that is not HTML already, and the page around them."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape

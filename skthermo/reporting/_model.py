@@ -1,7 +1,5 @@
 """Sections of a report on what was monitored, and on how good the model is."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is measured and learned, and the smallest damage that a detector finds with it."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,37 +14,26 @@ from skthermo.studies.detectability._pod_curve import pod_curve
 
 @dataclass(frozen=True)
 class Arrangement:
-    """What is measured, for how long, and the detector that learns it.
-
-    Attributes
-    ----------
-    detector : detector
-        Not fitted.
-    columns : sequence
-        Names of what it sees, in its order.
-    n_baseline : int
-        Healthy records that it learns from.
-    is_frame : bool
-        Whether it sees frames.
-    """
+    """An unfitted detector, the names of the columns that it sees, in order, as a frame or an array, and the number of
+    healthy records that it learns from."""
 
     detector: Any
     columns: Sequence[Hashable]
     n_baseline: int
     is_frame: bool
 
-    def with_mode(self, name: str) -> Arrangement:
+    def with_mode(self, name: str) -> "Arrangement":
         """The arrangement with one more measured mode, which is a target where a part of the detector has targets."""
         detector, added = clone(self.detector), name if self.is_frame else len(self.columns)
         targets = {key: value for key, value in detector.get_params().items() if key.rsplit("__", 1)[-1] == "targets"}
         detector.set_params(**{key: [*value, added] for key, value in targets.items()})
         return replace(self, detector=detector, columns=[*self.columns, name])
 
-    def with_sensor(self, name: Hashable) -> Arrangement:
+    def with_sensor(self, name: Hashable) -> "Arrangement":
         """The arrangement with one more temperature."""
         return replace(self, columns=[*self.columns, name])
 
-    def with_baseline(self, factor: float) -> Arrangement:
+    def with_baseline(self, factor: float) -> "Arrangement":
         """The arrangement with a longer baseline."""
         return replace(self, n_baseline=int(np.ceil(self.n_baseline * factor)))
 

@@ -21,17 +21,7 @@ FEW_ALARMS = 10
 
 @dataclass(frozen=True)
 class Rate:
-    """Rate of alarms of several repeats.
-
-    Attributes
-    ----------
-    n_alarms, n_records : int
-        Over all repeats; records that could not be judged are left out.
-    n_effective : float
-        Number of independent records that would give the rate as accurately.
-    lowest, highest : float
-        Bounds of the rate.
-    """
+    """Rate of alarms over all judged records, its bounds, and the number of independent records with the same error."""
 
     n_alarms: int
     n_records: int
@@ -48,15 +38,8 @@ class Rate:
 def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = False) -> Rate:
     """Rate of negative decisions, with Clopper-Pearson bounds of the effective number of records.
 
-    Parameters
-    ----------
-    decisions : ndarray of shape (n_repeats, n_records)
-        Decision function of a detector for the same records with different noise, in order of time; NaN where there
-        is none.
-    confidence : float, default=0.95
-        Two-sided.
-    whole_repeats : bool, default=False
-        Whether all records of a repeat depend on each other, as where each repeat has other damage.
+    Decisions, (n_repeats, n_records), are of the same records with different noise, in order of time, and NaN where
+    there is none. With ``whole_repeats``, all records of a repeat depend on each other.
     """
     judged = ~np.isnan(decisions)
     n_alarms, n_records = int((decisions < 0).sum()), int(judged.sum())
@@ -80,14 +63,9 @@ def clopper_pearson(n_alarms: float, n_records: float, confidence: float) -> tup
 
 @dataclass(frozen=True)
 class Blocks:
-    """Contiguous blocks of records, whose sums in different repeats are independent.
+    """Contiguous blocks of records by their first ones, whose sums in different repeats are independent.
 
-    Attributes
-    ----------
-    starts : ndarray of int
-        First record of each block.
-    judged : ndarray of bool, shape (n_repeats, n_records)
-        Records with a decision.
+    Judged records are those with a decision, (n_repeats, n_records).
     """
 
     starts: NDArray[np.intp]

@@ -1,7 +1,5 @@
 """Records of one scenario as a detector judges them, and their row in the table of a study."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,21 +15,8 @@ from skthermo.studies.scenarios import BaseScenario
 
 @dataclass(frozen=True, eq=False)
 class JudgedRecords:
-    """Records of one scenario and source, judged in every repeat.
-
-    Attributes
-    ----------
-    scenario : BaseScenario
-        What is changed.
-    source : str
-        "data-informed" or "reference".
-    rows : DataFrame or array-like of n_records rows
-        Says when the records were taken.
-    damage_index : Series of shape (n_records,)
-        Of the first repeat.
-    decisions : list of ndarray of shape (n_records,)
-        Decision function in each repeat, NaN where there is none.
-    """
+    """Records of one scenario and source: when they were taken, their damage index in the first repeat, and the
+    detector's decision function in each repeat, NaN where there is none."""
 
     scenario: BaseScenario
     source: str
@@ -40,13 +25,7 @@ class JudgedRecords:
     decisions: list[Array]
 
     def summary(self, confidence: float) -> dict[str, Any]:
-        """Rates, bounds and time to detection, from the onset of the damage on.
-
-        Raises
-        ------
-        ValueError
-            If no record can be judged.
-        """
+        """Rates, bounds and time to detection, from the onset of the damage on."""
         times, scenario = row_times(self.rows), self.scenario
         start = times.min() if scenario.onset is None else time_of(self.rows, scenario.onset, "onset")
         order = np.argsort(times, kind="stable")

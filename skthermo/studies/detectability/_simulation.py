@@ -1,7 +1,5 @@
 """Simulated and reference records of all scenarios, as a detector judges them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,27 +22,8 @@ SIMULATED, REFERENCE = "data-informed", "reference"
 
 @dataclass(frozen=True)
 class Simulation:
-    """One weather, a fitted detector, and the frequencies of every scenario before noise.
-
-    Attributes
-    ----------
-    fem : DataInformedFEM
-        Fitted.
-    detector : detector
-        Fitted.
-    view : View
-        What the detector sees.
-    scenarios : sequence of BaseScenario
-        What is changed.
-    T : array-like or DataFrame of shape (n_records, n_sensors)
-        The weather.
-    clean : mapping of str to list of ndarray
-        By scenario, the frequencies (n_records, n_modes) of each of its draws.
-    noise : float, array-like or "fitted"
-        As in `DataInformedFEM.simulate`.
-    reference : callable or None
-        Gives true frequencies for a scenario and a seed.
-    """
+    """One weather, a fitted detector, and the frequencies before noise, (n_records, n_modes), of each draw of every
+    scenario; ``reference`` gives true frequencies for a scenario and a seed."""
 
     fem: Any
     detector: Any

@@ -1,7 +1,5 @@
 """Which columns a detector sees of measured and simulated records."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,19 +14,7 @@ from skthermo._frames import check_same_rows, column_names, frame_like
 
 @dataclass(frozen=True)
 class View:
-    """Columns of the detector's baseline, among the temperatures and frequencies of the chain side by side.
-
-    Attributes
-    ----------
-    names : list
-        Of all temperatures and modes of the chain.
-    n_sensors : int
-        How many of them are temperatures.
-    positions : ndarray of int
-        Of the columns that the detector sees, in its order.
-    is_frame : bool
-        Whether it sees a frame.
-    """
+    """Columns of a detector's baseline: their positions among temperatures and modes of the chain side by side."""
 
     names: Sequence[Hashable]
     n_sensors: int
@@ -45,11 +31,7 @@ class View:
         return self._seen(np.hstack([as_floats(T), F]), T)
 
     def reference(self, records: Any, T: Any, name: str) -> Any:
-        """Measured records of a scenario as the detector sees them.
-
-        They may have temperatures of their own; without, and where the detector sees temperatures, those of T are
-        theirs.
-        """
+        """Measured records of a scenario as the detector sees them, with temperatures T where they lack their own."""
         known = self._positions_of(records, f"the reference of scenario {name!r}")
         values = np.full((len(records), len(self.names)), np.nan)
         values[:, known] = as_columns(records)
@@ -92,13 +74,7 @@ class View:
 
 
 def read_baseline(fem: Any, detector: Any, baseline: Any) -> tuple[View, Any]:
-    """The detector's view, and the records that it learns from: by default those that the chain has learned from.
-
-    Raises
-    ------
-    ValueError
-        If columns do not fit, or temperatures are what the detector lacks or has no use for.
-    """
+    """The detector's view, and the records that it learns from: by default those that the chain has learned from."""
     T, F = fem.training_records_
     names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
     everything = View(names, n_sensors, np.arange(len(names)), False)

@@ -1,7 +1,5 @@
 """Simulated campaigns with modes, sensors and a length of the baseline that the real monitoring does not have."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -22,22 +20,8 @@ LARGEST_SEED = np.iinfo(np.int32).max
 class CampaignSimulator:
     """A chain that stands for the true structure: healthy records to learn from, and records of every severity.
 
-    Attributes
-    ----------
-    fem : DataInformedFEM
-        Fitted.
-    T : array-like or DataFrame of shape (n_records, n_sensors)
-        New weather.
-    changes : mapping
-        What is changed, by family and severity.
-    noise : float, array-like or "fitted"
-        Of the modes that the chain was fitted on.
-    n_baseline : int
-        Number of healthy records. The weather that the chain was fitted on begins again where they are more.
-    modes : sequence of int
-        Ranks of further modes of the model.
-    scatter : ndarray of shape (n_further,)
-        Relative standard deviations of their noise.
+    The weather of the training begins again where ``n_baseline`` is longer. ``modes`` are the ranks of further modes of
+    the model, and ``scatter`` the relative standard deviations of their noise.
     """
 
     fem: Any

@@ -23,20 +23,10 @@ Effects = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class BoundedFit:
-    """Severities between 0 and 0.95 that fit a shift best.
+    """Severities between 0 and 0.95 that fit a shift best, and the sum of squares of the whitened differences.
 
-    Attributes
-    ----------
-    severities : ndarray of shape (n_groups,)
-    misfit : float
-        Sum of squares of the whitened differences.
-    slopes : ndarray of shape (n_observed, n_groups)
-        Whitened derivatives at the fit.
-    target : ndarray of shape (n_observed,)
-        Whitened shift that slopes times severities should give, so that the fit is linear.
-    explained : ndarray of shape (n_observed,)
-        Shift by the fitted severities, not whitened.
-    converged : bool
+    ``slopes`` (n_observed, n_groups) are whitened derivatives at the fit, and ``target`` (n_observed,) the whitened
+    shift that they would explain in a linear fit; ``explained`` is the shift by the severities, not whitened.
     """
 
     severities: Array

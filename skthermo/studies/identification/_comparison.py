@@ -1,7 +1,5 @@
 """Measured shifts beside the effects of damage, in standard errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,15 +12,9 @@ from skthermo.studies.identification._bounded_fit import BoundedFit, Effects, fi
 
 @dataclass(frozen=True)
 class Part:
-    """Shifts of one kind: of frequencies or of mode shapes.
+    """Shifts of one kind, of frequencies or of mode shapes: NaN where nothing was measured; (n_observed,) each.
 
-    Attributes
-    ----------
-    effects : callable
-        Severities of the model's groups -> change and its derivatives.
-    measured : ndarray of shape (n_observed,)
-        NaN where nothing was measured.
-    covariance : ndarray of shape (n_observed, n_observed)
+    Effects are a function from severities of the model's groups to the change and its derivatives.
     """
 
     effects: Effects
@@ -47,15 +39,7 @@ def remembered(effects: Effects) -> Effects:
 class Comparison:
     """All measured shifts, and the effects of some groups on them.
 
-    Attributes
-    ----------
-    parts : list of Part
-    incidence : ndarray of shape (n_model_groups, n_groups)
-        1 where a group contains a group of the model.
-    names : list of str
-        Of the groups.
-    of_model : list of str
-        Names of the model's groups.
+    ``incidence``, (n_model_groups, n_groups), is 1 where a group contains a group of the model.
     """
 
     parts: list[Part]
@@ -63,7 +47,7 @@ class Comparison:
     names: Sequence[str] = ()
     of_model: Sequence[str] = ()
 
-    def of(self, columns: list[list[int]]) -> Comparison:
+    def of(self, columns: list[list[int]]) -> "Comparison":
         """The comparison for some groups, each of one or several joined."""
         incidence = np.array([self.incidence[:, joined].max(axis=1) for joined in columns])
         names = [" + ".join(self.names[column] for column in joined) for joined in columns] if self.names else ()

@@ -1,7 +1,5 @@
 """The result of an identification: tables and tests from fits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects of damage on the frequencies, averaged over the weather of some records."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,20 +22,8 @@ LEVELS = (0.3, 0.6, 1.0)
 class FrequencyEffects:
     """Mean change of the logarithms of the measured frequencies that severities cause.
 
-    Attributes
-    ----------
-    fem : DataInformedFEM
-        Fitted.
-    theta : ndarray of shape (n_rows, n_parameters)
-        Parameters in the weather of some records.
-    weights : ndarray of shape (n_rows, n_modes)
-        Weight of each record in the mean of a mode.
-    groups : list of str
-        Damage groups of the model.
-    healthy : ndarray of shape (n_rows, n_modes)
-        Logarithm of the undamaged structure's frequencies.
-    simulators : dict
-        Simulators with damage parameters made so far, by the highest severity that a reduced model covers.
+    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes). Simulators with
+    damage parameters are kept by the highest severity that their reduced model covers.
     """
 
     fem: Any
@@ -48,7 +34,7 @@ class FrequencyEffects:
     simulators: dict[float, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, fem: Any, theta: Array, F: Array, groups: Sequence[str]) -> FrequencyEffects:
+    def of(cls, fem: Any, theta: Array, F: Array, groups: Sequence[str]) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
         is_slow = fem.simulator_.reduced is None and getattr(fem.model, "prefer", "processes") == "processes"
         present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
@@ -60,7 +46,7 @@ class FrequencyEffects:
         weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
         return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), groups, healthy)
 
-    def nominal(self) -> FrequencyEffects:
+    def nominal(self) -> "FrequencyEffects":
         """The same effects at the model's nominal state.
 
         Parameters that the records do not determine may have drifted, so that a symmetric structure is no longer

@@ -182,13 +182,7 @@ def _of_shapes(
 
 
 def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
-    """Groups of the model by name; several of them where they are joined.
-
-    Raises
-    ------
-    ValueError
-        If the model cannot be damaged, a group is unknown, or there is none.
-    """
+    """Groups of the model by name; several of them where they are joined."""
     if not hasattr(model, "damaged") or not hasattr(model, "groups"):
         raise ValueError(f"{model!r} has no damage groups; expected a model that can be damaged, such as AffineModel")
     known = model.groups

@@ -1,7 +1,5 @@
 """Effects of damage on mode shapes at sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,18 +18,7 @@ STEP = 1e-3
 class ShapeEffects:
     """Change of the mode shapes at sensors that severities cause, at one theta.
 
-    Attributes
-    ----------
-    model : FE model
-        With mode shapes.
-    theta : ndarray of shape (1, n_parameters)
-        Mean parameters.
-    groups : list of str
-        Damage groups of the model.
-    dofs : ndarray of shape (n_sensors,)
-        Degrees of freedom of the sensors.
-    reference : ndarray of shape (n_sensors, n_modes)
-        Shapes of the undamaged model, to which all shapes are scaled.
+    All shapes are scaled to the reference, those of the undamaged model, (n_sensors, n_modes).
     """
 
     model: Any
@@ -41,14 +28,8 @@ class ShapeEffects:
     reference: Array
 
     @classmethod
-    def of(cls, fem: Any, theta: Array, groups: Sequence[str], dofs: ArrayLike) -> ShapeEffects:
-        """Effects at the mean of some rows of theta.
-
-        Raises
-        ------
-        ValueError
-            If the model gives no shapes, or a degree of freedom does not exist.
-        """
+    def of(cls, fem: Any, theta: Array, groups: Sequence[str], dofs: ArrayLike) -> "ShapeEffects":
+        """Effects at the mean of some rows of theta."""
         if not hasattr(fem.model, "modes"):
             raise ValueError(f"{fem.model!r} has no method 'modes'; expected a model with one, to compare mode shapes")
         mean = theta.mean(axis=0, keepdims=True)
@@ -78,13 +59,7 @@ class ShapeEffects:
         return np.where(np.isnan(shapes), np.nan, np.real(factors * known))
 
     def measured(self, shapes: Any, noise: ArrayLike) -> tuple[Array, Array]:
-        """Change of every component from a healthy to a damaged shape, and its standard deviation.
-
-        Raises
-        ------
-        ValueError
-            If the shapes do not fit the sensors and modes, or the noise is 0.
-        """
+        """Change of every component from a healthy to a damaged shape, and its standard deviation."""
         if not isinstance(shapes, Sequence) or len(shapes) != 2:
             raise ValueError(
                 "shapes is not a pair; expected measured shapes of the healthy and of the damaged structure"

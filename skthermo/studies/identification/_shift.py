@@ -1,7 +1,5 @@
 """Shift of measured frequencies from the healthy structure's in the same weather, and its error."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -20,21 +18,10 @@ PSEUDO_PERIODS = 24
 
 
 class Shift(NamedTuple):
-    """Mean relative shift of each mode.
+    """Mean relative shift of each mode, and how many records it is the mean of; NaN for a mode that was not measured.
 
-    Attributes
-    ----------
-    mean : ndarray of shape (n_modes,)
-        Mean of ln(measured / predicted), less what the training records in similar weather show; NaN for a mode that
-        was not measured.
-    covariance : ndarray of shape (n_modes, n_modes)
-        Of its errors.
-    n_records : ndarray of shape (n_modes,)
-        How many records it is the mean of.
-    n_periods : int
-        Degrees of freedom of the covariance: the number of periods, pseudo-periods included.
-    modes : list
-        Names of the modes.
+    It is the mean of ln(measured / predicted), less what the training records in similar weather show. ``n_periods``
+    are the degrees of freedom of the covariance of its errors: the number of periods, pseudo-periods included.
     """
 
     mean: Array
@@ -45,13 +32,7 @@ class Shift(NamedTuple):
 
 
 def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
-    """The shift at the temperatures T with parameters theta, and its covariance from periods of the training records.
-
-    Raises
-    ------
-    ValueError
-        If the noise is neither "fitted" nor relative standard deviations above 0.
-    """
+    """The shift at temperatures T with parameters theta, and its covariance from periods of the training records."""
     residuals, number = fem.expected_residuals(T, return_number=True)
     shifts = np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + as_floats(residuals))))
     mean, n_records = _mean(shifts), (~np.isnan(shifts)).sum(axis=0)
@@ -77,13 +58,10 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
 def covariance_of_record(periods: list[tuple[Array, Array]]) -> Array:
     """Covariance, (n_modes, n_modes), of independent records whose means would scatter as those of the periods do.
 
-    Serial correlation makes it larger than that of single records. It is NaN for modes without a record. A dozen means
-    hardly determine the correlations of several modes, so that these are shrunk to those of single records.
-
-    Parameters
-    ----------
-    periods : list of (ndarray of shape (n_records, n_modes), ndarray of shape (n_modes,))
-        Residuals of each period less those of other periods in similar weather, and the number of records of these.
+    A period is its residuals, (n_records, n_modes), less those of other periods in similar weather, and the number of
+    records of these for each mode. Serial correlation makes the covariance larger than that of single records. It is
+    NaN for modes without a record. A dozen means hardly determine correlations, so that these are shrunk to those of
+    single records.
     """
     n_periods = len(periods)
     means = []

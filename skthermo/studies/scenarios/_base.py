@@ -1,7 +1,5 @@
 """The base of all scenarios, and checks of what a study is given."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -74,15 +72,7 @@ class BaseScenario(ABC):
 
 
 def check_chain(fem: Any) -> None:
-    """Raise an error for what is not a fitted chain.
-
-    Raises
-    ------
-    ValueError
-        If it is something else, such as an FE model.
-    NotFittedError
-        If it is not fitted.
-    """
+    """Raise an error for what is not a fitted chain."""
     if not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
