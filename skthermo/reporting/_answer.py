@@ -24,7 +24,7 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     words = paragraphs(
         "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
         "learned from measurements how temperature moves this structure, simulated it in the same weather without "
-        "damage and with damage. The alarm system judged every simulated record.",
+        "damage and with damage. The alarm system judged every simulated record."
     )
     meaning = paragraphs(
         "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "

@@ -33,12 +33,7 @@ SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dp
 
 
 def draw(
-    make: Callable[[], Any],
-    alt: str,
-    title: str = "",
-    *,
-    height: float | None = HEIGHT,
-    width: float = WIDTH,
+    make: Callable[[], Any], alt: str, title: str = "", *, height: float | None = HEIGHT, width: float = WIDTH
 ) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
 

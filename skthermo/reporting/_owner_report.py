@@ -30,12 +30,7 @@ PACKAGES = ("skthermo", "numpy", "scipy", "pandas", "sklearn", "matplotlib")
 
 
 def owner_report(
-    study: Any,
-    path: str | os.PathLike[str],
-    *,
-    identified: Any = None,
-    title: str | None = None,
-    structure: Any = None,
+    study: Any, path: str | os.PathLike[str], *, identified: Any = None, title: str | None = None, structure: Any = None
 ) -> Path:
     """Write a report for the owner of a structure: one HTML file, with all drawings in it.
 

@@ -173,12 +173,7 @@ class PODCurve:
 
 
 def pod_curve(
-    severities: ArrayLike,
-    n_detected: ArrayLike,
-    n_records: ArrayLike,
-    *,
-    log: bool = False,
-    confidence: float = 0.95,
+    severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike, *, log: bool = False, confidence: float = 0.95
 ) -> PODCurve:
     """Fit the probability of detection over severity, by maximum likelihood.
 

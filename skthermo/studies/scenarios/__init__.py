@@ -5,12 +5,4 @@ from skthermo.studies.scenarios._progressive import ProgressiveDamage
 from skthermo.studies.scenarios._scenario import Scenario, sweep
 from skthermo.studies.scenarios._uncertain import UncertainDamage
 
-__all__ = [
-    "BaseScenario",
-    "ProgressiveDamage",
-    "Scenario",
-    "UncertainDamage",
-    "check_chain",
-    "check_groups",
-    "sweep",
-]
+__all__ = ["BaseScenario", "ProgressiveDamage", "Scenario", "UncertainDamage", "check_chain", "check_groups", "sweep"]
