@@ -42,7 +42,9 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
         cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]
         parts += [
             element("h3", "Smallest damage that is found reliably"),
-            bullets(_sentence(found) for found in findings),
+            bullets(
+                element("span", element("strong", f"{found.family}:"), f" {found.sentence()}") for found in findings
+            ),
             table("Smallest damage found reliably: among the tested severities, and from a curve.", columns, cells),
         ]
     unclear = _unclear_families(rows, findings)
@@ -67,15 +69,8 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
     scenarios = {scenario.name: scenario for scenario in study.scenarios}
-    has_truth = (results["source"] == REFERENCE).any()
-    columns = [
-        "Scenario",
-        "What is changed",
-        "Records in alarm",
-        "Bounds",
-        "Records judged",
-        "Mean time to the first alarm",
-    ]
+    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds", "Records judged"]
+    columns.append("Mean time to the first alarm")
     cells = [
         [
             row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
@@ -87,43 +82,34 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         ]
         for _, row in results.iterrows()
     ]
-    reference = " Rows called reference are of records that were given to compare the simulations with."
     introduction = (
         "Every scenario was simulated in the same weather, "
         f"{counted(int(results['n_repeats'].max()), 'time')}, each time with other scatter of the measurements. For "
         "the healthy structure, alarms are false and should be few; for a damaged one, they should be many."
     )
     introduction += _beginning(study)
-    if has_truth:
-        introduction += reference
-    parts = [paragraphs(introduction), table("Alarms in every scenario.", columns, cells)]
-    curves = [draw_curve(found, found.curve) for found in findings if found.curve is not None]
-    if curves:
-        parts.append(element("h3", "How the share of alarms grows with damage"))
-    parts.append(
+    if (results["source"] == REFERENCE).any():
+        introduction += " Rows called reference are of records that were given to compare the simulations with."
+    distance = "The index is the Mahalanobis distance, not squared."
+    parts = [
+        paragraphs(introduction),
+        table("Alarms in every scenario.", columns, cells),
         figure(
             "Share of records in alarm over the severity of the damage: tested severities with 95 % bounds, and a "
             "curve through them with its bounds. The label a90 marks the severity at which 90 % of the records raise "
             "an alarm, a90/95 the one at which this is so with 95 % confidence.",
-            curves,
-        )
-    )
-    drawn = _damage_indices(study, findings, scenarios)
-    distance = (
-        " The index is the Mahalanobis distance, not squared."
-        if isinstance(last_step(study.detector_), MahalanobisDetector)
-        else ""
-    )
-    if drawn:
-        parts.append(element("h3", "What the alarm system sees"))
-    parts.append(
+            [draw_curve(found, found.curve) for found in findings if found.curve is not None],
+            "How the share of alarms grows with damage",
+        ),
         figure(
             "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
             "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
-            f"records of the damaged structure above.{distance}",
-            drawn,
-        )
-    )
+            "records of the damaged structure above."
+            + (f" {distance}" if isinstance(last_step(study.detector_), MahalanobisDetector) else ""),
+            _damage_indices(study, findings, scenarios),
+            "What the alarm system sees",
+        ),
+    ]
     return section("found", "What would be found and what not", *(part for part in parts if part))
 
 
@@ -141,11 +127,17 @@ def described(scenario: Any) -> str:
     """What a scenario changes, in words."""
     if scenario is None:
         return ""
-    changes = [f"{group}: {_change(severity)}" for group, severity in _damage(scenario).items() if severity]
+    is_uncertain = hasattr(scenario, "draws")
+    damage = scenario.draws.mean().round(3) if is_uncertain else getattr(scenario, "damage", None) or {}
+    changes = [
+        f"{group}: {percent(abs(severity))} {'less' if severity > 0 else 'more'} stiffness"
+        for group, severity in damage.items()
+        if severity
+    ]
     changes += [f"{name} times {factor:g}" for name, factor in (getattr(scenario, "parameters", None) or {}).items()]
     changes += [f"added {what}" for what in ("stiffness", "mass") if getattr(scenario, what, None) is not None]
     text = ", ".join(changes) or "nothing"
-    if hasattr(scenario, "draws"):
+    if is_uncertain:
         text += ", known with uncertainty"
     if scenario.onset is not None:
         text += f", from {_place(scenario.onset)} on"
@@ -153,22 +145,8 @@ def described(scenario: Any) -> str:
     return text if end is None else f"{text}, growing until {_place(end)}"
 
 
-def _damage(scenario: Any) -> dict[str, float]:
-    if hasattr(scenario, "draws"):
-        return {str(group): round(float(mean), 3) for group, mean in scenario.draws.mean().items()}
-    return dict(getattr(scenario, "damage", None) or {})
-
-
-def _change(severity: float) -> str:
-    return f"{percent(abs(severity))} {'less' if severity > 0 else 'more'} stiffness"
-
-
 def _place(onset: Any) -> str:
     return f"record {onset}" if isinstance(onset, int | np.integer) else f"{pd.Timestamp(onset):%Y-%m-%d %H:%M}"
-
-
-def _sentence(found: Finding) -> Html:
-    return element("span", element("strong", f"{found.family}:"), f" {found.sentence()}")
 
 
 def _false_alarms(rows: pd.DataFrame) -> Html:

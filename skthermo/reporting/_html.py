@@ -124,10 +124,11 @@ def image(svg: bytes, alt: str) -> Html:
     return element("img", src=f"data:image/svg+xml;base64,{b64encode(svg).decode()}", alt=alt)
 
 
-def figure(caption: str, images: Sequence[Html]) -> Html:
-    """Drawings beside each other where there is room, and what they show."""
+def figure(caption: str, images: Sequence[Html], heading: str = "") -> Html:
+    """Drawings beside each other where there is room, and what they show; nothing without drawings."""
     cells = element("div", *images, class_="panels")
-    return element("figure", cells, element("figcaption", caption)) if images else Html()
+    drawn = element("figure", cells, element("figcaption", caption))
+    return joined([*([element("h3", heading)] if heading else []), drawn]) if images else Html()
 
 
 def page(title: str, introduction: Html, sections: Mapping[str, tuple[str, Html]], ending: Html) -> str:

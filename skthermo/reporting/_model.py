@@ -16,14 +16,9 @@ from skthermo.reporting._html import Html, bullets, element, figure, paragraphs,
 MOST_PREDICTED = 1000
 """Number of records that are drawn over temperature."""
 
-LARGE_OFFSET = 15.0
-"""Percent by which the mean of a mode differs from the model's frequency if it may be another mode."""
-
-LARGE_DEVIATION = 0.5
-"""Standard deviation of a stiffness above which it is hardly determined."""
-
-MANY_OUTSIDE = 0.05
-"""Share of records with a stiffness outside its range that is worth a sentence."""
+LARGE_OFFSET, LARGE_DEVIATION, MANY_OUTSIDE = 15.0, 0.5, 0.05
+"""Offset of a mode in percent, standard deviation of a stiffness, and share of records outside its range, above which
+they are doubtful."""
 
 
 def monitored(study: Any, structure: Any, families: list[str]) -> Html:

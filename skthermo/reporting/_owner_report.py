@@ -98,29 +98,26 @@ def owner_report(
         )
     if file.is_dir():
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
-    heading = TITLE if title is None else title
-    _write(file, page(heading, _introduction(study), _sections(study, identified, structure), _ending()))
+    n_states = counted(study.results_["scenario"].nunique(), "state")
+    introduction = paragraphs(f"The alarm system was tested by simulation, in {n_states} of the structure.")
+    ending = paragraphs(f"Written by skthermo on {date.today():%Y-%m-%d}.")
+    sections = _sections(study, identified, structure)
+    _write(file, page(TITLE if title is None else title, introduction, sections, ending))
     return file
 
 
 def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[str, Html]]:
     findings = findings_of(study)
     now = [] if identified is None else identified_sentences(identified)
-    families = [found.family for found in findings]
     sections = {
         "answer": ("The answer", answer(study, findings, now)),
-        "monitored": ("What was monitored", monitored(study, structure, families)),
+        "monitored": ("What was monitored", monitored(study, structure, [found.family for found in findings])),
         "model": ("How good the model is", quality(study)),
         "found": ("What would be found", found_and_missed(study, findings)),
     }
     if identified is not None:
         sections["identified"] = ("Identified damage", identified_damage(identified))
     return sections | {"settings": ("Settings", _settings(study, identified))}
-
-
-def _introduction(study: Any) -> Html:
-    n_states = study.results_["scenario"].nunique()
-    return paragraphs(f"The alarm system was tested by simulation, in {counted(n_states, 'state')} of the structure.")
 
 
 def _settings(study: Any, identified: Any) -> Html:
@@ -154,10 +151,6 @@ def _versions() -> list[list[str]]:
     names = {"sklearn": "scikit-learn"}
     versions = [[names.get(name, name), str(import_module(name).__version__)] for name in PACKAGES]
     return [["Python", platform.python_version()], *versions]
-
-
-def _ending() -> Html:
-    return paragraphs(f"Written by skthermo on {date.today():%Y-%m-%d}.")
 
 
 def _write(file: Path, text: str) -> None:

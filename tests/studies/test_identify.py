@@ -189,6 +189,16 @@ def test_known_standard_error_of_a_single_group(fem):
     assert found.single.loc["top", "severity"] == pytest.approx(0.2, abs=1e-4)
 
 
+def test_significance_is_that_of_all_groups_together(fem):
+    """Bonferroni: with three groups, one is significant if its p-value is below a third of the error rate."""
+    F, options = simulated(fem, {"top": 0.01}), {"groups": GROUPS, "noise": 0.01, "random_state": 0}
+    p_value = identify_damage(fem, WEATHER, F, **options).table.loc["top", "p_value"]
+    assert 0 < p_value < 0.25
+    for factor, is_significant in ((2.9, False), (3.1, True)):
+        found = identify_damage(fem, WEATHER, F, significance=factor * p_value, **options)
+        assert found.table.loc["top", "significant"] == is_significant
+
+
 def test_draws_make_a_scenario(fem):
     found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2, "bottom": 0.2}), GROUPS, random_state=0)
     scenario = found.scenario("as found")

@@ -20,8 +20,7 @@ from skthermo._warnings import warn_user
 from skthermo._warnings_once import warnings_once
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._arrangement import Arrangement
-from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
-from skthermo.studies.detectability._pod_fit import bracket_of, check_probability
+from skthermo.studies.detectability._pod_curve import PODCurve, bracket_of, check_probability, pod_curve
 from skthermo.studies.detectability._simulation import SIMULATED, Simulation, clean_frequencies
 from skthermo.studies.detectability._view import read_baseline
 from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups

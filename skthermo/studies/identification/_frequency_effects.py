@@ -1,6 +1,6 @@
 """Effects of damage on the frequencies, averaged over the weather of some records."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -76,9 +76,7 @@ class FrequencyEffects:
         return frequencies, -jacobian[:, :, -len(self.groups) :]
 
     def _differenced(self, severities: Array) -> tuple[Array, Array]:
-        steps = STEP * np.eye(len(self.groups))
-        slopes = [(self._damaged(severities + h) - self._damaged(severities - h)) / (2 * STEP) for h in steps]
-        return self._damaged(severities), np.stack(slopes, axis=2)
+        return self._damaged(severities), central_differences(self._damaged, severities)
 
     def _damaged(self, severities: Array) -> Array:
         damage = dict(zip(self.groups, severities.tolist(), strict=True))
@@ -99,3 +97,9 @@ class FrequencyEffects:
 def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
     """Frequencies of the undamaged structure in the measured domain, in Hz, (n_rows, n_modes)."""
     return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=warn)))
+
+
+def central_differences(function: Callable[[Array], Array], severities: Array) -> Array:
+    """Derivatives of a function by each severity, along a new last axis."""
+    steps = STEP * np.eye(len(severities))
+    return np.stack([(function(severities + h) - function(severities - h)) / (2 * STEP) for h in steps], axis=-1)

@@ -9,9 +9,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
-
-STEP = 1e-3
-"""Step of differences in severity."""
+from skthermo.studies.identification._frequency_effects import central_differences
 
 
 @dataclass(frozen=True)
@@ -43,9 +41,8 @@ class ShapeEffects:
 
     def __call__(self, severities: Array) -> tuple[Array, Array]:
         """Change of every component, (n_sensors * n_modes,), and its derivatives by the severities."""
-        steps = STEP * np.eye(len(self.groups))
-        slopes = [(self._shapes(severities + h) - self._shapes(severities - h)) / (2 * STEP) for h in steps]
-        return self._shapes(severities) - self.reference.ravel(), np.stack(slopes, axis=1)
+        slopes = central_differences(self._shapes, severities)
+        return self._shapes(severities) - self.reference.ravel(), slopes
 
     def _shapes(self, severities: Array) -> Array:
         damaged = self.model.damaged(dict(zip(self.groups, severities.tolist(), strict=True)))

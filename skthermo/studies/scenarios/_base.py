@@ -12,20 +12,10 @@ from skthermo._validation import check_is_fitted
 
 
 class BaseScenario(ABC):
-    """Base of scenarios: a name, what is changed, and the place in a family of severities.
+    """A name, what is changed from the onset on, and the place in a family of scenarios that differ in severity only.
 
-    Attributes
-    ----------
-    name : str
-        Unique in a study.
-    family : str or None
-        Scenarios of one family differ in severity only.
-    severity : float
-        NaN where there is no single one.
-    onset : int, time or None
-        When the change begins; None where it is there from the first record.
-    n_draws : int
-        Number of different states that the repeats of a study take in turn.
+    The severity is NaN where there is no single one, and the onset None where the change is there from the beginning.
+    The repeats of a study take ``n_draws`` different states in turn.
     """
 
     name: str

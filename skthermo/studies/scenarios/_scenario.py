@@ -84,15 +84,12 @@ class Scenario(BaseScenario):
         )
 
     def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
-        asked = {"damage": self.damage, "parameters": self.parameters, "stiffness": self.stiffness, "mass": self.mass}
-        return {name: value for name, value in asked.items() if value is not None and not _is_empty(value)}
+        asked = {"damage": self.damage or None, "parameters": self.parameters or None}
+        asked |= {"stiffness": self.stiffness, "mass": self.mass}
+        return {name: value for name, value in asked.items() if value is not None}
 
     def __repr__(self) -> str:
         return f"Scenario({', '.join([repr(self.name), *(f'{k}={_short(v)}' for k, v in self.changes(None).items())])})"
-
-
-def _is_empty(value: Any) -> bool:
-    return isinstance(value, dict) and not value
 
 
 def _short(value: Any) -> str:
