@@ -22,7 +22,7 @@ def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expecte
     random, inside = np.random.default_rng(0), []
     for _ in range(2000):
         rates = random.uniform(0, 1, n_repeats + 1)
-        decisions = np.where(np.arange(1000) < 1000 * rates[:, np.newaxis], -1.0, 1.0)
+        decisions = np.where(np.arange(200) < 200 * rates[:, np.newaxis], -1.0, 1.0)
         lowest, highest = band_of(decisions[:-1], 0.95)
         inside.append(lowest <= (decisions[-1] < 0).mean() <= highest)
     assert np.mean(inside) == pytest.approx(expected, abs=0.04)

@@ -1,4 +1,4 @@
-"""Intervals of rates of alarms, in simulation and against closed forms."""
+"""Intervals of rates of alarms, in simulation and against closed forms; `detectability_intervals.py` has more cases."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,7 @@ def decisions(random, rate, correlation, n_repeats, n_records):
     return noise - limits, norm.cdf(limits).mean()
 
 
-@pytest.mark.parametrize(("n_repeats", "correlation"), [(20, 0.0), (20, 0.8), (3, 0.5), (1, 0.0), (1, 0.8)])
-@pytest.mark.parametrize("rate", [0.02, 0.3, 0.95])
+@pytest.mark.parametrize(("n_repeats", "correlation", "rate"), [(20, 0.8, 0.02), (3, 0.5, 0.95), (1, 0.8, 0.3)])
 def test_bounds_hold_the_rate_as_often_as_they_say(n_repeats, correlation, rate):
     random, held = np.random.RandomState(0), []
     for _ in range(150):
