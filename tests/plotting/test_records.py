@@ -11,7 +11,6 @@ import pytest
 from sklearn.linear_model import LinearRegression
 
 from skthermo.plotting import FitReportDisplay, FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 
 def drawn(line):
@@ -80,9 +79,7 @@ def test_histories_of_measured_and_predicted_frequencies(fem, year):
 
 
 def test_the_history_of_a_chain_fitted_to_arrays_names_its_parameters(fem, year):
-    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=100, noise=0.01)
-    from_arrays = DataInformedFEM(fem.model, inverse=inverse, mapper=TemperatureMapper(LinearRegression()))
-    from_arrays.fit(year.temperatures.to_numpy(), year.frequencies.to_numpy())
+    from_arrays = type(fem)(fem.model, random_state=0).fit(year.temperatures.to_numpy(), year.frequencies.to_numpy())
     display = HistoryDisplay.from_estimator(from_arrays)
     assert [ax.get_ylabel().split("\n")[0] for ax in display.axes_] == fem.parameter_names_
     assert display.axes_[-1].get_xlabel() == "record"

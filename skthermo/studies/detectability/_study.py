@@ -28,11 +28,6 @@ from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
 MANY_FALSE_ALARMS = 0.5
 """Rate of false alarms above which a warning says that baseline and simulation are not of the same structure."""
 
-UNDETECTED = (
-    "; alarms are as rare as for the healthy structure: severities are small, or outliers of the baseline raise the "
-    "threshold"
-)
-
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
 
@@ -342,7 +337,8 @@ class DetectabilityStudy(BaseEstimator):
         except ValueError as error:
             if rows["severity"].min() < 0 < rows["severity"].max():
                 raise
-            cause = UNDETECTED if self.is_undetected(*key) else ""
+            rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
+            cause = f"{rare}baseline raise the threshold" if self.is_undetected(*key) else ""
             warn_user(f"no curve of source {key[1]!r} for {error}{cause}", "family without a curve")
             return bracket
         if np.isnan(curve.slope):
