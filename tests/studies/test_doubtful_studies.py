@@ -45,6 +45,7 @@ def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
 def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     both = study(fem, [*sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]])
     both.run(WEATHER)
+    assert [both.is_undetected(family) for family in ("bottom", "vertical")] == [False, True]
     with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase.*as rare as for the healthy"):
         curve = both.minimum_detectable_damage(method="curve")
     assert 0.1 < curve.loc[("bottom", "data-informed"), "mdd"] < 0.3

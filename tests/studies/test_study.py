@@ -327,8 +327,9 @@ def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
 
 def test_a_study_must_be_run_before_it_is_asked(fem):
     study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1)
-    with pytest.raises(ValueError, match="expected a call of run before"):
-        study.minimum_detectable_damage()
+    for ask in (study.minimum_detectable_damage, lambda: study.is_undetected("top")):
+        with pytest.raises(ValueError, match="expected a call of run before"):
+            ask()
     study.run(WEATHER)
     with pytest.raises(ValueError, match="family 'bottom', source 'data-informed' is not in the results"):
         study.pod_curve("bottom")

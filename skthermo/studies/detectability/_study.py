@@ -307,17 +307,26 @@ class DetectabilityStudy(BaseEstimator):
         -------
         bool
             True if no rate is above the highest upper bound of the rates of false alarms.
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
         """
-        rows = self.results_[self.results_["source"] == source]
+        rows = self._results()
+        rows = rows[rows["source"] == source]
         healthy = rows.loc[rows["measure"] == "PFA", "highest"].max()
         rates = rows.loc[(rows["measure"] == "POD") & (rows["family"] == family), "rate"]
         return bool((rates <= healthy).all())
 
-    def _families(self) -> dict[tuple[Any, Any], pd.DataFrame]:
-        """Rows of the results by family and source."""
+    def _results(self) -> pd.DataFrame:
         if not hasattr(self, "results_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")
-        rows = self.results_
+        return self.results_
+
+    def _families(self) -> dict[tuple[Any, Any], pd.DataFrame]:
+        """Rows of the results by family and source."""
+        rows = self._results()
         rows = rows[(rows["measure"] == "POD") & rows["family"].notna() & rows["severity"].notna()]
         return dict(iter(rows.groupby(["family", "source"], sort=False)))  # type: ignore[arg-type]
 
