@@ -190,6 +190,22 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
         ("periods of windows", "law.of(windows, rest, self", "law.of(windows, np.arange(n_rows), self"),
     ],
+    ("studies/identification/_shift.py", "studies/test_identify_parts.py"): [
+        ("pseudo-periods of the shift's correlation", "PSEUDO_PERIODS = 24", "PSEUDO_PERIODS = 0"),
+    ],
+    ("studies/identification/_findings.py", "studies/test_identify.py"): [
+        ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
+    ],
+    ("studies/detectability/_simulation.py", "studies/test_study.py"): [
+        (
+            "noise of reference records",
+            "self.reference(scenario, int(seeds[1]))",
+            "self.reference(scenario, int(seeds[0]))",
+        ),
+    ],
+    ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
+        ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
+    ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
