@@ -1,5 +1,7 @@
 """Normal distributions of rows in which modes may be missing."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 
@@ -26,19 +28,13 @@ JITTER = 1e-12
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Mean and covariance of all modes; a row's distance is that of the modes that it has.
-
-    Attributes
-    ----------
-    mean : ndarray of shape (n_modes,)
-    covariance : ndarray of shape (n_modes, n_modes)
-    """
+    """Mean and covariance of all modes; a row's distance is that of the modes that it has."""
 
     mean: Array
     covariance: Array
 
     @classmethod
-    def of(cls, rows: Array) -> "Gaussian":
+    def of(cls, rows: Array) -> Gaussian:
         """The most likely one, by expectation maximisation where modes are missing."""
         present = ~np.isnan(rows)
         centre = np.nanmean(rows, axis=0)
@@ -54,17 +50,24 @@ class Gaussian:
 
     def whiten(self, rows: Array) -> Array:
         """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
-        present = ~np.isnan(rows)
-        masks, of_row = patterns(present)
-        roots = whitenings(np.broadcast_to(self.covariance, (len(masks), *self.covariance.shape)), masks)[0]
-        centred = self.centred(rows)
-        white = centred @ roots[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", centred, roots[of_row])
-        return np.where(present, white, np.nan)
+        return whiten_by(self.covariance[np.newaxis], np.zeros(len(rows), dtype=np.intp), rows - self.mean)
+
+    def distances(self, rows: Array) -> Array:
+        """Mahalanobis distances in the modes that rows have; NaN where there is none."""
+        scale = np.sqrt(np.diag(self.covariance))
+        masks, of_row = patterns(~np.isnan(rows))
+        # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
+        inverses = precisions(self.covariance / np.outer(scale, scale), masks)
+        standard = self.centred(rows) / scale
+        times_inverse = (
+            standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
+        )
+        squared = np.einsum("ij,ij->i", times_inverse, standard)
+        return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
     def second_moments(self, rows: Array) -> Array:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
-        present = ~np.isnan(rows)
-        masks, of_row = patterns(present)
+        masks, of_row = patterns(~np.isnan(rows))
         fill, rest = _conditionals(self.covariance, masks)
         complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
         return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
@@ -80,10 +83,21 @@ def patterns(present: Mask) -> tuple[Mask, NDArray[np.intp]]:
     return present[first], of_row.ravel()
 
 
-def precisions(covariances: Array, masks: Mask) -> Array:
-    """Inverses of the covariances of the modes in each mask; zero elsewhere."""
-    both = masks[..., :, np.newaxis] & masks[..., np.newaxis, :]
-    return np.where(both, np.linalg.inv(_alone(covariances, masks, both)), 0.0)
+def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:
+    """Centred rows in standard deviations and uncorrelated, each by one of several covariances."""
+    present = ~np.isnan(centred)
+    masks, pattern = patterns(present)
+    cases, case = np.unique(which * len(masks) + pattern, return_inverse=True)
+    roots = whitenings(covariances[cases // len(masks)], masks[cases % len(masks)])[0]
+    filled = np.nan_to_num(centred)
+    white = filled @ roots[0] if len(roots) == 1 else np.einsum("ij,ijk->ik", filled, roots[case])
+    return np.where(present, white, np.nan)
+
+
+def precisions(covariance: Array, masks: Mask) -> Array:
+    """Inverses of the covariance of the modes in each mask; zero elsewhere."""
+    both = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
+    return np.where(both, np.linalg.inv(_alone(covariance, masks, both)), 0.0)
 
 
 def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
@@ -131,7 +145,7 @@ def _alone(covariances: Array, masks: Mask, both: Mask) -> Array:
 
 def _conditionals(covariance: Array, masks: Mask) -> tuple[Array, Array]:
     """Matrices that complete centred rows of each mask, and the covariance of what they fill in."""
-    fill = covariance @ precisions(np.broadcast_to(covariance, (len(masks), *covariance.shape)), masks)
+    fill = covariance @ precisions(covariance, masks)
     return fill, covariance - fill @ covariance
 
 

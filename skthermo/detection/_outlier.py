@@ -1,5 +1,7 @@
 """Damage index and alarm by any of scikit-learn's outlier detectors."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

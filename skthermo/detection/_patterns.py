@@ -1,5 +1,7 @@
 """Damage indices that mean the same whichever modes a record has."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,14 +40,6 @@ class PatternScale:
 
     A pattern's factor is that of all rows with as many modes, at the threshold, times its own, at the highest tenth of
     its rows. Both are drawn to 1 as far as groups differ no more than by chance. Complete rows have the factor 1.
-
-    Attributes
-    ----------
-    by_number : ndarray of shape (n_modes + 1,)
-        Factors by the number of modes that are there.
-    masks : ndarray of shape (n_patterns, n_modes)
-        Patterns with factors of their own.
-    by_pattern : ndarray of shape (n_patterns,)
     """
 
     by_number: Array
@@ -53,7 +47,7 @@ class PatternScale:
     by_pattern: Array
 
     @classmethod
-    def of(cls, index: Array, present: Mask, contamination: float) -> "PatternScale":
+    def of(cls, index: Array, present: Mask, contamination: float) -> PatternScale:
         """Learned from the indices of a baseline."""
         known = np.isfinite(index)
         index, present = index[known], present[known]

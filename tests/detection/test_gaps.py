@@ -213,7 +213,7 @@ def test_a_row_farther_away_in_the_same_direction_has_a_higher_index(row, factor
 def test_rows_of_any_number_at_once_have_the_same_index(monkeypatch):
     detector = MahalanobisDetector().fit(GAPPY)
     whole = detector.damage_index(GAPPY)
-    monkeypatch.setattr("skthermo.detection._mahalanobis.ROWS", 7)
+    monkeypatch.setattr("skthermo.detection._mahalanobis.ROWS_AT_ONCE", 7)
     np.testing.assert_allclose(detector.damage_index(GAPPY), whole, rtol=1e-9)
 
 

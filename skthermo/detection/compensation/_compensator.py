@@ -1,5 +1,7 @@
 """Removes the effect of temperature from frequencies by regression."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Any, Literal, overload
 
@@ -7,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
-from sklearn.model_selection import BaseCrossValidator, cross_val_predict
+from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, frame_like, warn_of_absurd, warn_of_disorder
@@ -22,11 +24,11 @@ from skthermo._validation import (
 )
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange
-from skthermo.detection._complete_rows import CompleteRowsRegressor
-from skthermo.detection._folds import folds_of
-from skthermo.detection._targets import check_positions_are_names, positions_of, split_columns
-from skthermo.detection._whitening import Spread
+from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
+from skthermo.detection.compensation._targets import check_positions_are_names, positions_of, split_columns
+from skthermo.detection.compensation._whitening import Spread
 
+Rows = NDArray[np.intp]
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
@@ -158,7 +160,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.scale = scale
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: None = None) -> "TemperatureCompensator":
+    def fit(self, X: ArrayLike, y: None = None) -> TemperatureCompensator:
         """Fit the regression of the targets on the other columns.
 
         Parameters
@@ -260,7 +262,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         known = ~np.isnan(weather).any(axis=1)
         message = self.training_range_.warning(weather) if known.any() else ""
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
-            warn_user(message, "foreign weather")
+            warn_user(message, "weather outside the training range")
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
         return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
 
@@ -341,3 +343,18 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
+    """Folds that test every row once, and the first rows, which a splitter that goes forward in time does not test."""
+    folds = list(check_cv(cv).split(X))
+    tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
+    untested = np.arange(tested.argmax())
+    wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
+    if wrong.size:
+        raise ValueError(
+            f"cv is {cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
+            "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
+            "first, as TimeSeriesSplit does"
+        )
+    return folds, untested

@@ -1,5 +1,7 @@
 """Regression on records with missing values."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from sklearn.utils import get_tags
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._models import is_model
+from skthermo._pipelines import last_step
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer
 
@@ -29,7 +32,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     def __init__(self, estimator: BaseEstimator):
         self.estimator = estimator
 
-    def fit(self, X: Any, y: Any) -> "CompleteRowsRegressor":
+    def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
         head, rest = split_pipeline(self.estimator)
         self.head_ = None if head is None else clone(head)
         inputs = X if head is None else self.head_.fit_transform(X)
@@ -75,7 +78,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     def _predictable(self, inputs: Any) -> NDArray[np.bool_]:
         if self.takes_nan_ or scipy.sparse.issparse(inputs):
             return np.ones(inputs.shape[0], dtype=bool)
-        return _complete(inputs)
+        return ~np.isnan(as_floats(inputs)).any(axis=1)
 
 
 def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstimator]:
@@ -99,7 +102,7 @@ def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
 
 def as_target(estimator: BaseEstimator, y: Any) -> Any:
     """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
-    if y.shape[1] > 1 or not get_tags(_final_estimator(estimator)).target_tags.single_output:
+    if y.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output:
         return y
     return y.squeeze(axis=1)
 
@@ -138,15 +141,4 @@ def learns_from_y(transformer: BaseEstimator | str | None) -> bool:
 
 def takes_missing_targets(estimator: BaseEstimator) -> bool:
     """Whether an estimator accepts NaN in y: one with an FE model leaves out incomplete rows itself, after its lags."""
-    return is_model(getattr(_final_estimator(estimator), "model", None))
-
-
-def _final_estimator(estimator: BaseEstimator) -> BaseEstimator:
-    """The last estimator of a pipeline, or the one inside a search."""
-    if isinstance(estimator, Pipeline):
-        return _final_estimator(estimator.steps[-1][1])
-    return _final_estimator(estimator.estimator) if isinstance(estimator, BaseSearchCV) else estimator
-
-
-def _complete(values: Any) -> NDArray[np.bool_]:
-    return ~np.isnan(as_floats(values)).any(axis=1)
+    return is_model(getattr(last_step(estimator), "model", None))
