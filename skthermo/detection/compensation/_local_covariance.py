@@ -27,7 +27,8 @@ class Smoothing(NamedTuple):
     n_pseudo: int
 
 
-CANDIDATES = [Smoothing(*pair) for pair in ((50, 5), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))]
+PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
+CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
 """The more records, the more the covariance of all may count."""
 
 
