@@ -12,18 +12,11 @@ from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
-MOST_STEPS = 100
-TOLERANCE = 1e-9
-"""Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
-
-SETTLED = 0.01
-"""It may also end after the most steps, without a warning if the last is this small beside the sampling error."""
-
-GAPS_TOLERANCE = 1e-7
-"""A combination of standardised modes with gaps that varies less than this is taken to be constant."""
-
-JITTER = 1e-12
-"""Added to the variances of standardised modes, so that copies of a mode have inverses until `check_invertible`."""
+MOST_STEPS = 100  # of expectation maximisation
+TOLERANCE = 1e-9  # it ends when no mean or covariance of standardised modes moves by more
+SETTLED = 0.01  # size of the last of the most steps, beside the sampling error, above which it warns
+GAPS_TOLERANCE = 1e-7  # variance below which a combination of standardised modes with gaps counts as constant
+JITTER = 1e-12  # added to variances of standardised modes: copies of a mode have inverses until `check_invertible`
 
 
 @dataclass(frozen=True)
@@ -59,10 +52,8 @@ class Gaussian:
         # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
         inverses = precisions(self.covariance / np.outer(scale, scale), masks)
         standard = self.centred(rows) / scale
-        times_inverse = (
-            standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
-        )
-        squared = np.einsum("ij,ij->i", times_inverse, standard)
+        scaled = standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
+        squared = np.einsum("ij,ij->i", scaled, standard)
         return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
     def second_moments(self, rows: Array) -> Array:
@@ -116,10 +107,7 @@ def check_not_empty(rows: Array) -> None:
 
 
 def check_invertible(covariance: Array, rows: Array, size: Array | None = None) -> Array:
-    """Standard deviations of the modes, if no mode is constant or a combination of others.
-
-    ``size`` holds magnitudes of the modes beside which a deviation may be only rounding.
-    """
+    """Standard deviations of the modes, more than rounding beside their size, if no mode depends on others."""
     size = np.fmax.reduce(np.abs(rows)) if size is None else size
     deviations = np.sqrt(np.diag(covariance))
     constant = (deviations <= 1e-14 * size) | (np.fmax.reduce(rows) == np.fmin.reduce(rows))

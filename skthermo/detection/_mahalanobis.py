@@ -18,11 +18,8 @@ from skthermo.detection._gaussian import Gaussian, check_invertible, check_not_e
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
-ROWS_AT_ONCE = 20_000
-"""Number of rows whose distances are computed at a time, which bounds memory."""
-
-N_PERIODS = 10
-"""Periods of the baseline whose distances are computed with a covariance of the others, if it has no closed form."""
+ROWS_AT_ONCE = 20_000  # whose distances are computed, which bounds memory
+N_PERIODS = 10  # of the baseline, whose distances are computed with a covariance of the others if it has no closed form
 
 
 class MahalanobisDetector(DamageDetector):
@@ -75,9 +72,8 @@ class MahalanobisDetector(DamageDetector):
 
     Notes
     -----
-    `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode,
-    or a mode that is a combination of others. The units of the modes do not matter, unless ``covariance`` depends
-    on them, as a shrunk one does.
+    `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode, or a mode that is a
+    combination of others. The units of the modes do not matter, unless ``covariance`` depends on them.
 
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty. Where the baseline
@@ -94,11 +90,10 @@ class MahalanobisDetector(DamageDetector):
     ----------
     Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
-    Wilson & Hilferty, The distribution of chi-square, Proceedings of the National Academy of Sciences 17 (1931) 684-688
-    [WH31]_.
+    Wilson & Hilferty, The distribution of chi-square [WH31]_.
 
-    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm,
-    Scandinavian Journal of Statistics 35 (2008) 335-353 [VR08]_.
+    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm
+    [VR08]_.
 
     Examples
     --------
@@ -145,14 +140,13 @@ class MahalanobisDetector(DamageDetector):
         return choose(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
-        index = np.empty(len(F))
-        for first in range(0, len(F), ROWS_AT_ONCE):
-            rows = F[first : first + ROWS_AT_ONCE]
-            distances, present = self._distances(rows), ~np.isnan(rows)
-            if not present.all():
-                distances = as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
-            index[first : first + ROWS_AT_ONCE] = distances
-        return index
+        return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
+
+    def _of_few(self, F: Array) -> Array:
+        distances, present = self._distances(F), ~np.isnan(F)
+        if present.all():
+            return distances
+        return as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
 
     def _distances(self, F: Array) -> Array:
         """Distances of rows in the modes that they have; NaN where there is none."""

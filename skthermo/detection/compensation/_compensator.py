@@ -79,44 +79,35 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     Notes
     -----
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
-    it was fitted on, so their residuals are smaller than those of new records, and a threshold set on them gives too
-    many false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows
-    for the records to come. A pipeline calls `fit_transform` in its own ``fit``, so
-    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its threshold on out-of-fold residuals.
+    it was fitted on: their residuals are smaller than those of new records, and a threshold set on them gives too many
+    false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
+    the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
 
-    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be predicted by its
-    neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
-    predicted from other seasons, and its residuals and the threshold become too large. A baseline of several years, or
-    more and shorter folds, avoids this.
-
-    A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
-    too; an array is passed as an array.
+    Rows should be in order of time, so that folds are periods of time: with random folds, a row would be predicted by
+    its neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
+    predicted from other seasons, and its residuals and the threshold become too large.
 
     Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
     each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
-    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. The
-    numbers of neighbours and of pseudo-rows, or one covariance for all weather, are those under which baseline
-    records are likeliest given the others, records fewer than 24 rows apart left out; such records are left out too
-    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather.
-    Where a record's temperatures lie outside the baseline's by e ranges of their columns (on average over the
-    columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain. A row
-    with a missing temperature takes the covariance of all records. `transform` warns of rows whose weather is far
-    outside the baseline's; `applicability` says how far.
+    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
+    pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
+    given the others, records fewer than 24 rows apart left out; such records are left out too where the baseline itself
+    is scaled. A new record takes S from the baseline record with the most similar weather; with a missing temperature,
+    from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
+    the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
     Missing values:
 
-    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so
-      that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
-      the pipeline, and to the rows of X where the estimator is no such pipeline.
+    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so that
+      lags and imputers find their neighbours. What follows applies to the rows that they give to the rest.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
       estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
-      also at the end of a pipeline or in a search) gets all rows, because its lags need them; it leaves out incomplete
-      rows itself.
-    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to fit the
-      estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+      also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
+    - A row with another missing value, such as a lag that finds no record, is used if the estimator accepts NaN.
+      Otherwise the row does not train, and its residuals are NaN.
     - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
-      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a DatetimeIndex,
-      the rows of another fold shift the lags.
+      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without one, the rows of
+      another fold shift the lags.
 
     Examples
     --------

@@ -22,12 +22,7 @@ from skthermo._validation import BaseSearchCV, _BaseImputer
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
-    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
-
-    Transformers at the head of a pipeline that accept NaN get every row, so that lags find the rows before; the
-    rest of the pipeline gets the rows that it accepts. Where targets are missing, each of them gets a regressor of its
-    own, fitted on the rows that have it.
-    """
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
 
     def __init__(self, estimator: BaseEstimator):
         self.estimator = estimator
@@ -108,23 +103,16 @@ def as_target(estimator: BaseEstimator, y: Any) -> Any:
 
 
 def takes_nan(estimator: BaseEstimator) -> bool:
-    """Whether an estimator accepts NaN in X.
-
-    scikit-learn's tag does not say so for estimators inside a pipeline, a search or another wrapper.
-    """
+    """Whether an estimator accepts NaN in X, also inside a wrapper, of which scikit-learn's tag does not say so."""
     if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
         return True
     if isinstance(estimator, Pipeline):
-        for _, step in estimator.steps:
-            if not takes_nan(step):
-                return False
-            if isinstance(step, _BaseImputer):
-                return True
-        return True
-    if isinstance(estimator, ColumnTransformer):
-        return all(takes_nan(part) for _, part, _ in estimator.transformers)
-    if isinstance(estimator, FeatureUnion):
-        return all(takes_nan(part) for _, part in estimator.transformer_list)
+        steps = [step for _, step in estimator.steps]
+        imputer = next((i for i, step in enumerate(steps) if isinstance(step, _BaseImputer)), len(steps))
+        return all(takes_nan(step) for step in steps[: imputer + 1])
+    if isinstance(estimator, ColumnTransformer | FeatureUnion):
+        parts = estimator.transformers if isinstance(estimator, ColumnTransformer) else estimator.transformer_list
+        return all(takes_nan(part) for _, part, *_ in parts)
     if isinstance(estimator, MultiOutputRegressor | BaseSearchCV):
         return takes_nan(estimator.estimator)
     if isinstance(estimator, TransformedTargetRegressor) and estimator.regressor is not None:

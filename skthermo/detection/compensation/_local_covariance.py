@@ -13,11 +13,8 @@ from skthermo._arrays import Array
 from skthermo._weather import nearest
 from skthermo.detection._gaussian import Gaussian, Mask, whitenings
 
-NEAR_IN_TIME = 24
-"""Records fewer than this many rows apart, a day of hourly ones, do not tell each other's covariance."""
-
-NUMBERS_AT_ONCE = 4_000_000
-"""Numbers that are held in memory at a time."""
+NEAR_IN_TIME = 24  # records fewer rows apart, a day of hourly ones, do not tell each other's covariance
+NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 
 class Smoothing(NamedTuple):
@@ -27,9 +24,9 @@ class Smoothing(NamedTuple):
     n_pseudo: int
 
 
+# The more records, the more the covariance of all may count.
 PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
 CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
-"""The more records, the more the covariance of all may count."""
 
 
 @dataclass(frozen=True)

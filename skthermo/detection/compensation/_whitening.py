@@ -13,11 +13,8 @@ from skthermo._weather import TrainingRange, nearest, weather_coordinates
 from skthermo.detection._gaussian import Gaussian, check_invertible, whiten_by
 from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
 
-MOST_PLACES = 5000
-"""Largest number of baseline records, evenly spaced in time, that tell covariances by weather."""
-
-ERROR_PER_RANGE = 0.5
-"""Each range of the baseline's temperatures that a record is beyond them adds an error of this many deviations."""
+MOST_PLACES = 5000  # baseline records, evenly spaced in time, that tell covariances by weather
+ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's temperatures that a record is beyond them
 
 
 @dataclass(frozen=True)

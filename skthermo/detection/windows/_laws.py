@@ -16,8 +16,7 @@ from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._patterns import as_if_complete
 from skthermo.detection.windows._windows import Windows
 
-SMALLEST_CHANCE = 1e-50
-"""Indices of windows that are less likely grow in proportion to their records', as they do far out."""
+SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
 
 
 @dataclass(frozen=True)

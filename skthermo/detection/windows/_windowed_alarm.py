@@ -18,8 +18,7 @@ from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection.windows._laws import CountLaw, MeanLaw
 from skthermo.detection.windows._windows import Windows
 
-MOST_PERIODS = 50
-"""Largest number of periods of the baseline whose windows are judged by what the others teach."""
+MOST_PERIODS = 50  # of the baseline, whose windows are judged by what the others teach
 
 
 class WindowedAlarm(DamageDetector):
@@ -73,11 +72,10 @@ class WindowedAlarm(DamageDetector):
     -----
     Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a
     single one. The standard deviation of a mean therefore includes the mean correlation of two records in one window,
-    mode by mode, and the threshold comes from the baseline's own windows. Every window is judged by what other
-    periods of the baseline teach, and the number of independent windows, by the correlation time of the baseline's
-    highest ones, decides which of their indices is the threshold. If there are too few for the rate, the threshold
-    is the largest index, and a warning says so. With thresholds for days to come in mind, let the compensator predict
-    its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
+    mode by mode. The threshold comes from the baseline's own windows, each judged by what other periods teach; the
+    number of independent ones, by the correlation time of the highest (at least half a window), decides which index it
+    is. If there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
+    compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
 
     Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be
     as unlikely in a full window of independent records, by the binomial law. The first windows of a series are

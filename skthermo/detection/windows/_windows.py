@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo._frames import first_disorder
 
-NUMBERS_AT_ONCE = 2_000_000
-"""Numbers that are held in memory at a time."""
+NUMBERS_AT_ONCE = 2_000_000  # held in memory
 
 
 @dataclass(frozen=True)
