@@ -12,6 +12,7 @@ from sklearn.model_selection import TimeSeriesSplit
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection.compensation._local_covariance import Smoothing
 
 MODES = ["f1", "f2"]
 FROZEN = 0.1 * np.array([[2.0, 0.0], [1.0, 1.0]])
@@ -36,6 +37,12 @@ def compensator(scale="local", estimator=None, **options):
 X, LATER = campaign(), campaign(3000, 1)
 LOCAL = compensator().fit(X)
 SOURCE = "skthermo.detection.compensation._local_covariance"
+
+
+@pytest.fixture(autouse=True)
+def few_candidates(monkeypatch):
+    """To be quick: how the smoothing is chosen is tested by itself."""
+    monkeypatch.setattr(f"{SOURCE}.CANDIDATES", (Smoothing(50, 5), Smoothing(100, 5), Smoothing(100, 15)))
 
 
 def spreads(white, records):

@@ -1,6 +1,7 @@
 """Alarms raised by several records in a row."""
 
 import pickle
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,12 @@ def stream(n_rows=1500, seed=0, correlation=0.0, shift=0.0):
     noise = lfilter([1.0], [1.0, -correlation], noise, axis=0)
     stamps = pd.date_range("2025", periods=n_rows, freq="h")
     return pd.DataFrame([4.0, 9.0, 12.0] + (noise + [shift, 0, 0]) @ MIXED, stamps, ["f1", "f2", "f3"])
+
+
+@cache
+def fitted(rule):
+    """Windows of twelve records, for tests that only ask them."""
+    return WindowedAlarm(12, rule=rule).fit(X)
 
 
 X, LATER = stream(), stream(seed=1)
@@ -86,7 +93,8 @@ def how_many_count_as_one(alarm, index):
 
 def test_windows_count_as_one_as_long_as_alarms_last_and_within_half_a_window():
     """With half a window, because few high windows hardly tell how long they last."""
-    short, long = (WindowedAlarm(window, contamination=0.01).fit(X) for window in (2, 100))
+    short, long = WindowedAlarm(2, contamination=0.01), WindowedAlarm(100, contamination=0.01)
+    short.width_, long.width_ = 2, 100
     scattered = np.random.default_rng(0).random(20_000)
     in_runs = scattered + (np.arange(20_000) % 4000 < 40)
     assert how_many_count_as_one(short, in_runs) == pytest.approx(40, abs=2)
@@ -133,7 +141,7 @@ def test_alarms_are_where_m_of_n_records_are_above_the_threshold(n, data):
 
 
 def test_half_of_the_records_are_asked_for_by_default():
-    assert [WindowedAlarm(n, rule="m-of-n").fit(X).law_.m for n in (1, 2, 5, 24)] == [1, 1, 3, 12]
+    assert [WindowedAlarm(n, rule="m-of-n").fit(X[:700]).law_.m for n in (1, 2, 5, 24)] == [1, 1, 3, 12]
 
 
 @settings(max_examples=25, deadline=None)
@@ -201,7 +209,7 @@ def test_sums_over_windows_are_those_of_pandas():
 
 @each_rule
 def test_the_order_of_modes_and_their_units_do_not_matter(rule):
-    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    alarm = fitted(rule)
     for change in (lambda records: records[["f3", "f1", "f2"]], lambda records: records * [1.0, 1e3, 1e-6]):
         other = WindowedAlarm(12, rule=rule).fit(change(X))
         if rule == "m-of-n":
@@ -213,7 +221,7 @@ def test_the_order_of_modes_and_their_units_do_not_matter(rule):
 
 @each_rule
 def test_the_size_of_chunks_does_not_matter(rule, monkeypatch):
-    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    alarm = fitted(rule)
     whole = alarm.damage_index(HOLED)
     monkeypatch.setattr("skthermo.detection.windows._windows.NUMBERS_AT_ONCE", 100)
     np.testing.assert_allclose(alarm.damage_index(HOLED), whole, rtol=1e-10)
@@ -221,7 +229,7 @@ def test_the_size_of_chunks_does_not_matter(rule, monkeypatch):
 
 @each_rule
 def test_later_records_do_not_change_earlier_windows(rule):
-    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    alarm = fitted(rule)
     whole, memory = alarm.damage_index(HOLED), 11
     np.testing.assert_allclose(alarm.damage_index(HOLED[:700]), whole[:700], rtol=1e-9)
     np.testing.assert_allclose(alarm.damage_index(HOLED[300:])[memory:], whole[300 + memory :], rtol=1e-7)
@@ -268,7 +276,7 @@ def test_a_baseline_with_gaps_teaches_nearly_the_same(rule):
 
 @each_rule
 def test_pickles_clones_and_arrays(rule):
-    alarm = WindowedAlarm(12, rule=rule).fit(X)
+    alarm = fitted(rule)
     expected = alarm.damage_index(HOLED)
     pd.testing.assert_series_equal(pickle.loads(pickle.dumps(alarm)).damage_index(HOLED), expected)
     assert not hasattr(clone(alarm), "law_")
