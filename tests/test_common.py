@@ -73,8 +73,6 @@ def expected_failures(estimator):
         FusedDetector([("paper", MahalanobisDetector(threshold="quantile")), ("default", MahalanobisDetector())]),
         WindowedAlarm(3),
         WindowedAlarm(3, rule="m-of-n"),
-        WindowedAlarm(3, rule="ewma"),
-        WindowedAlarm(3, rule="cusum"),
         OutlierDetector(IsolationForest(n_estimators=20, random_state=0)),
         OutlierDetector(OneClassSVM()),
         OutlierDetector(LocalOutlierFactor(5, novelty=True)),

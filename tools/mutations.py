@@ -144,13 +144,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("detection/_gaussian.py", "detection/test_gaps.py"): [
         ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),
-        ("mean of modes with gaps", "mean, covariance = mean + step,", "mean, covariance = mean,"),
+        ("mean of modes with gaps", "[[mean + step], (updated", "[[mean], (updated"),
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
         ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
+        ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
     ],
     ("detection/_patterns.py", "detection/test_gaps.py"): [
         ("distances in few modes", "here, there = 2 / (9 * n_present)", "here, there = 2 / (8 * n_present)"),
-        ("factors of patterns", "np.exp(-_effects(", "np.exp(0 * _effects("),
+        ("factors of patterns", "-line - _effects(", "-line - 0 * _effects("),
+        ("factors of one pattern", "np.where(same.any(axis=1), same @ self.by_pattern, 1.0)", "1.0"),
         ("factors by chance", "- chi2.ppf(CHANCE, len(values) - 1)", ""),
     ],
     ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
@@ -169,26 +171,33 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
         ("rank of the threshold", "(n_independent + 1) * (1 - contamination)", "n_independent * (1 - contamination)"),
     ],
-    ("detection/_local_covariance.py", "detection/test_local_covariance.py"): [
+    ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
     ],
-    ("detection/_whitening.py", "detection/test_whitening.py"): [
-        ("spread beyond the baseline", "BEYOND = 0.5", "BEYOND = 0.0"),
+    ("detection/compensation/_whitening.py", "detection/test_whitening.py"): [
+        ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),
         ("unknown weather", "len(self.covariances) - 1)", "0)"),
     ],
-    ("detection/_window_laws.py", "detection/test_windowed_alarm.py"): [
+    ("detection/windows/_laws.py", "detection/test_windowed_alarm.py"): [
         ("correlation in a window", "sums**2 - squares", "sums**2"),
-        ("variance of a mean", "self.correlation * weights**2", "self.correlation * squared_weights"),
+        ("variance of a mean", "self.correlation * counts**2", "self.correlation * counts"),
         ("records of a partial window", "self.m * count / self.n", "self.m"),
     ],
-    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
-        ("mean age of fading records", "(window - 1) / (window + 1)", "window / (window + 1)"),
+    ("detection/windows/_windows.py", "detection/test_windowed_alarm.py"): [
+        ("records before a run of windows", "before = self.first[start]", "before = start"),
         ("edge of a window of time", 'side="right"', 'side="left"'),
     ],
-    ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
-        ("periods of windows", "law.of(windows, rest, self", "law.of(windows, np.arange(n_rows), self"),
+    ("detection/windows/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
+        ("periods of windows", "self._law(windows, rest)", "self._law(windows, np.arange(n_rows))"),
+        ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
+    ],
+    ("_warnings.py", "surrogate/test_report.py"): [
+        ("a warning for each fold", "if kind in kinds:", "if kind in kinds and not in_folds:"),
+    ],
+    ("_threads.py", "test_threads.py"): [
+        ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
     ("studies/identification/_shift.py", "studies/test_identify_parts.py"): [
         ("pseudo-periods of the shift's correlation", "PSEUDO_PERIODS = 24", "PSEUDO_PERIODS = 0"),

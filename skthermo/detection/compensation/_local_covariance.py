@@ -1,7 +1,10 @@
 """Covariance of residuals in similar weather."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,23 +13,20 @@ from skthermo._arrays import Array
 from skthermo._weather import nearest
 from skthermo.detection._gaussian import Gaussian, Mask, whitenings
 
-NEIGHBOURS = (50, 100, 200, 400, 800)
-PSEUDO_ROWS = (5, 15, 50)
-"""Candidates: records of similar weather that give a covariance, and the weight of that of all records beside them."""
-
-NEAR_IN_TIME = 24
-"""Records fewer than this many rows apart, a day of hourly ones, do not tell each other's covariance."""
-
-ENTRIES = 4_000_000
-"""Numbers that are held in memory at a time."""
+NEAR_IN_TIME = 24  # records fewer rows apart, a day of hourly ones, do not tell each other's covariance
+NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 
-@dataclass(frozen=True)
-class Smoothing:
-    """How a covariance follows the weather: over how many similar records, and how strongly drawn to that of all."""
+class Smoothing(NamedTuple):
+    """Over how many records of similar weather a covariance is taken, and as how many that of all records counts."""
 
     n_neighbors: int
     n_pseudo: int
+
+
+# The more records, the more the covariance of all may count.
+PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
+CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
 
 
 @dataclass(frozen=True)
@@ -39,18 +39,7 @@ class Neighbours:
 
 @dataclass(frozen=True)
 class History:
-    """Records of known weather in order of time.
-
-    Attributes
-    ----------
-    order : ndarray of shape (n_records,)
-        Positions in time.
-    places : ndarray of shape (n_records, n_coordinates)
-        The weather.
-    residuals : ndarray of shape (n_records, n_modes)
-    overall : Gaussian
-        Of all residuals.
-    """
+    """Residuals of records at positions in time and places in weather, and the distribution of all residuals."""
 
     order: NDArray[np.intp]
     places: Array
@@ -62,46 +51,21 @@ class History:
         if order is None:
             near = nearest(self.places, places, size)[1]
             return Neighbours(near, np.ones(near.shape, dtype=bool))
-        return self._far_in_time(size, nearest(self.places, places, size + 2 * NEAR_IN_TIME - 1)[1], order)
-
-    def own_neighbours(self, size: int) -> Neighbours:
-        """The records nearest to each of them, without those near in time."""
-        if size not in self._own:
-            near = self._nearest_to_own[:, : size + 2 * NEAR_IN_TIME - 1]
-            self._own[size] = self._far_in_time(size, near, self.order)
-        return self._own[size]
-
-    def best_smoothing(self) -> Smoothing | None:
-        """The smoothing, or none, under which records are likeliest given the others."""
-        plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
-        candidates: list[tuple[float, Smoothing | None]] = [(plain, None)]
-        for size in self._sizes:
-            for pseudo in PSEUDO_ROWS:
-                local = LocalCovariance(self, Smoothing(size, pseudo))
-                likelihood = whitened(self.residuals, self.overall, local(self.own_neighbours(size)))[1]
-                candidates.append((likelihood, local.smoothing))
-        return max(candidates, key=lambda candidate: candidate[0])[1]
-
-    @property
-    def _sizes(self) -> list[int]:
-        return [size for size in NEIGHBOURS if size <= len(self.order) // 2]
-
-    @cached_property
-    def _own(self) -> dict[int, Neighbours]:
-        return {}
-
-    @cached_property
-    def _nearest_to_own(self) -> NDArray[np.intp]:
-        return nearest(self.places, self.places, max(self._sizes) + 2 * NEAR_IN_TIME - 1)[1]
-
-    def _far_in_time(self, size: int, near: NDArray[np.intp], order: NDArray[np.intp]) -> Neighbours:
+        near = nearest(self.places, places, size + 2 * NEAR_IN_TIME - 1)[1]
         far = np.abs(self.order[near] - order[:, np.newaxis]) >= NEAR_IN_TIME
         return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+
+    def likeliest(self) -> LocalCovariance | None:
+        """The covariance by weather, or none, under which records are likeliest given the others."""
+        candidates = [LocalCovariance(self, one) for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
+        plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
+        likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
+        return [None, *candidates][int(np.argmax(likelihoods))]
 
 
 @dataclass(frozen=True)
 class LocalCovariance:
-    """Covariance at places in weather.
+    """Covariance at places in weather, as the records of the most similar weather show it.
 
     Standard deviations come from the modes that records have, correlations from records completed by the correlation
     in all weather.
@@ -117,11 +81,22 @@ class LocalCovariance:
         scale = np.sqrt(self._variances(neighbours) / np.einsum("ijj->ij", correlation))
         return scale[:, :, np.newaxis] * correlation * scale[:, np.newaxis, :]
 
+    def at(self, places: Array, order: NDArray[np.intp] | None = None) -> Array:
+        """Covariances at some places, without the records near ``order`` in time."""
+        return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
+
+    def likelihood(self) -> float:
+        """Log-likelihood of the records, each given the others."""
+        return whitened(self.history.residuals, self.history.overall, self(self._own))[1]
+
+    @cached_property
+    def _own(self) -> Neighbours:
+        return self.history.neighbours(self.smoothing.n_neighbors, self.history.places, self.history.order)
+
     @cached_property
     def _standard(self) -> tuple[Array, Gaussian]:
         """Records over the standard deviations in their own weather, and their distribution."""
-        deviations = np.sqrt(self._variances(self.history.own_neighbours(self.smoothing.n_neighbors)))
-        rows = (self.history.residuals - self.history.overall.mean) / deviations
+        rows = (self.history.residuals - self.history.overall.mean) / np.sqrt(self._variances(self._own))
         return rows, Gaussian.of(rows)
 
     def _variances(self, neighbours: Neighbours) -> Array:
@@ -132,7 +107,7 @@ class LocalCovariance:
         """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
         known, filled = ~np.isnan(values), np.nan_to_num(values)
         means, pseudo = np.empty((len(neighbours.rows), *prior.shape)), self.smoothing.n_pseudo
-        step = max(ENTRIES // (neighbours.rows.shape[1] * prior.size), 1)
+        step = max(NUMBERS_AT_ONCE // (neighbours.rows.shape[1] * prior.size), 1)
         for first in range(0, len(means), step):
             rows, counted = (part[first : first + step] for part in (neighbours.rows, neighbours.counted))
             sums = np.einsum("ij,ij...->i...", counted, filled[rows])

@@ -1,5 +1,7 @@
 """Removes the effect of temperature from frequencies by regression."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Any, Literal, overload
 
@@ -7,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
-from sklearn.model_selection import BaseCrossValidator, cross_val_predict
+from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, frame_like, warn_of_absurd, warn_of_disorder
@@ -22,11 +24,11 @@ from skthermo._validation import (
 )
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange
-from skthermo.detection._complete_rows import CompleteRowsRegressor
-from skthermo.detection._folds import folds_of
-from skthermo.detection._targets import check_positions_are_names, positions_of, split_columns
-from skthermo.detection._whitening import Spread
+from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
+from skthermo.detection.compensation._targets import check_positions_are_names, positions_of, split_columns
+from skthermo.detection.compensation._whitening import Spread
 
+Rows = NDArray[np.intp]
 AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
@@ -77,44 +79,35 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
     Notes
     -----
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
-    it was fitted on, so their residuals are smaller than those of new records, and a threshold set on them gives too
-    many false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows
-    for the records to come. A pipeline calls `fit_transform` in its own ``fit``, so
-    ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())`` sets its threshold on out-of-fold residuals.
+    it was fitted on: their residuals are smaller than those of new records, and a threshold set on them gives too many
+    false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
+    the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
 
-    Rows should be in order of time. Folds are then periods of time: with random folds, a row would be predicted by its
-    neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
-    predicted from other seasons, and its residuals and the threshold become too large. A baseline of several years, or
-    more and shorter folds, avoids this.
-
-    A frame is passed to the estimator as a frame, so that lags go by time, and the residuals are a frame
-    too; an array is passed as an array.
+    Rows should be in order of time, so that folds are periods of time: with random folds, a row would be predicted by
+    its neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
+    predicted from other seasons, and its residuals and the threshold become too large.
 
     Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
     each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
-    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. The
-    numbers of neighbours and of pseudo-rows, or one covariance for all weather, are those under which baseline
-    records are likeliest given the others, records fewer than 24 rows apart left out; such records are left out too
-    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather.
-    Where a record's temperatures lie outside the baseline's by e ranges of their columns (on average over the
-    columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain. A row
-    with a missing temperature takes the covariance of all records. `transform` warns of rows whose weather is far
-    outside the baseline's; `applicability` says how far.
+    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
+    pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
+    given the others, records fewer than 24 rows apart left out; such records are left out too where the baseline itself
+    is scaled. A new record takes S from the baseline record with the most similar weather; with a missing temperature,
+    from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
+    the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
     Missing values:
 
-    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so
-      that lags and imputers find their neighbours. What follows applies to the rows that they give to the rest of
-      the pipeline, and to the rows of X where the estimator is no such pipeline.
+    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so that
+      lags and imputers find their neighbours. What follows applies to the rows that they give to the rest.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
       estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
-      also at the end of a pipeline or in a search) gets all rows, because its lags need them; it leaves out incomplete
-      rows itself.
-    - A row with another missing value is used if the estimator accepts NaN. Otherwise the row is not used to fit the
-      estimator, and its residuals are NaN. Where a lag finds no record, it is such a value.
+      also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
+    - A row with another missing value, such as a lag that finds no record, is used if the estimator accepts NaN.
+      Otherwise the row does not train, and its residuals are NaN.
     - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
-      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without a DatetimeIndex,
-      the rows of another fold shift the lags.
+      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without one, the rows of
+      another fold shift the lags.
 
     Examples
     --------
@@ -158,7 +151,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.scale = scale
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: None = None) -> "TemperatureCompensator":
+    def fit(self, X: ArrayLike, y: None = None) -> TemperatureCompensator:
         """Fit the regression of the targets on the other columns.
 
         Parameters
@@ -260,7 +253,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         known = ~np.isnan(weather).any(axis=1)
         message = self.training_range_.warning(weather) if known.any() else ""
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
-            warn_user(message, "foreign weather")
+            warn_user(message, "weather outside the training range")
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
         return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
 
@@ -341,3 +334,18 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
+    """Folds that test every row once, and the first rows, which a splitter that goes forward in time does not test."""
+    folds = list(check_cv(cv).split(X))
+    tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
+    untested = np.arange(tested.argmax())
+    wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
+    if wrong.size:
+        raise ValueError(
+            f"cv is {cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
+            "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
+            "first, as TimeSeriesSplit does"
+        )
+    return folds, untested

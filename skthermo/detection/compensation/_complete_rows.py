@@ -1,5 +1,7 @@
 """Regression on records with missing values."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -14,22 +16,18 @@ from sklearn.utils import get_tags
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._models import is_model
+from skthermo._pipelines import last_step
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
-    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
-
-    Transformers at the head of a pipeline that accept NaN get every row, so that lags find the rows before; the
-    rest of the pipeline gets the rows that it accepts. Where targets are missing, each of them gets a regressor of its
-    own, fitted on the rows that have it.
-    """
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
 
     def __init__(self, estimator: BaseEstimator):
         self.estimator = estimator
 
-    def fit(self, X: Any, y: Any) -> "CompleteRowsRegressor":
+    def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
         head, rest = split_pipeline(self.estimator)
         self.head_ = None if head is None else clone(head)
         inputs = X if head is None else self.head_.fit_transform(X)
@@ -75,7 +73,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     def _predictable(self, inputs: Any) -> NDArray[np.bool_]:
         if self.takes_nan_ or scipy.sparse.issparse(inputs):
             return np.ones(inputs.shape[0], dtype=bool)
-        return _complete(inputs)
+        return ~np.isnan(as_floats(inputs)).any(axis=1)
 
 
 def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstimator]:
@@ -99,29 +97,22 @@ def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
 
 def as_target(estimator: BaseEstimator, y: Any) -> Any:
     """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
-    if y.shape[1] > 1 or not get_tags(_final_estimator(estimator)).target_tags.single_output:
+    if y.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output:
         return y
     return y.squeeze(axis=1)
 
 
 def takes_nan(estimator: BaseEstimator) -> bool:
-    """Whether an estimator accepts NaN in X.
-
-    scikit-learn's tag does not say so for estimators inside a pipeline, a search or another wrapper.
-    """
+    """Whether an estimator accepts NaN in X, also inside a wrapper, of which scikit-learn's tag does not say so."""
     if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
         return True
     if isinstance(estimator, Pipeline):
-        for _, step in estimator.steps:
-            if not takes_nan(step):
-                return False
-            if isinstance(step, _BaseImputer):
-                return True
-        return True
-    if isinstance(estimator, ColumnTransformer):
-        return all(takes_nan(part) for _, part, _ in estimator.transformers)
-    if isinstance(estimator, FeatureUnion):
-        return all(takes_nan(part) for _, part in estimator.transformer_list)
+        steps = [step for _, step in estimator.steps]
+        imputer = next((i for i, step in enumerate(steps) if isinstance(step, _BaseImputer)), len(steps))
+        return all(takes_nan(step) for step in steps[: imputer + 1])
+    if isinstance(estimator, ColumnTransformer | FeatureUnion):
+        parts = estimator.transformers if isinstance(estimator, ColumnTransformer) else estimator.transformer_list
+        return all(takes_nan(part) for _, part, *_ in parts)
     if isinstance(estimator, MultiOutputRegressor | BaseSearchCV):
         return takes_nan(estimator.estimator)
     if isinstance(estimator, TransformedTargetRegressor) and estimator.regressor is not None:
@@ -138,15 +129,4 @@ def learns_from_y(transformer: BaseEstimator | str | None) -> bool:
 
 def takes_missing_targets(estimator: BaseEstimator) -> bool:
     """Whether an estimator accepts NaN in y: one with an FE model leaves out incomplete rows itself, after its lags."""
-    return is_model(getattr(_final_estimator(estimator), "model", None))
-
-
-def _final_estimator(estimator: BaseEstimator) -> BaseEstimator:
-    """The last estimator of a pipeline, or the one inside a search."""
-    if isinstance(estimator, Pipeline):
-        return _final_estimator(estimator.steps[-1][1])
-    return _final_estimator(estimator.estimator) if isinstance(estimator, BaseSearchCV) else estimator
-
-
-def _complete(values: Any) -> NDArray[np.bool_]:
-    return ~np.isnan(as_floats(values)).any(axis=1)
+    return is_model(getattr(last_step(estimator), "model", None))
