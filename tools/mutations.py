@@ -138,6 +138,20 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
+    ("_io/_child.py", "test_matlab.py"): [
+        ("a part too many in a file", "n_parts != expected", "n_parts < expected"),
+        ("unsorted rows in a file", "if scipy.sparse.issparse(value) and not", "if False and not"),
+    ],
+    ("_io/_child.py", "fem/test_triplets.py"): [
+        ("entries on both sides in a file", "(rows < columns).any() and (rows > columns).any()", "False"),
+    ],
+    ("preprocessing/tracking/_assignment.py", "preprocessing/test_mode_tracker.py"): [
+        ("drift of tracked modes", "np.clip(mean, lowest, highest)", "mean"),
+        ("poles of tracked modes contested", "counts[inverse] > 1", "counts[inverse] > 2"),
+    ],
+    ("datasets/_kw51_truth.py", "datasets/test_kw51_campaign.py"): [
+        ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
+    ],
     ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),

@@ -25,20 +25,7 @@ class Poles(NamedTuple):
 
 
 def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
-    """The poles of some records.
-
-    Parameters
-    ----------
-    X : mapping, sequence of mappings, or table of frequencies
-        As `ModeTracker.transform` takes them.
-    sensors : list or None
-        Names of the reference's sensors.
-    n_sensors : int or None
-        Their number; None if the reference has no shapes, so that those of X are not read.
-
-    Returns
-    -------
-    Poles
+    """The poles of records as `ModeTracker.transform` takes them; without ``n_sensors`` shapes are not read.
 
     Raises
     ------
@@ -173,7 +160,7 @@ def _numbers(values: Any, what: str) -> NDArray:
         if array.dtype.kind == "O":
             array = array.astype(complex)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{what} of X is no array of numbers ({error}); expected numbers, real or complex") from error
+        raise ValueError(f"{what} of X is not numeric ({error}); expected numbers, real or complex") from error
     if array.dtype.kind not in "biufc":
         raise ValueError(f"{what} of X is of type {array.dtype}; expected numbers, real or complex")
     return array.astype(np.result_type(array.dtype, np.float32), copy=False)

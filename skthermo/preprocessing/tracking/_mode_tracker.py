@@ -1,5 +1,7 @@
 """Assigns the poles that operational modal analysis finds in each record to reference modes."""
 
+from __future__ import annotations
+
 from datetime import timedelta
 from numbers import Real
 from typing import Any
@@ -10,13 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 
 from skthermo._validation import Interval, _fit_context, check_is_fitted
-from skthermo.preprocessing._assignment import Pairs, close_modes, fitting_pairs
-from skthermo.preprocessing._following import assign_near, assign_while_following
-from skthermo.preprocessing._poles import Poles, read_poles
-from skthermo.preprocessing._reference_modes import ReferenceModes, read_reference, warn_of_alike
 from skthermo.preprocessing._stamps import as_duration, as_stamps
-from skthermo.preprocessing._tracked_modes import TrackedModes, tracked_modes
-from skthermo.preprocessing._tracking_warnings import warn_of_losses, warn_of_unknown_shapes, warn_of_unlike_shapes
+from skthermo.preprocessing.tracking._assignment import assign_near, assign_while_following, fitting_pairs
+from skthermo.preprocessing.tracking._poles import read_poles
+from skthermo.preprocessing.tracking._reference import ReferenceModes, read_reference
+from skthermo.preprocessing.tracking._results import TrackedModes, tracked_modes, warn_of_doubts
 
 
 class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
@@ -132,7 +132,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         self.close = close
 
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: Any = None, y: None = None) -> "ModeTracker":
+    def fit(self, X: Any = None, y: None = None) -> ModeTracker:
         """Read the reference.
 
         Parameters
@@ -160,7 +160,7 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         if isinstance(self.follow, bool):
             raise ValueError(f"follow is {self.follow}; expected a number of records, a duration or None")
         modes = read_reference(self.reference)
-        warn_of_alike(modes, self.max_shift, self.min_mac)
+        modes.warn_of_similar(self.max_shift, self.min_mac)
         self.frequencies_, self.shapes_, self.mode_names_, self.sensors_ = modes
         return self
 
@@ -216,27 +216,18 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         check_is_fitted(self)
         modes = ReferenceModes(self.frequencies_, self.shapes_, self.mode_names_, self.sensors_)
         poles = read_poles(X, self.sensors_, None if self.shapes_ is None else len(self.shapes_))
-        groups = close_modes(self.frequencies_, self.close)
-        pairs = fitting_pairs(poles.frequencies, poles.shapes, modes[:2], self.min_mac, groups)
-        record, frequencies = poles.record[pairs.pole], poles.frequencies[pairs.pole]
+        pairs = fitting_pairs(poles, modes, self.min_mac, self.close)
         followed = np.tile(self.frequencies_, (len(poles.index), 1))
         if self.follow is None:
-            chosen, near = assign_near(pairs, record, frequencies, self.frequencies_, self.max_shift)
+            chosen, near = assign_near(pairs, self.frequencies_, self.max_shift)
         else:
             order, n_records = self._pace(poles.index)
             chosen, near, followed = assign_while_following(
-                pairs,
-                record,
-                frequencies,
-                self.frequencies_,
-                self.max_shift,
-                order=order,
-                n_records=n_records,
-                max_drift=self.max_drift,
+                pairs, self.frequencies_, self.max_shift, order=order, n_records=n_records, max_drift=self.max_drift
             )
         result = tracked_modes(poles, pairs.at(chosen), pairs.at(near), followed, modes)
         if poles.shapes is not None:
-            self._warn(poles, pairs, chosen, followed, result.frequencies.notna().to_numpy())
+            warn_of_doubts(poles, pairs, chosen, followed, result.frequencies.notna().to_numpy(), modes)
         return result
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -273,18 +264,6 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
         if n_records < 1:
             raise ValueError(f"follow is {self.follow!r}, shorter than the records' median step; expected more")
         return order, n_records
-
-    def _warn(self, poles: Poles, pairs: Pairs, chosen: NDArray, followed: NDArray, found: NDArray) -> None:
-        is_free = ~np.isin(np.arange(len(poles.record)), pairs.pole[chosen])
-        left = pairs.at(is_free[pairs.pole])
-        record = poles.record[left.pole]
-        ratio = poles.frequencies[left.pole] / followed[record, left.mode]
-        warn_of_losses(left, record, ratio, found, self.mode_names_)
-        if self.shapes_ is not None:
-            warn_of_unlike_shapes(poles, is_free, followed, found, self.shapes_, self.mode_names_)
-        n_present = (~np.isnan(poles.shapes)).sum(axis=1)
-        is_zero = ~np.nan_to_num(poles.shapes).any(axis=1)
-        warn_of_unknown_shapes(int((is_zero | (n_present < min(2, len(self.shapes_)))).sum()), len(poles.record))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
