@@ -1,0 +1,55 @@
+"""Classes are composed, not chained, and files and folders can be read: no mixin with one user, no crowd, no crumbs."""
+
+import importlib
+import inspect
+import pkgutil
+from collections import Counter
+from pathlib import Path
+
+import skthermo
+
+PACKAGE = Path(skthermo.__file__).parent
+FILES = sorted(PACKAGE.rglob("*.py"))
+MOST_SIDE_BY_SIDE = 14  # modules of a package, beside its __init__.py
+SHORT = 40
+SHORT_FILES = {  # private files of fewer lines, and why they stand alone
+    "_io/_locks.py": "readers of files and the memory of an inverse share it",
+    "_models.py": "estimators of several packages share it",
+    "_optional.py": "packages import it wherever something optional is needed",
+    "_pipelines.py": "estimators of several packages share it",
+}
+
+
+def classes():
+    """All classes that skthermo defines."""
+    modules = [importlib.import_module(m.name) for m in pkgutil.walk_packages(skthermo.__path__, "skthermo.")]
+    found = {member for module in modules for _, member in inspect.getmembers(module, inspect.isclass)}
+    return {thing for thing in found if thing.__module__.startswith("skthermo")}
+
+
+def public():
+    """Names that users import."""
+    rooms = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
+    modules = map(importlib.import_module, rooms)
+    return {getattr(module, name) for module in modules for name in module.__all__ if callable(getattr(module, name))}
+
+
+def test_no_private_class_has_one_child():
+    ours = classes()
+    children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - public())
+    single = {base for base, number in children.items() if number == 1}
+    chains = [
+        f"{thing.__qualname__}({base.__qualname__})" for thing in ours for base in thing.__bases__ if base in single
+    ]
+    assert not sorted(chains), "a private class with one child is to be a part of it, or an object that it holds"
+
+
+def test_a_folder_can_be_overlooked():
+    beside = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES if path.name != "__init__.py")
+    assert not {folder: number for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE}
+
+
+def test_short_files_have_a_reason():
+    private = [path for path in FILES if path.name.startswith("_") and path.name != "__init__.py"]
+    short = {path.relative_to(PACKAGE).as_posix() for path in private if len(path.read_text().splitlines()) < SHORT}
+    assert short == set(SHORT_FILES), "a short file goes home to its only user, or has its reason above"
