@@ -34,6 +34,10 @@ def public():
     return {getattr(module, name) for module in modules for name in module.__all__ if callable(getattr(module, name))}
 
 
+def assert_none(wrong, instead):
+    assert not wrong, f"{instead}\n" + "\n".join(sorted(wrong))
+
+
 def test_no_private_class_has_one_child():
     ours = classes()
     children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - public())
@@ -41,15 +45,17 @@ def test_no_private_class_has_one_child():
     chains = [
         f"{thing.__qualname__}({base.__qualname__})" for thing in ours for base in thing.__bases__ if base in single
     ]
-    assert not sorted(chains), "a private class with one child is to be a part of it, or an object that it holds"
+    assert_none(chains, "expected one class, or an object that it holds:")
 
 
 def test_a_folder_can_be_overlooked():
     beside = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES if path.name != "__init__.py")
-    assert not {folder: number for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE}
+    full = [f"{folder} has {number} files" for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE]
+    assert_none(full, f"expected {MOST_SIDE_BY_SIDE} beside __init__.py, or a package within:")
 
 
 def test_short_files_have_a_reason():
     private = [path for path in FILES if path.name.startswith("_") and path.name != "__init__.py"]
     short = {path.relative_to(PACKAGE).as_posix() for path in private if len(path.read_text().splitlines()) < SHORT}
-    assert short == set(SHORT_FILES), "a short file goes home to its only user, or has its reason above"
+    assert_none(short - set(SHORT_FILES), f"expected {SHORT} lines, a place beside the only user, or a reason above:")
+    assert_none(set(SHORT_FILES) - short, "not short:")
