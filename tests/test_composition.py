@@ -3,12 +3,14 @@
 import importlib
 import inspect
 import pkgutil
+import re
 from collections import Counter
 from pathlib import Path
 
 import skthermo
 
 PACKAGE = Path(skthermo.__file__).parent
+HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MOST_SIDE_BY_SIDE = 14  # modules of a package, beside its __init__.py
 SHORT = 40
@@ -59,3 +61,9 @@ def test_short_files_have_a_reason():
     short = {path.relative_to(PACKAGE).as_posix() for path in private if len(path.read_text().splitlines()) < SHORT}
     assert_none(short - set(SHORT_FILES), f"expected {SHORT} lines, a place beside the only user, or a reason above:")
     assert_none(set(SHORT_FILES) - short, "not short:")
+
+
+def test_the_guide_for_contributors_lists_what_all_packages_share():
+    section = HOUSE.read_text().partition("What every package may use\n")[2].partition("\nDependencies\n")[0]
+    listed = set(re.findall(r"\* - ``(\w+?)(?:\.py)?``", section))
+    assert listed == {path.stem for path in PACKAGE.glob("_*") if path.name not in ("__init__.py", "__pycache__")}

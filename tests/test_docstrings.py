@@ -55,7 +55,7 @@ def public_callables():
 CALLABLES = list(public_callables())
 OBJECTS = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
 PROTOCOLS = {name for name, thing in OBJECTS if getattr(thing, "_is_protocol", False)}
-ELEMENT_METHODS = ("dofs", "ends", "stiffness", "mass")
+ELEMENT_METHODS = ("properties", "dofs", "ends", "stiffness", "mass")
 LONGEST_SIGNATURE = 700  # characters that help() prints
 
 
