@@ -12,12 +12,8 @@ from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
 MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
-
-DEFAULT_TOLERANCE = 1e-5
-
-MARGIN, LEAST_MARGIN = 0.25, 0.05
-"""Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
-
+DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
+MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their range, and of their values
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
