@@ -83,12 +83,6 @@ def check_temperatures(T: ArrayLike) -> None:
             )
 
 
-def look_like_radians(ratios: ArrayLike, within: float) -> bool:
-    """Whether all known ratios of measured to expected frequencies are about 2 pi: rad/s in place of Hz."""
-    ratios = as_floats(ratios)
-    return bool((np.abs(ratios[~np.isnan(ratios)] / (2 * np.pi) - 1) < within).all())
-
-
 def warn_of_markers(X: ArrayLike) -> None:
     """Warn of numbers that probably stand for a missing value, such as -999, in columns of any quantity."""
     values = as_floats(X)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._frames import column_names, look_like_radians
+from skthermo._frames import column_names
 from skthermo._pipelines import last_step
 from skthermo._saved_frames import SavesFrames
 from skthermo.fem import FEModel, linearise, match_modes
@@ -252,7 +253,7 @@ def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
             )
             return
     if len(far):
-        units = " (rad/s instead of Hz?)" if look_like_radians(ratios, LARGE_OFFSET / 100) else ""
+        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
         yield (
             "offset of modes",
