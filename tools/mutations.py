@@ -113,7 +113,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
-        ("relative derivatives of shapes", "slopes * theta[:, np.newaxis, np.newaxis]", "slopes"),
+        (
+            "relative derivatives of shapes",
+            "slopes = slopes * theta[rows][:, np.newaxis, np.newaxis]",
+            "slopes = slopes",
+        ),
     ],
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
         ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
