@@ -113,7 +113,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
-        ("relative derivatives of shapes", "slopes * theta[:, np.newaxis, np.newaxis]", "slopes"),
+        (
+            "relative derivatives of shapes",
+            "slopes = slopes * theta[rows][:, np.newaxis, np.newaxis]",
+            "slopes = slopes",
+        ),
     ],
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
         ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
@@ -122,7 +126,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
         ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
     ],
-    ("surrogate/chain/_residuals.py", "surrogate/test_uncertainty.py"): [
+    ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
@@ -131,14 +135,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
+        ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
+        ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_weather.py", "surrogate/test_uncertainty.py"): [
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
         ("correlation time", "time += 2 * correlation", "time += correlation"),
-    ],
-    ("surrogate/chain/_training_records.py", "surrogate/test_uncertainty.py"): [
-        ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
-        ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_io/_child.py", "test_matlab.py"): [
         ("a part too many in a file", "n_parts != expected", "n_parts < expected"),

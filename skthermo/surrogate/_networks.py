@@ -18,11 +18,7 @@ TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 
 
 def default_network() -> MLPRegressor:
-    """A small network for noisy data, with an L2 penalty that keeps it from fitting the noise.
-
-    Trained by Adam, because scikit-learn's L-BFGS averages the loss over outputs but sums the gradient: with several
-    outputs its line search fails.
-    """
+    """A small network for noisy data; Adam, because the line search of L-BFGS fails with several outputs."""
     return MLPRegressor(
         hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
     )

@@ -12,12 +12,8 @@ from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
 MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
-
-DEFAULT_TOLERANCE = 1e-5
-
-MARGIN, LEAST_MARGIN = 0.25, 0.05
-"""Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
-
+DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
+MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their range, and of their values
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
@@ -91,22 +87,31 @@ class Simulator:
         return frequencies
 
     def linearise(
-        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None
+        self,
+        theta: Array,
+        n_jobs: int | None = None,
+        dofs: NDArray[np.intp] | None = None,
+        *,
+        relative: bool = False,
     ) -> tuple[Array, ...]:
-        """Frequencies, (n_samples, n_modes), and d ln f / d ln theta, (n_samples, n_modes, n_parameters), quietly.
+        """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters), without warnings.
 
-        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d ln theta.
+        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta. If ``relative``,
+        derivatives are d ln f / d ln theta and d phi / d ln theta.
         """
         outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
         results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if rows.any():
                 quiet = model.quiet() if hasattr(model, "quiet") else model
-                solved: Any = (
-                    linearise(quiet, theta[rows], relative=True, n_jobs=n_jobs)
-                    if dofs is None
-                    else _relative(theta[rows], *linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs))
-                )
+                if dofs is None:
+                    solved: tuple[Array, ...] = linearise(quiet, theta[rows], relative=relative, n_jobs=n_jobs)
+                else:
+                    f, jacobian, shapes, slopes = linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs)
+                    if relative:
+                        jacobian = jacobian * theta[rows][:, np.newaxis] / f[:, :, np.newaxis]
+                        slopes = slopes * theta[rows][:, np.newaxis, np.newaxis]
+                    solved = f, jacobian, shapes, slopes
                 results = results or [np.full((len(theta), *array.shape[1:]), np.nan) for array in solved]
                 for result, array in zip(results, solved, strict=True):
                     result[rows] = array
@@ -123,9 +128,3 @@ class Simulator:
                 "DataInformedFEM(..., reduce=True) gives the same frequencies to 1e-5 in a small part of the time",
                 "full model",
             )
-
-
-def _relative(theta: Array, frequencies: Array, jacobian: Array, shapes: Array, slopes: Array) -> tuple[Array, ...]:
-    """Frequencies and shapes with their derivatives by ln theta, of the frequencies those of ln f."""
-    relative = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
-    return frequencies, relative, shapes, slopes * theta[:, np.newaxis, np.newaxis]

@@ -17,7 +17,7 @@ from skthermo._weather import correlation_time, order_statistic
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
-from skthermo.surrogate.chain._residuals import WeatherResiduals
+from skthermo.surrogate.chain._records import WeatherResiduals
 from tests.surrogate.chains import F, T, inverse
 from tests.surrogate.chains import chain as any_chain
 

@@ -36,8 +36,7 @@ from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, read_records, surrogates_in
-from skthermo.surrogate.chain._residuals import WeatherResiduals
-from skthermo.surrogate.chain._training_records import TrainingRecords
+from skthermo.surrogate.chain._records import TrainingRecords, WeatherResiduals
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
@@ -334,12 +333,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
         Notes
         -----
         Split-conformal intervals: the training records are divided into five periods of time, and each is predicted by
-        a mapper fitted on the others. The width is a multiple of the spread of these residuals in similar weather, so
-        that it grows, for example, in frost; the multiple is the order statistic that the periods themselves needed.
-        If new records are exchangeable with the training records, the interval holds a mode with about the probability
-        asked. Records of one structure are not: they are serially correlated, so that the share of a short period that
-        is held varies much more than that of independent records, and weather beyond the training range has no
-        residuals to learn from: there the interval is widened by the distance (see `applicability`).
+        a mapper fitted on the others. The width is a multiple of the spread of these residuals in similar weather; the
+        multiple is the order statistic that the periods themselves needed. If new records are exchangeable with the
+        training records, the interval holds a mode with about the probability asked. Records of one structure are
+        serially correlated, so that the share of a short period that is held varies more. Beyond the training range
+        there are no residuals to learn from, and the interval is widened by the distance (see `applicability`).
 
         References
         ----------
@@ -489,16 +487,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
         shape = (np.shape(X)[0], len(self.mode_names_))
         return check_noise(noise, shape[1]) * random.standard_normal(shape)
 
-    def simulate_modes(
-        self,
-        X: ArrayLike,
-        modes: Sequence[int],
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-    ) -> Array:
+    def simulate_modes(self, X: ArrayLike, modes: Sequence[int], **changes: Any) -> Array:
         """Frequencies of other modes than the measured ones, without noise and as the model gives them.
 
         Parameters
@@ -507,14 +496,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
             Temperatures in degrees Celsius.
         modes : sequence of int
             Ranks of modes of the healthy nominal model, the lowest being 0.
-        damage : mapping of str to float or array-like of shape (n_samples,), optional
-            As in `simulate`.
-        parameters : mapping of str to float, optional
-            As in `simulate`.
-        stiffness : matrix of shape (n_dof, n_dof), optional
-            As in `simulate`.
-        mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
-            As in `simulate`.
+        **changes
+            ``damage``, ``parameters``, ``stiffness`` and ``mass``, as in `simulate`.
 
         Returns
         -------
@@ -527,7 +510,6 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
             As in `simulate`; if the model has no such modes.
         """
         check_is_fitted(self)
-        changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
         return self._simulate(X, modes, **changes)
 
     @overload
@@ -535,11 +517,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
     @overload
     def expected_residuals(self, X: pd.DataFrame, return_number: Literal[True]) -> tuple[pd.DataFrame, Array]: ...
     @overload
-    def expected_residuals(self, X: ArrayLike, return_number: Literal[False] = False) -> Array: ...
-    @overload
-    def expected_residuals(self, X: ArrayLike, return_number: Literal[True]) -> tuple[Array, Array]: ...
-    @overload
-    def expected_residuals(self, X: ArrayLike, return_number: bool) -> Any: ...
+    def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any: ...
     def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
         """Mean relative residual of the training records in weather like that of each row.
 

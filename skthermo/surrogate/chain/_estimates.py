@@ -65,9 +65,8 @@ class Estimates:
     def targets(self, inverse: Any, mapper: Any) -> Array:
         """What M2 learns: theta or, in coordinates of frequencies, theta without the shrinkage of the inverse's prior.
 
-        One more Gauss-Newton step, hardly damped, with the derivatives that define these coordinates takes the
-        shrinkage out. Parameters that hardly move the frequencies may then scatter widely, but not their effects, which
-        are all that the mapper sees. Combinations of parameters that do not move them at all stay where they are.
+        One more Gauss-Newton step, hardly damped, takes the shrinkage out. Parameters that hardly move the frequencies
+        may then scatter widely, but not their effects, which are all that the mapper sees.
         """
         last = refining_step(inverse)
         if last is None or self.residuals is None:
@@ -95,9 +94,8 @@ def refining_step(inverse: Any) -> InverseSurrogate | None:
 def learn_in_frequencies(mapper: Any, inverse: InverseSurrogate, n_rows: int) -> FrequencyCoordinates | None:
     """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies, and return these.
 
-    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, and the
-    prior of the parameters does the damping. None if there is no such mapper, if it is fitted to one parameter at a
-    time, if it has coordinates already, or if the nominal state has no solution.
+    The derivatives are those at the nominal state, in standard deviations of the frequencies; the prior does the
+    damping. None if there is no such mapper, if it is fitted to one parameter at a time, or has coordinates already.
     """
     mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
     is_free = all(part.coordinates is None for part in mappers)

@@ -18,7 +18,7 @@ from skthermo._saved_frames import SavesFrames
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.surrogate.chain._estimates import Estimates
-from skthermo.surrogate.chain._training_records import TrainingRecords
+from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
@@ -237,7 +237,7 @@ def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
         )
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
-    if (ratios > 0).all() and len(ratios) > 1:
+    if len(ratios) > 1:
         table = match_modes(model, as_floats(F))
         unchanged = np.arange(len(offsets))
         near = offsets.abs().to_numpy() < SMALL_OFFSET

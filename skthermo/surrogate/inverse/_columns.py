@@ -81,9 +81,8 @@ class InverseColumns:
 class ShapeScores:
     """A few positive scores in place of many components: linear estimates of the parameters.
 
-    Ridge regression of ln theta on ln f and the components learns from noisy simulations which combinations of
-    components tell about the parameters. A regressor then has n_modes + n_parameters inputs, however many sensors there
-    are.
+    Ridge regression of ln theta on ln f and the components learns them from noisy simulations. A regressor then has
+    n_modes + n_parameters inputs, however many sensors there are.
     """
 
     def __init__(self, n_modes: int, inputs: Array, theta: Array):

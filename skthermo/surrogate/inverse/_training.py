@@ -1,25 +1,27 @@
 """Simulations that the inverse surrogate learns from."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from pickle import PicklingError
 from typing import Any
 
+import joblib
 import numpy as np
+from joblib import Memory
 from sklearn.utils import Bunch
+from sklearn.utils.validation import check_memory
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array
+from skthermo._io import lock
 from skthermo._warnings import warn_user
+from skthermo.fem import sample, share_reordered
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
-from skthermo.surrogate.inverse._memory import ORDER_CHECKS, remembered_simulations
 
-MANY_REORDERED = 0.1
-"""Share of simulations with modes in another order above which a warning is given. A share of 5 % does not harm the
-truss's results; 29 % doubles the error of Z24."""
-
-MIDDLE = (0.5, 99.5)
-"""Percentiles of the records' parameters that a narrower box is made for: a few wrong records do not widen it."""
-
+ORDER_CHECKS = 256  # number of samples whose modes are looked at for another order
+MANY_REORDERED = 0.1  # share of them that gives a warning: 5 % does not harm the truss, 29 % doubles the error of Z24
+MIDDLE = (0.5, 99.5)  # percentiles of records that a narrower box is made for: a few wrong ones do not widen it
 LEAST_HALF_WIDTH = 0.02  # smallest half-width of a narrower box, as a share of its middle
 
 
@@ -87,3 +89,36 @@ def _draw(
     seed = fixed_seed if is_remembered else random.randint(np.iinfo(np.int32).max)
     settings = (box.bounds, inverse.n_samples, tol, inverse.dofs, inverse.n_jobs, seed)
     return remembered_simulations(inverse.memory, model, *settings)
+
+
+def remembered_simulations(memory: str | Memory | None, model: Any, *settings: Any) -> tuple[Bunch, float, Any]:
+    """`simulations`, read from the memory if stored there; of several processes only one makes them."""
+    try:
+        memory = check_memory(memory)
+    except OSError as error:
+        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
+    if memory.location is None:
+        return simulations("", model, *settings)
+    try:
+        identity = joblib.hash(model, coerce_mmap=True)
+    except PicklingError as error:
+        raise ValueError(
+            f"memory cannot recognise {model!r}; expected one that can be pickled, with functions and classes from a "
+            "module that can be imported (no lambda, nothing from a script, a notebook or a function), or memory=None"
+        ) from error
+    folder = Path(memory.location)
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / f"{identity}.lock", "w") as file:
+        lock(file)
+        return memory.cache(simulations, ignore=["model", "n_jobs"])(identity, model, *settings)
+
+
+def simulations(
+    identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, dofs: Any, n_jobs: Any, seed: int
+) -> tuple[Bunch, float, Any]:
+    """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None."""
+    reduced = None if tol is None else model.reduced(bounds, tol=tol, random_state=seed)
+    model = reduced or model
+    drawn = sample(model, bounds, n_samples, dofs=dofs, n_jobs=n_jobs, random_state=seed)
+    sorts = not getattr(model, "track", True) and hasattr(model, "modes")
+    return drawn, share_reordered(model, drawn.theta[:ORDER_CHECKS]) if sorts else 0.0, reduced

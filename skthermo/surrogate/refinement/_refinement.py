@@ -92,7 +92,7 @@ class Refinement:
         return result
 
     def _objective(self, inputs: Array, log_measured: Array, noise: Array) -> Objective:
-        linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs)
+        linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs, relative=True)
         if self.shapes is None:
             return Objective(linearise, log_measured, noise, self.prior)
         measured = MeasuredShapes(self.shapes.unit_shapes(inputs))
@@ -141,7 +141,7 @@ class Refinement:
         weak as suits the mean of all records.
         """
         model, nominal = Simulator(self.simulator.model), np.ones((1, theta.shape[1]))
-        _, sensitivity, shapes, slopes = model.linearise(nominal, dofs=self.shapes.dofs)
+        _, sensitivity, shapes, slopes = model.linearise(nominal, dofs=self.shapes.dofs, relative=True)
         units = MeasuredShapes(shapes.swapaxes(1, 2) / np.linalg.norm(shapes, axis=1)[:, :, np.newaxis])
         rows = np.hstack([sensitivity, units.misfit(shapes, slopes)[1]])
         weak = replace(self.prior, width=self.prior.width * np.sqrt(n_rows))

@@ -1,23 +1,29 @@
-"""Out-of-fold residuals of a chain, by weather: their spread, intervals, and realistic noise."""
+"""The records that a chain was fitted to, and its residuals by weather: their spread, intervals, realistic noise."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import clone
+from sklearn.model_selection import KFold
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._pipelines import last_step
+from skthermo._regressors import weights_for
+from skthermo._saved_frames import SavesFrames
+from skthermo._times import row_times
 from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
 
+N_FOLDS = 5
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
 OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
-SIMILAR = 0.1
-"""Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
-records goes on while it lasts."""
+SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
 
 
 @dataclass(frozen=True)
@@ -66,9 +72,8 @@ class WeatherResiduals:
     def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
         """Residuals of each of some periods less those that the other periods have in similar weather.
 
-        With the effective sample size, (n_modes,), of the mean of what is subtracted. One mapper gives both, as for new
-        records, so that its own error in such weather cancels; but where a mapper follows its own records more closely
-        than others, the residuals are those out of fold.
+        With the effective sample size, (n_modes,), of the mean of what is subtracted. The mapper of all records gives
+        both, so that its own error in such weather cancels, unless it follows its own records too closely.
         """
         residuals = self.values if self._is_overfitted else self.own
         parts = []
@@ -183,3 +188,46 @@ class WeatherResiduals:
         filled = np.where(np.isnan(self.values), 0.0, self.values)
         means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)
         return max(1.0, 2 * max(correlation_time(column) for column in (self.values - means).T) - 1)
+
+
+@dataclass
+class TrainingRecords(SavesFrames):
+    """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
+
+    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, and ``weights`` those of the
+    rows, or None. ``residuals`` are out of fold, and None until they have been computed.
+    """
+
+    temperatures: Any
+    frequencies: Any
+    inputs: Array
+    targets: Array
+    weights: Array | None
+    residuals: WeatherResiduals | None = None
+
+    @property
+    def trained(self) -> NDArray[np.bool_]:
+        """Which rows trained M2."""
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1))
+
+    def out_of_fold(self, mapper: Any, frequencies_of: Callable[[Array], Array]) -> WeatherResiduals:
+        """Relative residuals of the records, each predicted by a mapper fitted on other periods of time.
+
+        Given are the fitted mapper, and the function from parameters to frequencies as they would be measured.
+        """
+        order = np.argsort(row_times(self.temperatures), kind="stable")
+        inputs, theta, measured = self.inputs[order], self.targets[order], as_floats(self.frequencies)[order]
+        rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1))
+        usable = ~np.isnan(theta[rows]).any(axis=1)
+        if usable.sum() < 2 * N_FOLDS:
+            raise ValueError(f"{usable.sum()} records have parameters; expected at least {2 * N_FOLDS} for residuals")
+        learner, predicted, folds = last_step(mapper), np.full_like(theta[rows], np.nan), np.empty(len(rows), dtype=int)
+        for fold, (train, test) in enumerate(KFold(N_FOLDS).split(rows)):
+            train = train[usable[train]]
+            weights = None if self.weights is None else self.weights[order][rows][train]
+            fitted = clone(learner).fit(inputs[rows][train], theta[rows][train], **weights_for(learner, weights))
+            predicted[test], folds[test] = as_columns(fitted.predict(inputs[rows][test])), fold
+        own = as_columns(mapper.predict(self.temperatures))[order][rows]
+        values, own = (measured[rows] / frequencies_of(theta) - 1 for theta in (predicted, own))
+        known = ~np.isnan(values).all(axis=1)
+        return WeatherResiduals(inputs[rows][known], values[known], own[known], folds[known])
