@@ -55,7 +55,7 @@ def public_callables():
 
 CALLABLES = list(public_callables())
 PROTOCOLS = {name for name, thing in public_objects() if getattr(thing, "_is_protocol", False)}
-ELEMENT_METHODS = ("dofs", "ends", "stiffness", "mass")
+ELEMENT_METHODS = ("properties", "dofs", "ends", "stiffness", "mass")
 
 
 def is_contract_of_an_element(name):

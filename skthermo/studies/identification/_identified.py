@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array
 from skthermo._formatting import listed
 from skthermo.studies.identification._bounded_fit import HIGHEST_SEVERITY
@@ -123,7 +124,7 @@ class IdentifiedDamage:
         if is_damaged or not self.is_unexplained or np.isnan(rest).all():
             return ""
         ratios = 1 + known["measured"].to_numpy(dtype=float)
-        if (np.abs(ratios / (2 * np.pi) - 1) < NEAR_2_PI).all():
+        if seem_rad_per_s(ratios, NEAR_2_PI):
             return "the measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz"
         n_higher = (known["measured"] > CLEARLY_HIGHER * known["standard_error"]).sum()
         worst = int(np.nanargmax(np.abs(rest)))
