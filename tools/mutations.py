@@ -1,19 +1,21 @@
 """Whether the tests notice mistakes in the numerics of modal analysis, updating, surrogates and detection.
 
-    OMP_NUM_THREADS=1 python tools/mutations.py [WORD ...]
+    OMP_NUM_THREADS=1 python tools/mutations.py [--jobs 2] [WORD ...]
 
 Each mutation is a mistake that somebody could make: a sign, a factor, a dropped term, another constant. It is written
 into a temporary copy of the package, where the tests named beside it must fail. Prints "killed" or "SURVIVED" for
-each. The exit code is 1 if one survived: a test is then missing.
+each, and those that survived again at the end. The exit code is 1 if one survived: a test is then missing.
 """
 
 import argparse
 import os
+import queue
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -238,28 +240,56 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("words", nargs="*", metavar="WORD", help="only mutations with one of these in what they break")
-    words = parser.parse_args().words
+    parser.add_argument("--jobs", type=int, default=2, help="how many run at a time")
+    options = parser.parse_args()
     chosen = [
         (*where, *mutation)
         for where, mutations in MUTATIONS.items()
         for mutation in mutations
-        if not words or any(word in mutation[0] for word in words)
+        if not options.words or any(word in mutation[0] for word in options.words)
     ]
-    with tempfile.TemporaryDirectory() as folder:
-        for name in COPIED:
-            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-            copy(ROOT / name, Path(folder) / name)
-        survived = sum([survives(Path(folder), *mutation) for mutation in chosen])
-    print(f"{len(chosen) - survived} of {len(chosen)} killed")
-    return 1 if survived or not chosen else 0
+    unwritable = [mutation for mutation in chosen if not is_written_once(*mutation)]
+    if unwritable or not chosen:
+        print("no mutation has these words" if not chosen else "expected once in its file:", *unwritable, sep="\n")
+        return 2
+    copies = queue.SimpleQueue()  # of the package, one for each job
+
+    def outcome(mutation):
+        copy = copies.get()
+        try:
+            return survives(copy, *mutation)
+        finally:
+            copies.put(copy)
+
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
+        for job in range(options.jobs):
+            copies.put(copied_to(Path(folder) / str(job)))
+        survived = [mutation for mutation, alive in zip(chosen, pool.map(outcome, chosen), strict=True) if alive]
+    print(f"{len(chosen) - len(survived)} of {len(chosen)} killed")
+    for file, tests, breaks, *_ in survived:
+        print(f"SURVIVED: {breaks} ({file}; tests/{tests})")
+    return 1 if survived else 0
+
+
+def is_written_once(file, tests, breaks, original, mutated):
+    """Whether a mutation can be made: its file and tests exist, and its text stands in the file once."""
+    path = ROOT / "skthermo" / file
+    return path.exists() and path.read_text().count(original) == 1 and (ROOT / "tests" / tests).exists()
+
+
+def copied_to(folder):
+    """A folder with a copy of all that tests need."""
+    folder.mkdir()
+    for name in COPIED:
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, folder / name)
+    return folder
 
 
 def survives(folder, file, tests, breaks, original, mutated):
     """Whether the tests pass in spite of a mutation."""
     path = folder / "skthermo" / file
     source = path.read_text()
-    if source.count(original) != 1:
-        raise SystemExit(f"{file} has {original!r} {source.count(original)} times; expected it once")
     path.write_text(source.replace(original, mutated))
     start = time.perf_counter()
     command = [sys.executable, "-B", "-m", "pytest", "-n0", "-q", "-x", f"tests/{tests}"]
@@ -267,7 +297,7 @@ def survives(folder, file, tests, breaks, original, mutated):
     run = subprocess.run(command, cwd=folder, env=paths, capture_output=True, text=True)
     path.write_text(source)
     if run.returncode not in (0, 1):
-        raise SystemExit(f"{tests} did not run:\n{run.stdout}{run.stderr}")
+        raise RuntimeError(f"{tests} did not run:\n{run.stdout}{run.stderr}")
     verdict = "killed" if run.returncode else "SURVIVED"
     print(f"{verdict:9} {time.perf_counter() - start:4.0f} s  {breaks}", flush=True)
     return not run.returncode

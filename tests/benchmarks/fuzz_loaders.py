@@ -2,11 +2,11 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/fuzz_loaders.py
 
-Bytes are flipped, cut off, inserted or exchanged, and numbers that state lengths are changed; of compressed files also
-the content, which is then compressed again with right checksums. Files are read by `load_affine`, `load_z24` or `load_kw51`,
-250 of them in one process, which itself starts a child for each. A file passes if it is read, or refused by a ValueError
-or OSError that names it, and that process takes at most 256 MB; the child's memory is limited. The exit code is 1 if one
-does not. A thousand files take some 15 minutes.
+Bytes are flipped, cut off, inserted or exchanged, and numbers that state lengths are changed; of compressed files
+also the content, which is then compressed again with right checksums. Files are read by `load_affine`, `load_z24` or
+`load_kw51`, 250 of them in one process, which itself starts a child for each. A file passes if it is read, or refused
+by a ValueError or OSError that names it, and that process takes at most 256 MB; the child's memory is limited. The
+exit code is 1 if one does not. A thousand files take some 15 minutes.
 """
 
 import argparse
