@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import platform
 from collections.abc import Iterator
@@ -102,7 +101,7 @@ def owner_report(
     introduction = paragraphs(f"The alarm system was tested by simulation, in {n_states} of the structure.")
     ending = paragraphs(f"Written by skthermo on {date.today():%Y-%m-%d}.")
     sections = _sections(study, identified, structure)
-    _write(file, page(TITLE if title is None else title, introduction, sections, ending))
+    write_when_complete(file, page(TITLE if title is None else title, introduction, sections, ending))
     return file
 
 
@@ -153,12 +152,11 @@ def _versions() -> list[list[str]]:
     return [["Python", platform.python_version()], *versions]
 
 
-def _write(file: Path, text: str) -> None:
+def write_when_complete(file: Path, text: str) -> None:
     """Write a file beside it, and put it in its place when it is complete."""
     unfinished = file.with_name(f".{file.name}.{uuid4().hex}")
     try:
         unfinished.write_text(text, encoding="utf-8")
         os.replace(unfinished, file)
     finally:
-        with contextlib.suppress(FileNotFoundError):
-            unfinished.unlink()
+        unfinished.unlink(missing_ok=True)

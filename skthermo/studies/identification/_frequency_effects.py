@@ -62,21 +62,22 @@ class FrequencyEffects:
         frequencies, slopes = (self._linearised if exact else self._differenced)(severities)
         measured, elasticity = self._measured(frequencies)
         change = self._mean(np.log(measured) - self.healthy)
-        relative = (elasticity / frequencies)[:, :, np.newaxis] * slopes
+        relative = elasticity[:, :, np.newaxis] * slopes
         return change, np.stack([self._mean(column) for column in np.moveaxis(relative, 2, 0)], axis=1)
 
     def _linearised(self, severities: Array) -> tuple[Array, Array]:
-        """Frequencies and their exact derivatives by the severities."""
+        """Frequencies, and exact derivatives of their logarithms by the severities."""
         level = next(level for level in LEVELS if severities.max() <= level)
         if level not in self.simulators:
             self.simulators[level] = self.fem.simulator_.with_damage_parameters(self.groups, 0.0, level)
         simulator = self.simulators[level]
         theta = np.hstack([self.theta, np.tile(1 - severities, (len(self.theta), 1))])
         frequencies, jacobian = simulator.linearise(theta, self.fem.n_jobs)
-        return frequencies, -jacobian[:, :, -len(self.groups) :]
+        return frequencies, -jacobian[:, :, -len(self.groups) :] / (1 - severities)
 
     def _differenced(self, severities: Array) -> tuple[Array, Array]:
-        return self._damaged(severities), central_differences(self._damaged, severities)
+        frequencies = self._damaged(severities)
+        return frequencies, central_differences(self._damaged, severities) / frequencies[:, :, np.newaxis]
 
     def _damaged(self, severities: Array) -> Array:
         damage = dict(zip(self.groups, severities.tolist(), strict=True))
