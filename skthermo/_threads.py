@@ -1,11 +1,10 @@
 """Limits BLAS to one thread for small matrices and small networks, which more threads would slow down."""
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from threading import Lock, get_ident
+from threading import Lock
 from typing import Any, TypeVar
 
 import threadpoolctl  # installed with scikit-learn, which requires it
@@ -14,7 +13,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _lock = Lock()
-_inside: list[int] = []  # for each open context, the thread that opened it
+_n_inside = 0  # open contexts
 _limits: Any = None
 
 
@@ -37,43 +36,23 @@ def _in_control() -> Iterator[None]:
 def single_blas_thread() -> Iterator[None]:
     """Limit every BLAS library of this process to one thread.
 
-    The limit is global to the process. Contexts that overlap in several Python threads are therefore
-    counted: the first to enter sets the limit, and the last to leave lifts it. A process forked in the meantime keeps
-    only the contexts of the thread that forked it.
+    The limit is global to the process. Contexts that overlap in several Python threads are therefore counted: the first
+    to enter sets the limit, and the last to leave lifts it.
     """
-    global _limits
-    thread = get_ident()
+    global _n_inside, _limits
     with _lock:
-        if not _inside:
+        if not _n_inside:
             with _in_control():
                 _limits = _controller().limit(limits=1)
-        _inside.append(thread)
+        _n_inside += 1
     try:
         yield
     finally:
         with _lock:
-            if thread in _inside:
-                _inside.remove(thread)
-            _lift_limit_after_last()
-
-
-def _lift_limit_after_last() -> None:
-    global _limits
-    if not _inside and _limits is not None:
-        with _in_control():
-            _limits.restore_original_limits()
-        _limits = None
-
-
-def _forget_other_threads() -> None:
-    """Called in a forked process, in which only the thread that forked continues."""
-    _inside[:] = [thread for thread in _inside if thread == get_ident()]
-    _lift_limit_after_last()
-    _lock.release()
-
-
-if hasattr(os, "register_at_fork"):  # not on Windows
-    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_forget_other_threads)
+            _n_inside -= 1
+            if not _n_inside:
+                with _in_control():
+                    _limits.restore_original_limits()
 
 
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
@@ -82,9 +61,11 @@ def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item
     Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) apply to these Python threads too. Closing
     the iterator waits for the items that are running and skips the rest.
     """
-    n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
+    n_threads = 1
+    if len(items) > 1:
+        n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
     with single_blas_thread():
-        if min(n_threads, len(items)) < 2:
+        if n_threads < 2:
             yield from map(function, items)
         else:
             with ThreadPoolExecutor(n_threads) as pool:

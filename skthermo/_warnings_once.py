@@ -11,18 +11,10 @@ from skthermo._warnings import warn_user
 
 @contextmanager
 def warnings_once(where: str = "") -> Iterator[list[str]]:
-    """Give warnings that differ only in their numbers once, when the context ends.
+    """Give warnings that differ only in their numbers once, when the context ends, and yield a list of their texts.
 
-    Parameters
-    ----------
-    where : str, default=""
-        Said of the repetitions with their number, such as "in the simulations of this study"; by default they are not
-        mentioned.
-
-    Yields
-    ------
-    list of str
-        Their texts, which it holds from then on.
+    ``where`` is said of the repetitions with their number, such as "in the simulations of this study"; by default they
+    are not mentioned.
     """
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:

@@ -4,11 +4,11 @@ import os
 import subprocess
 import sys
 
-PROGRAM = '''
+PROGRAM = """
 from concurrent.futures import ThreadPoolExecutor
-import os
-from threading import Barrier, Event, Thread
+from threading import Barrier
 
+import joblib
 import numpy as np
 import scipy.linalg  # brings a BLAS of its own
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -24,32 +24,6 @@ def limited(barrier=None):
             barrier.wait()
         return blas_threads()
 
-def forked_beside_a_limit():
-    """Threads of BLAS in a process that is forked while another thread holds them to one."""
-    reader, writer = os.pipe()
-    entered, left = Event(), Event()
-
-    def hold():
-        with single_blas_thread():
-            entered.set()
-            left.wait()
-
-    thread = Thread(target=hold)
-    thread.start()
-    entered.wait()
-    child = os.fork()
-    if not child:
-        counts = blas_threads()
-        assert limited() == {1}
-        assert blas_threads() == counts
-        np.ones((500, 500)) @ np.ones((500, 500))
-        os.write(writer, bytes(counts))
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    left.set()
-    thread.join()
-    return set(os.read(reader, 8))
-
 if blas_threads() == {1}:  # all that one core gets unasked
     threadpool_limits(2, "blas")
 assert blas_threads() == {2}
@@ -59,15 +33,14 @@ for _ in range(3):
     with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(limited, [Barrier(2)] * 2)) == [{1}, {1}]
     assert blas_threads() == {2}
+threads = joblib.Parallel(2, backend="threading")
+assert threads(joblib.delayed(limited)(barrier) for barrier in [Barrier(2)] * 2) == [{1}, {1}]
+assert blas_threads() == {2}
 assert list(map_on_blas_threads(lambda _: blas_threads(), range(4))) == [{1}] * 4
 with threadpool_limits(2, "blas"), ThreadPoolExecutor(1) as pool:
     assert pool.submit(limited).result() == {1}
 assert blas_threads() == {2}
-if hasattr(os, "fork"):
-    assert forked_beside_a_limit() == {2}
-    with single_blas_thread():
-        assert forked_beside_a_limit() == {1}
-'''
+"""
 
 
 def test_limits_hold_in_every_thread_and_are_lifted_again():

@@ -1,9 +1,9 @@
 """Damage detection from frequencies."""
 
-from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._fused import FusedDetector
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
-from skthermo.detection._windowed_alarm import WindowedAlarm
+from skthermo.detection.compensation import TemperatureCompensator
+from skthermo.detection.windows import WindowedAlarm
 
 __all__ = ["FusedDetector", "MahalanobisDetector", "OutlierDetector", "TemperatureCompensator", "WindowedAlarm"]

@@ -1,5 +1,7 @@
 """The part that all damage detectors share: threshold, scores and alarms."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from numbers import Real
 from typing import Any, Self, overload
@@ -25,12 +27,12 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
 
     def _records(self, X: Any, F: Array) -> Any:
-        """What is learned from and judged: the rows, or what a detector makes of them."""
+        """Hook: preprocess validated rows."""
         return F
 
     @abstractmethod
     def _learn(self, F: Any) -> Array:
-        """Learn the baseline, and give its damage index as the threshold should see it."""
+        """Fit; return calibration scores."""
 
     @abstractmethod
     def _limit(self, index: Array) -> float:

@@ -1,14 +1,16 @@
 """Several detectors as one."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
-from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array
+from skthermo._pipelines import last_step
 from skthermo._validation import _BaseComposition
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
@@ -90,7 +92,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         """
         return self._get_params("detectors", deep=deep)
 
-    def set_params(self, **params: Any) -> "FusedDetector":
+    def set_params(self, **params: Any) -> FusedDetector:
         """Set parameters, also of the detectors, as in ``set_params(lines__mahalanobisdetector__contamination=0.01)``.
 
         Parameters
@@ -113,7 +115,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
             raise ValueError("detectors is an empty list; expected one or more (name, detector)")
         self._validate_names([name for name, _ in self.detectors])
         self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]
-        lasts = [_last(detector) for detector in self.detectors_]
+        lasts = [last_step(detector) for detector in self.detectors_]
         for (name, _), last in zip(self.detectors, lasts, strict=True):
             if not isinstance(last, DamageDetector) or last.threshold_ <= 0:
                 raise ValueError(
@@ -126,11 +128,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         return conformal_threshold(index, self.contamination)
 
     def _index(self, X: ArrayLike) -> Array:
-        return _mean([-fitted.score_samples(X) / _last(fitted).threshold_ for fitted in self.detectors_])
-
-
-def _last(detector: Any) -> Any:
-    return detector[-1] if isinstance(detector, Pipeline) else detector
+        return _mean([-fitted.score_samples(X) / last_step(fitted).threshold_ for fitted in self.detectors_])
 
 
 def _mean(indices: list[Array]) -> Array:

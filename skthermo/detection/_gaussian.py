@@ -1,44 +1,33 @@
 """Normal distributions of rows in which modes may be missing."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, patterns
 from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
-MOST_STEPS = 100
-TOLERANCE = 1e-9
-"""Expectation maximisation ends when no mean or covariance of standardised modes moves by more than this."""
-
-SETTLED = 0.01
-"""It may also end after the most steps, without a warning if the last is this small beside the sampling error."""
-
-GAPS_TOLERANCE = 1e-7
-"""A combination of standardised modes with gaps that varies less than this is taken to be constant."""
-
-JITTER = 1e-12
-"""Added to the variances of standardised modes, so that copies of a mode have inverses until `check_invertible`."""
+MOST_STEPS = 100  # of expectation maximisation
+TOLERANCE = 1e-9  # it ends when no mean or covariance of standardised modes moves by more
+SETTLED = 0.01  # size of the last of the most steps, beside the sampling error, above which it warns
+GAPS_TOLERANCE = 1e-7  # variance below which a combination of standardised modes with gaps counts as constant
+JITTER = 1e-12  # added to variances of standardised modes: copies of a mode have inverses until `check_invertible`
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Mean and covariance of all modes; a row's distance is that of the modes that it has.
-
-    Attributes
-    ----------
-    mean : ndarray of shape (n_modes,)
-    covariance : ndarray of shape (n_modes, n_modes)
-    """
+    """Mean and covariance of all modes; a row's distance is that of the modes that it has."""
 
     mean: Array
     covariance: Array
 
     @classmethod
-    def of(cls, rows: Array) -> "Gaussian":
+    def of(cls, rows: Array) -> Gaussian:
         """The most likely one, by expectation maximisation where modes are missing."""
         present = ~np.isnan(rows)
         centre = np.nanmean(rows, axis=0)
@@ -54,36 +43,42 @@ class Gaussian:
 
     def whiten(self, rows: Array) -> Array:
         """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
-        present = ~np.isnan(rows)
-        masks, of_row = patterns(present)
-        roots = whitenings(np.broadcast_to(self.covariance, (len(masks), *self.covariance.shape)), masks)[0]
-        centred = self.centred(rows)
-        white = centred @ roots[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", centred, roots[of_row])
-        return np.where(present, white, np.nan)
+        return whiten_by(self.covariance[np.newaxis], np.zeros(len(rows), dtype=np.intp), rows - self.mean)
+
+    def distances(self, rows: Array) -> Array:
+        """Mahalanobis distances in the modes that rows have; NaN where there is none."""
+        scale = np.sqrt(np.diag(self.covariance))
+        masks, of_row = patterns(~np.isnan(rows))
+        # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
+        inverses = precisions(self.covariance / np.outer(scale, scale), masks)
+        standard = self.centred(rows) / scale
+        scaled = standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
+        squared = np.einsum("ij,ij->i", scaled, standard)
+        return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
     def second_moments(self, rows: Array) -> Array:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
-        present = ~np.isnan(rows)
-        masks, of_row = patterns(present)
+        masks, of_row = patterns(~np.isnan(rows))
         fill, rest = _conditionals(self.covariance, masks)
         complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
         return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
 
 
-def patterns(present: Mask) -> tuple[Mask, NDArray[np.intp]]:
-    """Different rows of a mask, and which of them each row is."""
-    if present.all():
-        return present[:1], np.zeros(len(present), dtype=np.intp)
-    packed = np.packbits(present, axis=1)
-    keys = np.ascontiguousarray(packed).view(np.dtype((np.void, packed.shape[1]))).ravel()
-    first, of_row = np.unique(keys, return_index=True, return_inverse=True)[1:]
-    return present[first], of_row.ravel()
+def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:
+    """Centred rows in standard deviations and uncorrelated, each by one of several covariances."""
+    present = ~np.isnan(centred)
+    masks, pattern = patterns(present)
+    cases, case = np.unique(which * len(masks) + pattern, return_inverse=True)
+    roots = whitenings(covariances[cases // len(masks)], masks[cases % len(masks)])[0]
+    filled = np.nan_to_num(centred)
+    white = filled @ roots[0] if len(roots) == 1 else np.einsum("ij,ijk->ik", filled, roots[case])
+    return np.where(present, white, np.nan)
 
 
-def precisions(covariances: Array, masks: Mask) -> Array:
-    """Inverses of the covariances of the modes in each mask; zero elsewhere."""
-    both = masks[..., :, np.newaxis] & masks[..., np.newaxis, :]
-    return np.where(both, np.linalg.inv(_alone(covariances, masks, both)), 0.0)
+def precisions(covariance: Array, masks: Mask) -> Array:
+    """Inverses of the covariance of the modes in each mask; zero elsewhere."""
+    both = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
+    return np.where(both, np.linalg.inv(_alone(covariance, masks, both)), 0.0)
 
 
 def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
@@ -102,10 +97,7 @@ def check_not_empty(rows: Array) -> None:
 
 
 def check_invertible(covariance: Array, rows: Array, size: Array | None = None) -> Array:
-    """Standard deviations of the modes, if no mode is constant or a combination of others.
-
-    ``size`` holds magnitudes of the modes beside which a deviation may be only rounding.
-    """
+    """Standard deviations of the modes, more than rounding beside their size, if no mode depends on others."""
     size = np.fmax.reduce(np.abs(rows)) if size is None else size
     deviations = np.sqrt(np.diag(covariance))
     constant = (deviations <= 1e-14 * size) | (np.fmax.reduce(rows) == np.fmin.reduce(rows))
@@ -131,7 +123,7 @@ def _alone(covariances: Array, masks: Mask, both: Mask) -> Array:
 
 def _conditionals(covariance: Array, masks: Mask) -> tuple[Array, Array]:
     """Matrices that complete centred rows of each mask, and the covariance of what they fill in."""
-    fill = covariance @ precisions(np.broadcast_to(covariance, (len(masks), *covariance.shape)), masks)
+    fill = covariance @ precisions(covariance, masks)
     return fill, covariance - fill @ covariance
 
 

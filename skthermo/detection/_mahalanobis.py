@@ -1,5 +1,7 @@
 """Damage index and alarm by Mahalanobis distance."""
 
+from __future__ import annotations
+
 from typing import Literal
 
 import numpy as np
@@ -12,15 +14,12 @@ from skthermo._arrays import Array
 from skthermo._validation import HasMethods, StrOptions
 from skthermo._warnings import warn_user
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._gaussian import Gaussian, check_invertible, check_not_empty, patterns, precisions
+from skthermo.detection._gaussian import Gaussian, check_invertible, check_not_empty
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
-ROWS = 20_000
-"""Number of rows whose distances are computed at a time, which bounds memory."""
-
-FOLDS = 10
-"""Periods of the baseline whose distances are computed with a covariance of the others, if it has no closed form."""
+ROWS_AT_ONCE = 20_000  # whose distances are computed, which bounds memory
+N_PERIODS = 10  # of the baseline, whose distances are computed with a covariance of the others if it has no closed form
 
 
 class MahalanobisDetector(DamageDetector):
@@ -73,9 +72,8 @@ class MahalanobisDetector(DamageDetector):
 
     Notes
     -----
-    `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode,
-    or a mode that is a combination of others. The units of the modes do not matter, unless ``covariance`` depends
-    on them, as a shrunk one does.
+    `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode, or a mode that is a
+    combination of others. The units of the modes do not matter, unless ``covariance`` depends on them.
 
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty. Where the baseline
@@ -92,11 +90,10 @@ class MahalanobisDetector(DamageDetector):
     ----------
     Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
-    Wilson & Hilferty, The distribution of chi-square, Proceedings of the National Academy of Sciences 17 (1931) 684-688
-    [WH31]_.
+    Wilson & Hilferty, The distribution of chi-square [WH31]_.
 
-    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm,
-    Scandinavian Journal of Statistics 35 (2008) 335-353 [VR08]_.
+    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm
+    [VR08]_.
 
     Examples
     --------
@@ -143,31 +140,19 @@ class MahalanobisDetector(DamageDetector):
         return choose(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
-        index = np.empty(len(F))
-        for first in range(0, len(F), ROWS):
-            rows = F[first : first + ROWS]
-            distances, present = self._distances(rows), ~np.isnan(rows)
-            if not present.all():
-                distances = as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
-            index[first : first + ROWS] = distances
-        return index
+        return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
+
+    def _of_few(self, F: Array) -> Array:
+        distances, present = self._distances(F), ~np.isnan(F)
+        if present.all():
+            return distances
+        return as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
 
     def _distances(self, F: Array) -> Array:
         """Distances of rows in the modes that they have; NaN where there is none."""
-        scale = np.sqrt(np.diag(self.covariance_.covariance_))
-        correlation = self.covariance_.covariance_ / np.outer(scale, scale)
-        standard = (F - self.covariance_.location_) / scale
-        present = ~np.isnan(F)
-        if present.all():
-            if self.covariance is not None:
-                return np.sqrt(self.covariance_.mahalanobis(F))
-            standard = standard @ np.linalg.cholesky(np.linalg.inv(correlation))
-            return np.sqrt(np.einsum("ij,ij->i", standard, standard))
-        masks, of_row = patterns(present)
-        inverses = precisions(np.broadcast_to(correlation, (len(masks), *correlation.shape)), masks)
-        standard = np.nan_to_num(standard)
-        squared = np.einsum("ij,ijk,ik->i", standard, inverses[of_row], standard)
-        return np.where(present.any(axis=1), np.sqrt(np.maximum(squared, 0.0)), np.nan)
+        if self.covariance is not None and not np.isnan(F).any():
+            return np.sqrt(self.covariance_.mahalanobis(F))
+        return Gaussian(self.covariance_.location_, self.covariance_.covariance_).distances(F)
 
     def _left_out(self, F: Array, distances: Array) -> Array:
         """Distances of baseline rows from the other rows."""
@@ -178,7 +163,7 @@ class MahalanobisDetector(DamageDetector):
                 left_out = np.sqrt(n_rows * distances**2 / (n_rows - 1 - distances**2))
             return np.where(distances**2 < n_rows - 1, left_out, np.where(np.isnan(distances), np.nan, np.inf))
         complete, left_out = np.flatnonzero(~np.isnan(F).any(axis=1)), distances.copy()
-        for rest, fold in KFold(min(FOLDS, len(complete))).split(complete):
+        for rest, fold in KFold(min(N_PERIODS, len(complete))).split(complete):
             others = clone(self.covariance).fit(F[complete[rest]])
             left_out[complete[fold]] = np.sqrt(others.mahalanobis(F[complete[fold]]))
         return left_out
@@ -199,7 +184,7 @@ def _most_likely(F: Array) -> EmpiricalCovariance:
     scale = check_invertible(learned.covariance, F)
     fitted = EmpiricalCovariance()
     fitted.location_, fitted.covariance_, fitted.n_features_in_ = learned.mean, learned.covariance, F.shape[1]
-    # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
+    # By way of the correlation, as in `Gaussian.distances`.
     fitted.precision_ = np.linalg.inv(learned.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
     return fitted
 

@@ -1,5 +1,7 @@
 """Damage index and alarm by any of scikit-learn's outlier detectors."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -47,20 +49,15 @@ class OutlierDetector(DamageDetector):
 
     Notes
     -----
-    The scale of the damage index is the estimator's: that of ``EllipticEnvelope`` is the *squared*
-    Mahalanobis distance, that of ``IsolationForest`` lies between 0 and 1. Indices of different
-    estimators cannot be compared, but their alarms can.
+    The scale of the damage index is the estimator's: ``EllipticEnvelope`` gives the *squared* Mahalanobis distance,
+    ``IsolationForest`` a number between 0 and 1. Indices of different estimators cannot be compared, but their
+    alarms can. Estimators that measure distances, such as ``OneClassSVM``, give high modes more weight, because these
+    vary more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
 
-    Estimators that measure distances, such as ``OneClassSVM`` and ``LocalOutlierFactor``, give high
-    modes more weight, because these vary more in Hz. ``make_pipeline(StandardScaler(),
-    OneClassSVM())`` as the estimator weights all modes alike.
-
-    The threshold comes from rows on which the estimator was fitted. Estimators that score such rows
-    better than new ones, as ``LocalOutlierFactor`` does, set it too low: check the rate of false
-    alarms on healthy records that `fit` has not seen.
-
-    Rows with a missing mode are left out of the baseline; their damage index is NaN, and
-    ``predict`` raises no alarm there.
+    The threshold comes from rows on which the estimator was fitted. Estimators that score such rows better than new
+    ones, as ``LocalOutlierFactor`` does, set it too low: check the rate of false alarms on healthy records that `fit`
+    has not seen. Rows with a missing mode are left out of the baseline; their damage index is NaN, and ``predict``
+    raises no alarm there.
 
     Examples
     --------
@@ -110,13 +107,10 @@ class OutlierDetector(DamageDetector):
     def _index(self, F: Array) -> Array:
         index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)
         if complete.any():
-            index[complete] = self._abnormality(F[complete])
+            is_pyod = _is_pyod(self.estimator_)
+            score = self.estimator_.decision_function if is_pyod else self.estimator_.score_samples
+            index[complete] = score(F[complete]) if is_pyod else -score(F[complete])
         return index
-
-    def _abnormality(self, complete: Array) -> Array:
-        if _is_pyod(self.estimator_):
-            return self.estimator_.decision_function(complete)
-        return -self.estimator_.score_samples(complete)
 
 
 def _is_pyod(estimator: Any) -> bool:

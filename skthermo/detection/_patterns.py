@@ -1,22 +1,19 @@
 """Damage indices that mean the same whichever modes a record has."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from skthermo._arrays import Array
-from skthermo.detection._gaussian import Mask, patterns
+from skthermo._arrays import Array, patterns
+from skthermo.detection._gaussian import Mask
 
-CHANCE = 0.95
-"""Groups of rows get factors of their own only if they differ by more than chance would with this probability."""
-
-TENTH = 0.1
-"""Share of a pattern's rows above the level by which its factor is learned: a rare one has too few alarms for that."""
-
-FEWEST = 50
-"""Number of rows from which a group gets a factor of its own."""
+CHANCE = 0.95  # groups of rows get factors only if they differ by more than chance would with this probability
+PATTERN_SHARE = 0.1  # of a pattern's rows are above the level that gives its factor: it has too few alarms for that
+FEWEST_ROWS = 50  # of a group that gets a factor of its own
 
 
 def as_if_complete(distances: Array, n_present: Array, n_modes: int) -> Array:
@@ -38,14 +35,6 @@ class PatternScale:
 
     A pattern's factor is that of all rows with as many modes, at the threshold, times its own, at the highest tenth of
     its rows. Both are drawn to 1 as far as groups differ no more than by chance. Complete rows have the factor 1.
-
-    Attributes
-    ----------
-    by_number : ndarray of shape (n_modes + 1,)
-        Factors by the number of modes that are there.
-    masks : ndarray of shape (n_patterns, n_modes)
-        Patterns with factors of their own.
-    by_pattern : ndarray of shape (n_patterns,)
     """
 
     by_number: Array
@@ -53,13 +42,15 @@ class PatternScale:
     by_pattern: Array
 
     @classmethod
-    def of(cls, index: Array, present: Mask, contamination: float) -> "PatternScale":
+    def of(cls, index: Array, present: Mask, contamination: float) -> PatternScale:
         """Learned from the indices of a baseline."""
         known = np.isfinite(index)
         index, present = index[known], present[known]
         by_number = _factors(index, present.sum(axis=1), present.shape[1] + 1, contamination, trend=True)
         masks, of_row = patterns(present)
-        by_pattern = _factors(index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, TENTH))
+        by_pattern = _factors(
+            index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, PATTERN_SHARE)
+        )
         scale = cls(by_number, masks, by_pattern)
         complete = scale._raw(np.ones((1, present.shape[1]), dtype=bool))[0]
         return cls(by_number / complete, masks, by_pattern)
@@ -80,7 +71,7 @@ def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float,
     With ``trend``, they are drawn to a straight line over the numbers of the groups.
     """
     counts = np.bincount(group, minlength=n_groups)
-    large = np.flatnonzero(counts >= max(FEWEST, 1 / share))
+    large = np.flatnonzero(counts >= max(FEWEST_ROWS, 1 / share))
     if len(large) < 2:
         return np.ones(n_groups)
     logs = np.log(index)
@@ -98,7 +89,8 @@ def _line(numbers: Array, values: Array, variances: Array) -> Array:
     """Differences from the mean on a straight line, shrunk; zero if chance may have caused them."""
     weights = 1 / variances
     x = numbers - np.average(numbers, weights=weights)
-    slope, information = (weights * x * values).sum() / (weights * x * x).sum(), (weights * x * x).sum()
+    information = (weights * x * x).sum()
+    slope = (weights * x * values).sum() / information
     evidence = slope**2 * information
     return slope * (1 - 1 / evidence) * x if evidence > chi2.ppf(CHANCE, 1) else np.zeros(len(x))
 

@@ -14,20 +14,8 @@ def quantile_threshold(index: Array, contamination: float) -> float:
 def conformal_threshold(index: Array, contamination: float, share: float = 1.0, what: str = "records") -> float:
     """The ceil((n + 1)(1 - contamination))-th smallest index, which a new one exceeds with that probability at most.
 
-    Parameters
-    ----------
-    index : ndarray of shape (n_samples,)
-        Indices of baseline records, each by a detector that was not fitted on it; NaN is left out.
-    contamination : float
-    share : float
-        Number of independent records for each record, where they depend on their neighbours in time.
-    what : str
-        What is judged, for the warning.
-
-    Returns
-    -------
-    float
-        The largest index, with a warning, if there are too few records for the rate.
+    Each index comes from a detector that was not fitted on its record; NaN is left out. ``share`` is the number of
+    independent records for each record, where they depend on their neighbours in time.
     """
     ordered = np.sort(index[~np.isnan(index)])
     n_independent = share * len(ordered)

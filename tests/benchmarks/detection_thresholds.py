@@ -1,8 +1,9 @@
-"""False alarms and detection on simulated residuals, whose law is known: thresholds, windows, missing modes, charts.
+"""False alarms and detection on simulated residuals, whose law is known: thresholds, windows, missing modes, charts,
+drift.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_thresholds.py
 
-``--parts`` chooses some of the four.
+``--parts`` chooses some of the five.
 """
 
 import argparse
@@ -10,15 +11,18 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from control_charts import correlated, cusum
+from control_charts import correlated, cusum, whitened
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.metrics import time_to_detection
 
 THRESHOLDS = ("quantile", "conformal", "chi2")
-RULES = {"mean": "mean", "ewma": "exponentially weighted", "cusum": "cumulative sum", "m-of-n": "half of the records"}
+RULES = {"mean": "mean", "m-of-n": "half of the records"}
 ASKED = 0.02
 CORRELATION = 0.7
+SLOW = 0.999
+"""Correlation of neighbouring records of a drift, which lasts for about two months of hourly ones."""
+YEAR = 8760
 N_MODES = 4
 SHIFTS = (0.0, 0.5, 1.0, 2.0)
 """In standard deviations of a single record; none shows the false alarms."""
@@ -138,7 +142,7 @@ def print_charts(options):
     random, onset, n_after = np.random.default_rng(3), 500, 400
     baseline, independent = (correlated(random, (n, N_MODES), CORRELATION) for n in (10_000, options.calibration))
     methods = {"single records": windowed(WindowedAlarm(1).fit(baseline))}
-    for n, rule in product((6, 24), RULES):
+    for n, rule in product((6, 24, 120), RULES):
         methods[f"window of {n}, {RULES[rule]}"] = windowed(WindowedAlarm(n, rule=rule).fit(baseline))
     for allowance in (0.25, 0.5, 1.0):
         methods[f"CUSUM, allowance {allowance}"] = lambda records, allowance=allowance: cusum(records, allowance)
@@ -188,11 +192,31 @@ def print_one_calibration(title, thresholds, found, onset):
     print()
 
 
+def print_drift(options):
+    """False alarms where healthy residuals drift slowly, after a year of the same drift."""
+    rows = {}
+    for size, seed in product((0.0, 0.3, 0.6), range(options.repeats // 3)):
+        random = np.random.default_rng(seed)
+        steady, slow = (correlated(random, (2 * YEAR, N_MODES), time) for time in (CORRELATION, SLOW))
+        baseline, new = np.split(steady + size * slow, 2)
+        rates = rows.setdefault(f"{size} deviations", {})
+        for window in (24, 120):
+            found = rate(WindowedAlarm(window, contamination=ASKED).fit(baseline), new)
+            rates.setdefault(f"window of {window}, mean", []).append(found)
+        index, later = (cusum(whitened(baseline, records), 0.5) for records in (baseline, new))
+        found = (later > np.quantile(index, 1 - ASKED)).mean()
+        rates.setdefault("CUSUM, allowance 0.5", []).append(found)
+    table = pd.DataFrame({size: {name: 100 * np.mean(r) for name, r in rates.items()} for size, rates in rows.items()})
+    print(f"False alarms in the next year, %, residuals that drift with an autocorrelation of {SLOW} by\n")
+    print(table.round(1).to_string(), end="\n\n")
+
+
 PARTS = {
     "finite-samples": print_finite_samples,
     "windows": print_windows,
     "missing-modes": print_missing_modes,
     "charts": print_charts,
+    "drift": print_drift,
 }
 
 

@@ -30,7 +30,6 @@ SCALES = (None, "global", "local")
 THRESHOLDS = ("quantile", "conformal", "chi2")
 WINDOWS = {
     "mean of 24 records": WindowedAlarm(24),
-    "weighted like 24 records": WindowedAlarm(24, rule="ewma"),
     "12 of 24 records": WindowedAlarm(24, rule="m-of-n"),
     "mean of 24 hours": WindowedAlarm("24h"),
 }

@@ -213,7 +213,7 @@ def test_a_row_farther_away_in_the_same_direction_has_a_higher_index(row, factor
 def test_rows_of_any_number_at_once_have_the_same_index(monkeypatch):
     detector = MahalanobisDetector().fit(GAPPY)
     whole = detector.damage_index(GAPPY)
-    monkeypatch.setattr("skthermo.detection._mahalanobis.ROWS", 7)
+    monkeypatch.setattr("skthermo.detection._mahalanobis.ROWS_AT_ONCE", 7)
     np.testing.assert_allclose(detector.damage_index(GAPPY), whole, rtol=1e-9)
 
 
@@ -300,6 +300,20 @@ def test_patterns_with_twice_the_variance_raise_as_many_alarms_as_others():
     detector.pattern_scale_ = MahalanobisDetector().fit(F).pattern_scale_  # factors of 1
     before = alarm_rates(detector, later)
     assert min(rate for pattern, rate in before.items() if not all(pattern)) > 0.04
+
+
+def test_one_noisy_pattern_of_several_raises_as_many_alarms_as_others():
+    """The first mode is missed where all others are noisier, the second whenever."""
+
+    def first_in_noise(n_rows, seed):
+        rows, drawn = records(n_rows, seed), np.random.default_rng(seed).random(n_rows)
+        rows[drawn < 0.2] = MEAN + 1.4 * (rows[drawn < 0.2] - MEAN)
+        rows[drawn < 0.2, 0] = rows[drawn > 0.8, 1] = np.nan
+        return rows
+
+    rates = alarm_rates(MahalanobisDetector().fit(first_in_noise(20_000, 1)), first_in_noise(40_000, 2))
+    assert len(rates) == 3
+    assert max(abs(rate - 0.02) for rate in rates.values()) < 0.008
 
 
 def test_patterns_alike_get_no_factors():

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from skthermo.detection._gaussian import Gaussian
-from skthermo.detection._local_covariance import History, LocalCovariance, Smoothing, whitened
-from tests.detection.test_whitening import FROZEN, SOURCE, THAWED, X, compensator
+from skthermo.detection.compensation._local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
+from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 
 
 @pytest.fixture
@@ -58,13 +58,11 @@ def test_a_burst_of_wild_records_does_not_whiten_itself(history):
     assert (np.linalg.norm(white, axis=1) > 50).all()
 
 
-def test_the_smoothing_is_the_likeliest_for_records_that_were_left_out(history, monkeypatch):
-    monkeypatch.setattr(f"{SOURCE}.NEIGHBOURS", (50, 100, 500))
-
+def test_the_smoothing_is_the_likeliest_for_records_that_were_left_out(history):
     def likelihood(smoothing):
         covariances = history.overall.covariance[np.newaxis].repeat(len(X), axis=0)
         if smoothing:
-            covariances = LocalCovariance(history, smoothing)(history.own_neighbours(smoothing.n_neighbors))
+            covariances = LocalCovariance(history, smoothing).at(history.places, history.order)
         centred = history.residuals - history.overall.mean
         pairs = zip(centred[:200], covariances[:200], strict=True)
         densities = sum(multivariate_normal.logpdf(row, [0, 0], covariance) for row, covariance in pairs)
@@ -72,5 +70,4 @@ def test_the_smoothing_is_the_likeliest_for_records_that_were_left_out(history, 
         assert found == pytest.approx(densities + 200 * np.log(2 * np.pi), rel=1e-10)
         return whitened(history.residuals, history.overall, covariances)[1]
 
-    candidates = [None, *(Smoothing(size, pseudo) for size in (50, 100, 500) for pseudo in (5, 15))]
-    assert max(candidates, key=likelihood) == history.best_smoothing()
+    assert history.likeliest().smoothing == max([None, *CANDIDATES], key=likelihood)

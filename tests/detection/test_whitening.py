@@ -12,6 +12,7 @@ from sklearn.model_selection import TimeSeriesSplit
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection.compensation._local_covariance import Smoothing
 
 MODES = ["f1", "f2"]
 FROZEN = 0.1 * np.array([[2.0, 0.0], [1.0, 1.0]])
@@ -35,14 +36,13 @@ def compensator(scale="local", estimator=None, **options):
 
 X, LATER = campaign(), campaign(3000, 1)
 LOCAL = compensator().fit(X)
-SOURCE = "skthermo.detection._local_covariance"
+SOURCE = "skthermo.detection.compensation._local_covariance"
 
 
 @pytest.fixture(autouse=True)
 def few_candidates(monkeypatch):
     """To be quick: how the smoothing is chosen is tested by itself."""
-    monkeypatch.setattr(f"{SOURCE}.NEIGHBOURS", (50, 100))
-    monkeypatch.setattr(f"{SOURCE}.PSEUDO_ROWS", (5, 15))
+    monkeypatch.setattr(f"{SOURCE}.CANDIDATES", (Smoothing(50, 5), Smoothing(100, 5), Smoothing(100, 15)))
 
 
 def spreads(white, records):
@@ -127,7 +127,7 @@ def test_a_baseline_of_equal_spread_loses_nothing():
 
 
 def test_some_of_a_long_baseline_tell_the_spread_of_all(monkeypatch):
-    monkeypatch.setattr("skthermo.detection._whitening.MOST", 600)
+    monkeypatch.setattr("skthermo.detection.compensation._whitening.MOST_PLACES", 600)
     fitted = compensator()
     white = fitted.fit_transform(X)
     assert len(fitted.spread_.places) == 600
@@ -254,8 +254,8 @@ def test_any_detector_follows():
 def test_the_size_of_chunks_does_not_matter(monkeypatch):
     holed = X.mask(np.random.default_rng(0).random(X.shape) < [0, 0, 0.3, 0.3])
     expected = compensator().fit_transform(holed), compensator().fit(holed).transform(LATER)
-    for module in (SOURCE, "skthermo.detection._whitening"):
-        monkeypatch.setattr(f"{module}.ENTRIES", 100_000)
+    for module in (SOURCE, "skthermo.detection.compensation._whitening"):
+        monkeypatch.setattr(f"{module}.NUMBERS_AT_ONCE", 100_000)
     found = compensator().fit_transform(holed), compensator().fit(holed).transform(LATER)
     for white, whole in zip(found, expected, strict=True):
         np.testing.assert_allclose(white, whole, rtol=1e-9, atol=1e-12)

@@ -1,0 +1,132 @@
+"""Regression on records with missing values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.pipeline import FeatureUnion, Pipeline
+from sklearn.utils import get_tags
+
+from skthermo._arrays import as_columns, as_floats
+from skthermo._frames import column_names
+from skthermo._models import is_model
+from skthermo._pipelines import last_step
+from skthermo._regressors import fit_outputs
+from skthermo._validation import BaseSearchCV, _BaseImputer
+
+
+class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
+
+    def __init__(self, estimator: BaseEstimator):
+        self.estimator = estimator
+
+    def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
+        head, rest = split_pipeline(self.estimator)
+        self.head_ = None if head is None else clone(head)
+        inputs = X if head is None else self.head_.fit_transform(X)
+        self.takes_nan_ = takes_nan(rest)
+        self.n_targets_ = y.shape[1]
+        usable, present = self._predictable(inputs), ~np.isnan(as_floats(y))
+        if takes_missing_targets(rest):
+            present[:] = True
+        in_use = usable[:, np.newaxis] & present
+        if not in_use.any(axis=0).all():
+            wanted = "that target" if self.takes_nan_ else "that target and every other column"
+            target = column_names(y, "target ")[in_use.any(axis=0).argmin()]
+            raise ValueError(
+                f"{target!r} has none of {len(y)} rows to learn from, of all or in a fold; expected rows with {wanted} "
+                f"for {type(rest).__name__}"
+            )
+        if (in_use == usable[:, np.newaxis]).all():
+            self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))
+        else:
+            self.regressor_ = MultiOutputRegressor(rest)
+            targets = as_floats(y).T
+            self.regressor_.estimators_ = [
+                clone(rest).fit(inputs[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
+            ]
+        self.estimator_ = self.regressor_ if head is None else joined(self.estimator, self.head_, self.regressor_)
+        return self
+
+    def predict(self, X: Any) -> NDArray[np.float64]:
+        inputs = X if self.head_ is None else self.head_.transform(X)
+        usable = self._predictable(inputs)
+        predicted = np.full((len(X), self.n_targets_), np.nan)
+        if usable.any():
+            values = as_columns(self.regressor_.predict(inputs[usable]))
+            expected = (int(usable.sum()), self.n_targets_)
+            if values.shape != expected:
+                raise ValueError(
+                    f"{type(self.regressor_).__name__} predicted the shape {values.shape}; expected {expected}, a "
+                    "column for each target"
+                )
+            predicted[usable] = values
+        return predicted
+
+    def _predictable(self, inputs: Any) -> NDArray[np.bool_]:
+        if self.takes_nan_ or scipy.sparse.issparse(inputs):
+            return np.ones(inputs.shape[0], dtype=bool)
+        return ~np.isnan(as_floats(inputs)).any(axis=1)
+
+
+def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstimator]:
+    """The first transformers of a pipeline, as far as they accept NaN and learn without y, and what follows them."""
+    if not isinstance(estimator, Pipeline):
+        return None, estimator
+    steps = [step for _, step in estimator.steps]
+    n_head = next(
+        (i for i, step in enumerate(steps[:-1]) if not takes_nan(step) or learns_from_y(step)), len(steps) - 1
+    )
+    if not n_head:
+        return None, estimator
+    return estimator[:n_head], steps[-1] if n_head == len(steps) - 1 else estimator[n_head:]
+
+
+def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
+    """A fitted pipeline of its fitted parts."""
+    tail = rest.steps if isinstance(rest, Pipeline) else [(pipeline.steps[-1][0], rest)]
+    return Pipeline([*head.steps, *tail], memory=pipeline.memory, verbose=pipeline.verbose)
+
+
+def as_target(estimator: BaseEstimator, y: Any) -> Any:
+    """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
+    if y.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output:
+        return y
+    return y.squeeze(axis=1)
+
+
+def takes_nan(estimator: BaseEstimator) -> bool:
+    """Whether an estimator accepts NaN in X, also inside a wrapper, of which scikit-learn's tag does not say so."""
+    if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
+        return True
+    if isinstance(estimator, Pipeline):
+        steps = [step for _, step in estimator.steps]
+        imputer = next((i for i, step in enumerate(steps) if isinstance(step, _BaseImputer)), len(steps))
+        return all(takes_nan(step) for step in steps[: imputer + 1])
+    if isinstance(estimator, ColumnTransformer | FeatureUnion):
+        parts = estimator.transformers if isinstance(estimator, ColumnTransformer) else estimator.transformer_list
+        return all(takes_nan(part) for _, part, *_ in parts)
+    if isinstance(estimator, MultiOutputRegressor | BaseSearchCV):
+        return takes_nan(estimator.estimator)
+    if isinstance(estimator, TransformedTargetRegressor) and estimator.regressor is not None:
+        return takes_nan(estimator.regressor)
+    return get_tags(estimator).input_tags.allow_nan
+
+
+def learns_from_y(transformer: BaseEstimator | str | None) -> bool:
+    """Whether a transformer may need the targets, which are not known in every row."""
+    if transformer is None or isinstance(transformer, str):
+        return False
+    return get_tags(transformer).target_tags.required or hasattr(transformer, "estimator")
+
+
+def takes_missing_targets(estimator: BaseEstimator) -> bool:
+    """Whether an estimator accepts NaN in y: one with an FE model leaves out incomplete rows itself, after its lags."""
+    return is_model(getattr(last_step(estimator), "model", None))

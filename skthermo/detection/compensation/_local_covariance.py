@@ -1,0 +1,124 @@
+"""Covariance of residuals in similar weather."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo._weather import nearest
+from skthermo.detection._gaussian import Gaussian, Mask, whitenings
+
+NEAR_IN_TIME = 24  # records fewer rows apart, a day of hourly ones, do not tell each other's covariance
+NUMBERS_AT_ONCE = 4_000_000  # held in memory
+
+
+class Smoothing(NamedTuple):
+    """Over how many records of similar weather a covariance is taken, and as how many that of all records counts."""
+
+    n_neighbors: int
+    n_pseudo: int
+
+
+# The more records, the more the covariance of all may count.
+PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
+CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Records nearest to some places in weather, and which of them count."""
+
+    rows: NDArray[np.intp]
+    counted: Mask
+
+
+@dataclass(frozen=True)
+class History:
+    """Residuals of records at positions in time and places in weather, and the distribution of all residuals."""
+
+    order: NDArray[np.intp]
+    places: Array
+    residuals: Array
+    overall: Gaussian
+
+    def neighbours(self, size: int, places: Array, order: NDArray[np.intp] | None = None) -> Neighbours:
+        """The records nearest to each place, without those near ``order`` in time."""
+        if order is None:
+            near = nearest(self.places, places, size)[1]
+            return Neighbours(near, np.ones(near.shape, dtype=bool))
+        near = nearest(self.places, places, size + 2 * NEAR_IN_TIME - 1)[1]
+        far = np.abs(self.order[near] - order[:, np.newaxis]) >= NEAR_IN_TIME
+        return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+
+    def likeliest(self) -> LocalCovariance | None:
+        """The covariance by weather, or none, under which records are likeliest given the others."""
+        candidates = [LocalCovariance(self, one) for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
+        plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
+        likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
+        return [None, *candidates][int(np.argmax(likelihoods))]
+
+
+@dataclass(frozen=True)
+class LocalCovariance:
+    """Covariance at places in weather, as the records of the most similar weather show it.
+
+    Standard deviations come from the modes that records have, correlations from records completed by the correlation
+    in all weather.
+    """
+
+    history: History
+    smoothing: Smoothing
+
+    def __call__(self, neighbours: Neighbours) -> Array:
+        """Covariances that the neighbours of each place show."""
+        rows, standard = self._standard
+        correlation = self._mean(standard.second_moments(rows), standard.covariance, neighbours)
+        scale = np.sqrt(self._variances(neighbours) / np.einsum("ijj->ij", correlation))
+        return scale[:, :, np.newaxis] * correlation * scale[:, np.newaxis, :]
+
+    def at(self, places: Array, order: NDArray[np.intp] | None = None) -> Array:
+        """Covariances at some places, without the records near ``order`` in time."""
+        return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
+
+    def likelihood(self) -> float:
+        """Log-likelihood of the records, each given the others."""
+        return whitened(self.history.residuals, self.history.overall, self(self._own))[1]
+
+    @cached_property
+    def _own(self) -> Neighbours:
+        return self.history.neighbours(self.smoothing.n_neighbors, self.history.places, self.history.order)
+
+    @cached_property
+    def _standard(self) -> tuple[Array, Gaussian]:
+        """Records over the standard deviations in their own weather, and their distribution."""
+        rows = (self.history.residuals - self.history.overall.mean) / np.sqrt(self._variances(self._own))
+        return rows, Gaussian.of(rows)
+
+    def _variances(self, neighbours: Neighbours) -> Array:
+        overall = self.history.overall
+        return self._mean((self.history.residuals - overall.mean) ** 2, np.diag(overall.covariance), neighbours)
+
+    def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
+        """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
+        known, filled = ~np.isnan(values), np.nan_to_num(values)
+        means, pseudo = np.empty((len(neighbours.rows), *prior.shape)), self.smoothing.n_pseudo
+        step = max(NUMBERS_AT_ONCE // (neighbours.rows.shape[1] * prior.size), 1)
+        for first in range(0, len(means), step):
+            rows, counted = (part[first : first + step] for part in (neighbours.rows, neighbours.counted))
+            sums = np.einsum("ij,ij...->i...", counted, filled[rows])
+            counts = np.einsum("ij,ij...->i...", counted, known[rows], dtype=float)
+            means[first : first + step] = (sums + pseudo * prior) / (counts + pseudo)
+        return means
+
+
+def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:
+    """Residuals in standard deviations and uncorrelated, by a covariance each, and their log-likelihood."""
+    present = ~np.isnan(residuals)
+    roots, log_determinants = whitenings(covariances, present)
+    white = np.einsum("ij,ijk->ik", overall.centred(residuals), roots)
+    return np.where(present, white, np.nan), -0.5 * float((white**2).sum() + log_determinants.sum())

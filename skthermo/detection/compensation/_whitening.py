@@ -1,0 +1,93 @@
+"""Residuals in standard deviations, by the covariance that residuals have in each record's weather."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.pipeline import Pipeline
+
+from skthermo._arrays import Array, spread_evenly
+from skthermo._weather import TrainingRange, nearest, weather_coordinates
+from skthermo.detection._gaussian import Gaussian, check_invertible, whiten_by
+from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
+
+MOST_PLACES = 5000  # baseline records, evenly spaced in time, that tell covariances by weather
+ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's temperatures that a record is beyond them
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean of residuals, and their covariance by weather.
+
+    ``covariances`` are those at the ``places`` of the baseline's weather, and at last the overall one, for unknown
+    weather; ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's
+    temperatures residuals may be larger.
+    """
+
+    overall: Gaussian
+    covariances: Array
+    reach: TrainingRange | None
+    smoothing: Smoothing | None = None
+    coordinates: Pipeline | None = None
+    places: Array | None = None
+
+    @classmethod
+    def of(cls, weather: Array, residuals: Array, size: Array, *, local: bool) -> tuple[Spread, Array]:
+        """Learn from a baseline in order of time; whiten each of its records by others, which are not near in time.
+
+        ``size`` holds magnitudes of the frequencies.
+        """
+        overall, learned = Gaussian.of(residuals), ~np.isnan(residuals).all(axis=1)
+        check_invertible(overall.covariance, residuals, size)
+        reach = TrainingRange.of(weather, learned) if local else None
+        plain = cls(overall, overall.covariance[np.newaxis], reach)
+        white = plain.whiten(weather, residuals)
+        usable = np.flatnonzero(learned & ~np.isnan(weather).any(axis=1))
+        if not local or len(usable) < 2 * CANDIDATES[0].n_neighbors:
+            return plain, white
+        coordinates = weather_coordinates(weather[usable])
+        told = spread_evenly(usable, MOST_PLACES)
+        places = coordinates.transform(weather[told])
+        covariance = History(told, places, residuals[told], overall).likeliest()
+        if covariance is None:
+            return plain, white
+        step = max(NUMBERS_AT_ONCE // covariance.smoothing.n_neighbors, 1)
+        for first in range(0, len(usable), step):
+            block = usable[first : first + step]
+            by_others = covariance.at(coordinates.transform(weather[block]), order=block)
+            white[block] = whitened(residuals[block], overall, by_others)[0]
+        covariances = np.concatenate([covariance.at(places), plain.covariances])
+        return cls(overall, covariances, reach, covariance.smoothing, coordinates, places), white
+
+    def deviations(self, weather: Array) -> Array:
+        """Standard deviations of residuals in the weather of each row, (n_samples, n_modes)."""
+        variances = np.einsum("ijj->ij", self.covariances)[self._place(np.asarray(weather, dtype=float))]
+        return np.sqrt(variances) * self._widening(weather)[:, np.newaxis]
+
+    def whiten(self, weather: Array, residuals: Array) -> Array:
+        """Residuals of new records in standard deviations and uncorrelated."""
+        white = np.empty_like(residuals)
+        step = max(NUMBERS_AT_ONCE // residuals.shape[1] ** 2, 1)
+        for first in range(0, len(residuals), step):
+            rows = slice(first, first + step)
+            by_place = whiten_by(self.covariances, self._place(weather[rows]), residuals[rows] - self.overall.mean)
+            white[rows] = by_place / self._widening(weather[rows])[:, np.newaxis]
+        return white
+
+    def _widening(self, weather: Array) -> Array:
+        """Factor of the deviations where weather is beyond that of the baseline."""
+        if self.reach is None:
+            return np.ones(len(weather))
+        varied = self.reach.highest > self.reach.lowest
+        excess = np.nan_to_num(self.reach.excess(weather))[:, varied]
+        return np.sqrt(1 + (ERROR_PER_RANGE * excess.sum(axis=1) / max(varied.sum(), 1)) ** 2)
+
+    def _place(self, weather: Array) -> NDArray[np.intp]:
+        """The nearest place of every row; the overall covariance where a temperature is missing."""
+        place = np.full(len(weather), len(self.covariances) - 1)
+        known = ~np.isnan(weather).any(axis=1)
+        if self.places is not None and known.any():
+            place[known] = nearest(self.places, self.coordinates.transform(weather[known]), 1)[1][:, 0]
+        return place

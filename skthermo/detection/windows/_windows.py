@@ -1,0 +1,75 @@
+"""Which records count together with each one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo._frames import first_disorder
+
+NUMBERS_AT_ONCE = 2_000_000  # held in memory
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Records in order of time, and the first record of the window that ends with each."""
+
+    rows: Array
+    first: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, X: Any, rows: Array, window: int | str) -> Windows:
+        """Windows of a number of records, or of a time on the index of a frame."""
+        row = first_disorder(X)
+        if row:
+            raise ValueError(
+                f"row {row} ({X.index[row]}) is earlier than the row before it; expected records in order of time, as "
+                "X.sort_index() gives"
+            )
+        if not isinstance(window, str):
+            return cls(rows, np.maximum(np.arange(len(rows)) - window + 1, 0))
+        try:
+            duration = pd.Timedelta(window)
+        except ValueError:
+            duration = pd.NaT
+        if not duration >= pd.Timedelta("1s"):
+            raise ValueError(f"window is {window!r}; expected a number of records, or a time such as '24h'")
+        times = getattr(X, "index", None)
+        if not isinstance(times, pd.DatetimeIndex) or times.hasnans:
+            raise ValueError(
+                f"window is {window!r}, a time, but the records are not a frame with a stamp for each; expected a "
+                "DatetimeIndex, or a number of records as the window"
+            )
+        return cls(rows, times.searchsorted(times - duration, side="right"))
+
+    def sums(self, values: Array) -> Array:
+        """Sums of the values of the records in every window."""
+        totals = np.concatenate([np.zeros((1, *values.shape[1:])), values.cumsum(axis=0)])
+        return totals[1:] - totals[self.first]
+
+    def ending_in(self, start: int, stop: int) -> Windows:
+        """The windows that end in a run of records, after those of the records before it that they need."""
+        before = self.first[start]
+        return Windows(self.rows[before:stop], np.maximum(self.first[before:stop] - before, 0))
+
+    def runs(self) -> Iterator[tuple[int, int]]:
+        """First record of each run, and the one after its last, so that the windows of a run fit into memory."""
+        step = max(NUMBERS_AT_ONCE // self.longest, 1)
+        for start in range(0, len(self.rows), step):
+            yield start, min(start + step, len(self.rows))
+
+    @property
+    def sizes(self) -> NDArray[np.intp]:
+        """Number of records in every window."""
+        return np.arange(len(self.rows)) - self.first + 1
+
+    @property
+    def longest(self) -> int:
+        """Largest number of records in a window."""
+        return int(self.sizes.max())
