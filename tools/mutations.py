@@ -163,6 +163,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("mean of modes with gaps", "[[mean + step], (updated", "[[mean], (updated"),
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
         ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
+    ],
+    ("detection/_gaussian.py", "detection/test_whitening.py"): [
         ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
     ],
     ("detection/_patterns.py", "detection/test_gaps.py"): [

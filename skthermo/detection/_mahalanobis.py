@@ -184,7 +184,6 @@ def _most_likely(F: Array) -> EmpiricalCovariance:
     scale = check_invertible(learned.covariance, F)
     fitted = EmpiricalCovariance()
     fitted.location_, fitted.covariance_, fitted.n_features_in_ = learned.mean, learned.covariance, F.shape[1]
-    # By way of the correlation, as in `Gaussian.distances`.
     fitted.precision_ = np.linalg.inv(learned.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
     return fitted
 

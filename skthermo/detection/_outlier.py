@@ -107,9 +107,8 @@ class OutlierDetector(DamageDetector):
     def _index(self, F: Array) -> Array:
         index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)
         if complete.any():
-            is_pyod = _is_pyod(self.estimator_)
-            score = self.estimator_.decision_function if is_pyod else self.estimator_.score_samples
-            index[complete] = score(F[complete]) if is_pyod else -score(F[complete])
+            fitted, rows = self.estimator_, F[complete]
+            index[complete] = fitted.decision_function(rows) if _is_pyod(fitted) else -fitted.score_samples(rows)
         return index
 
 

@@ -139,7 +139,7 @@ class WindowedAlarm(DamageDetector):
 
     def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
-        # Few high windows hardly tell how long they last: those within half a window of each other share records.
+        # Few high windows hardly tell how long they last, but those within half a window of each other share records.
         time = max(correlation_time(is_high), self.width_ / 2)
         return conformal_threshold(index, self.contamination, 1 / time, "windows")
 
