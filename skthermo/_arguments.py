@@ -1,4 +1,4 @@
-"""Checks of theta, bounds, priors, noise, degrees of freedom and units.
+"""Checks of models, theta, bounds, priors, noise, degrees of freedom and units.
 
 Each check returns its argument as an array, or raises a ValueError that says what was got and what was expected.
 """
@@ -119,3 +119,26 @@ def _pair(width: Any, name: str) -> Any:
     if np.shape(width) != (2,):
         raise ValueError(f"bounds of parameter {name!r} are {width!r}; expected a half-width or (lowest, highest)")
     return [width]
+
+
+MEMBERS = ("parameter_names", "n_modes", "frequencies")
+
+
+def is_model(candidate: Any) -> bool:
+    """Whether an object is an FE model, judged by its attributes."""
+    return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in MEMBERS)
+
+
+def check_model(candidate: Any) -> None:
+    """Raise an error for an object that is not an FE model.
+
+    Raises
+    ------
+    ValueError
+        Says what was given.
+    """
+    if not is_model(candidate):
+        raise ValueError(
+            f"model is {candidate!r:.200}; expected an FE model, an object with parameter_names, n_modes and "
+            "frequencies"
+        )

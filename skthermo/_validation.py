@@ -19,8 +19,8 @@ from sklearn.utils._param_validation import HasMethods, Interval, InvalidParamet
 from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _check_sample_weight, _num_samples, check_is_fitted
 
+from skthermo._arguments import is_model
 from skthermo._arrays import without_mask, without_missing
-from skthermo._models import is_model
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
     Method = TypeVar("Method", bound=Callable[..., Any])

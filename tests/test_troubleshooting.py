@@ -15,8 +15,8 @@ ANY = "…"
 ERRORS = "The most common errors"
 """Title of the section that explains errors."""
 
-HELPER, REPEATED = "_warnings.py", "_warnings_once.py"
-"""Files that give the warnings of others."""
+HELPER = "_warnings.py"
+"""The file that gives the warnings of others."""
 
 REPORTS = ["_sentences", "_doubts", "summary", "likely_cause"]
 """Functions whose sentences tell what is doubtful."""
@@ -188,7 +188,7 @@ def test_terms_are_long_enough_to_be_found(terms):
 
 def test_the_text_of_every_warning_is_read_from_the_source(source):
     unread = {site.split(":")[0].split("/")[-1] for site, texts in source.warnings().items() if not texts}
-    assert unread == {HELPER, REPEATED}
+    assert unread == {HELPER}
 
 
 FORMS = """

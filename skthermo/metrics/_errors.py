@@ -1,5 +1,7 @@
 """Errors of predicted frequencies, by mode and by scenario."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows
-from skthermo._warnings_once import warnings_once
+from skthermo._warnings import warnings_once
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
 from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks

@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin
 
+from skthermo._arguments import is_model
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
-from skthermo._models import is_model
 from skthermo._validation import (
     HasMethods,
     StrOptions,

@@ -12,9 +12,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_noise
+from skthermo._arguments import check_model, check_noise
 from skthermo._arrays import Array, real_array
-from skthermo._models import check_model
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
-from skthermo._arguments import check_bounds, check_prior
+from skthermo._arguments import check_bounds, check_model, check_prior
 from skthermo._arrays import Array, Bounds, real_array
 from skthermo._frames import column_names
-from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import (

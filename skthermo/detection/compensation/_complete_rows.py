@@ -13,9 +13,9 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
+from skthermo._arguments import is_model
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
-from skthermo._models import is_model
 from skthermo._pipelines import last_step
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer

@@ -10,9 +10,8 @@ import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_theta
+from skthermo._arguments import check_model, check_theta
 from skthermo._arrays import Array
-from skthermo._models import check_model
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 from skthermo.fem.sampling._progress import with_progress

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
-from skthermo._warnings_once import without_warnings
+from skthermo._warnings import without_warnings
 from skthermo.studies.detectability._judged import JudgedRecords
 from skthermo.studies.detectability._view import View
 from skthermo.studies.scenarios import BaseScenario

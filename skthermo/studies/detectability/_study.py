@@ -16,8 +16,7 @@ from skthermo._arrays import as_random_state, positive_integer
 from skthermo._pipelines import last_step
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples, seed_parts, seeded
-from skthermo._warnings import warn_user
-from skthermo._warnings_once import warnings_once
+from skthermo._warnings import warn_user, warnings_once
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._arrangement import Arrangement
 from skthermo.studies.detectability._pod_curve import PODCurve, bracket_of, check_probability, pod_curve

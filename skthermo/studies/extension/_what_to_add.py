@@ -17,8 +17,7 @@ from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._frames import check_same_rows, column_names
 from skthermo._threads import single_blas_thread
-from skthermo._warnings import warn_user
-from skthermo._warnings_once import warnings_once, without_warnings
+from skthermo._warnings import warn_user, warnings_once, without_warnings
 from skthermo.fem import linearise
 from skthermo.studies.detectability import Arrangement, DetectabilityStudy
 from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name

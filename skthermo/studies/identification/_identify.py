@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
 from skthermo._validation import check_array
-from skthermo._warnings import warn_each, warn_user
-from skthermo._warnings_once import warnings_once
+from skthermo._warnings import warn_each, warn_user, warnings_once
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._frequency_effects import FrequencyEffects

@@ -8,9 +8,9 @@ from sklearn.base import clone
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
+from skthermo._arguments import check_model
 from skthermo._arrays import as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._models import check_model
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate.inverse import InverseSurrogate

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arguments import check_theta
+from skthermo._arguments import check_model, check_theta
 from skthermo._arrays import Array, Bounds, as_floats
 from skthermo._frames import frame_like
-from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context, check_is_fitted
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate
