@@ -69,7 +69,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
             If there are numbers that stand for a missing value, such as -999, values absurdly far from the others, or
             too few records for the rate of false alarms that is asked for.
         """
-        F = validate_data(self, X, ensure_all_finite="allow-nan", ensure_min_samples=2)
+        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
         warn_of_absurd(frame_like(X, F))
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
@@ -98,7 +98,7 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
             Dimensionless; NaN where it cannot be computed. A frame gives a series on its index.
         """
         check_is_fitted(self)
-        F = validate_data(self, X, ensure_all_finite="allow-nan", reset=False)
+        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
         index = self._index(self._records(X, F))
         return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
 

@@ -29,7 +29,7 @@ from skthermo.detection.compensation._targets import check_positions_are_names, 
 from skthermo.detection.compensation._whitening import Spread
 
 Rows = NDArray[np.intp]
-AS_FLOATS = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
+AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
 class TemperatureCompensator(TransformerMixin, BaseEstimator):
