@@ -16,7 +16,8 @@ from page_recipes import command_line, save_figures
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting import IdentifiedDamageDisplay, PODCurveDisplay
-from skthermo.studies import DetectabilityStudy, identify_damage, report, sweep
+from skthermo.reporting import owner_report
+from skthermo.studies import DetectabilityStudy, identify_damage, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 options = command_line().parse_args()
@@ -62,10 +63,11 @@ IdentifiedDamageDisplay.from_predictions(identified)
 # %%
 # The page for the owner
 # ----------------------
-# :func:`~skthermo.studies.report` writes one HTML file that needs nothing else: it can be sent by e-mail and printed.
+# :func:`~skthermo.reporting.owner_report` writes one HTML file that needs nothing else: it can be sent by e-mail and
+# printed.
 
 options.figures.mkdir(parents=True, exist_ok=True)
-path = report(
+path = owner_report(
     study, options.figures / "truss_report.html", identified=identified, title="Monitoring of the truss bridge"
 )
 print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")

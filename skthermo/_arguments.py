@@ -1,6 +1,6 @@
-"""Checks of theta, bounds, priors, noise and degrees of freedom.
+"""Checks of theta, bounds, priors, noise, degrees of freedom and units.
 
-Each returns its argument as an array, or raises a ValueError that says what was got and what was expected.
+Each check returns its argument as an array, or raises a ValueError that says what was got and what was expected.
 """
 
 from collections.abc import Mapping, Sequence
@@ -99,6 +99,12 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     if (counts > 1).any():
         raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
     return array.astype(np.intp)
+
+
+def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:
+    """Whether all known ratios of measured to expected frequencies are about 2 pi: rad/s given in place of Hz."""
+    offsets = np.abs(np.asarray(ratios, dtype=float) / (2 * np.pi) - 1)
+    return bool(np.isfinite(offsets).any() and not (offsets >= tolerance).any())
 
 
 def _pair(width: Any, name: str) -> Any:

@@ -122,3 +122,20 @@ def as_random_state(seed: Any) -> np.random.RandomState:
 def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """At most that many of the rows, spread evenly over them."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
+
+
+def patterns(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Different rows of a mask, and which of them each row is."""
+    if mask.all():
+        return mask[:1], np.zeros(len(mask), dtype=np.intp)
+    packed = np.packbits(mask, axis=1)
+    keys = np.ascontiguousarray(packed).view(np.dtype((np.void, packed.shape[1]))).ravel()
+    first, of_row = np.unique(keys, return_index=True, return_inverse=True)[1:]
+    return mask[first], of_row.ravel()
+
+
+def rows_by_pattern(mask: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Different rows of a mask, each with the positions at which it occurs."""
+    masks, of_row = patterns(mask)
+    order = np.argsort(of_row, kind="stable")
+    return list(zip(masks, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True)) if len(mask) else []

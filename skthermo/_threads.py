@@ -61,9 +61,11 @@ def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item
     Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) apply to these Python threads too. Closing
     the iterator waits for the items that are running and skips the rest.
     """
-    n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
+    n_threads = 1
+    if len(items) > 1:
+        n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
     with single_blas_thread():
-        if min(n_threads, len(items)) < 2:
+        if n_threads < 2:
             yield from map(function, items)
         else:
             with ThreadPoolExecutor(n_threads) as pool:

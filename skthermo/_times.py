@@ -1,6 +1,6 @@
 """When a record was taken: its time on a DatetimeIndex, else its number."""
 
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -19,24 +19,24 @@ def row_times(T: Any) -> Array:
 
 
 def time_of(T: Any, moment: Any, what: str) -> float:
-    """A number of a record, or a time, on the scale of `row_times`.
+    """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last.
 
     Raises
     ------
     ValueError
         If it is neither.
     """
-    if isinstance(moment, Real) and not isinstance(moment, bool) and np.isfinite(float(moment)):
-        times = row_times(T)
-        return float(np.interp(float(moment), np.arange(len(times)), times)) if moment < len(times) else np.inf
+    times, is_timed = row_times(T), _has_stamps(T)
+    if isinstance(moment, Integral) and not isinstance(moment, bool) and moment >= 0:
+        return float(times[moment]) if moment < len(times) else np.inf
     try:
-        if _has_stamps(T):
+        if is_timed and not isinstance(moment, Real):
             return float((pd.Timestamp(moment).as_unit("ns") - T.index[0].as_unit("ns")).value)
     except (TypeError, ValueError):
         pass
-    zone = f" in the time zone {T.index.tz}" if _has_stamps(T) and T.index.tz is not None else ""
-    expected = f"the number of a record, or a time{zone}" if _has_stamps(T) else "the number of a record"
-    raise ValueError(f"{what} is {moment!r}; expected {expected}")
+    zone = f" in the time zone {T.index.tz}" if is_timed and T.index.tz is not None else ""
+    expected = f"a position from 0, or a time{zone}" if is_timed else "a position from 0"
+    raise ValueError(f"{what} is {moment!r} for {len(times)} records; expected {expected}")
 
 
 def _has_stamps(T: Any) -> bool:

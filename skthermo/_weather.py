@@ -14,11 +14,8 @@ from sklearn.preprocessing import StandardScaler
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
 
-FAR = 0.25
-"""A temperature farther outside the range of training than this many times its width counts as unknown weather."""
-
-EXPLAINED = 0.99
-"""Share of the variance of the weather that its coordinates keep."""
+FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
+EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 
 
 @dataclass(frozen=True)
@@ -48,10 +45,10 @@ class TrainingRange:
         if not known.any():
             return f"none of {len(values)} rows can be predicted: each lacks a temperature or a lagged one"
         limits = np.array([np.fmin.reduce(values), np.fmax.reduce(values)])
-        if (np.nan_to_num(self.excess(limits)) <= FAR).all():
+        if (np.nan_to_num(self.excess(limits)) <= FAR_OUTSIDE).all():
             return ""
         excess = np.where(known[:, np.newaxis], self.excess(inputs), 0.0)
-        rows = (excess > FAR).any(axis=1)
+        rows = (excess > FAR_OUTSIDE).any(axis=1)
         if not rows.any():
             return ""
         column = int(excess.max(axis=0).argmax())

@@ -1,8 +1,18 @@
 """One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen."""
 
 import os
+import sys
+
+import pytest
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture
+def in_process(request, monkeypatch):
+    """Files are read in this process, as in a frozen program, which saves half a second for each."""
+    if getattr(request, "param", True):
+        monkeypatch.setattr(sys, "frozen", True, raising=False)

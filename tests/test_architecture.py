@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import functools
 import pkgutil
 import subprocess
 import sys
@@ -46,11 +47,17 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "studies.identification": {"studies.scenarios"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
-TREES = {path: ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+@functools.cache
+def nodes(path):
+    """All nodes of a file's syntax tree."""
+    return list(ast.walk(ast.parse(path.read_text())))
 
 
 def imported_modules(path):
-    for node in ast.walk(TREES[path]):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -75,7 +82,7 @@ def may_import(room):
 
 def test_arrows_point_one_way():
     against = []
-    for path in TREES:
+    for path in FILES:
         room = ".".join(package_of(path))
         for module in own_imports(path):
             package = ".".join(part for part in module if not part.startswith("_"))
@@ -89,7 +96,7 @@ def test_arrows_point_one_way():
 
 
 def test_every_package_has_its_arrows():
-    packages = {".".join(package_of(path)) for path in TREES if path.name == "__init__.py"}
+    packages = {".".join(package_of(path)) for path in FILES if path.name == "__init__.py"}
     public = {package for package in packages if package and not package.startswith("_")}
     assert public <= {*MAY_IMPORT, *WITHIN}
 
@@ -102,12 +109,12 @@ def test_the_guide_for_contributors_shows_the_arrows():
 
 
 def test_what_every_room_uses_uses_no_room():
-    shared = [path for path in TREES if not package_of(path) or package_of(path)[0].startswith("_")]
+    shared = [path for path in FILES if not package_of(path) or package_of(path)[0].startswith("_")]
     assert not [(path, module) for path in shared for module in own_imports(path) if not module[0].startswith("_")]
 
 
 def test_private_modules_are_for_their_own_package():
-    for path in TREES:
+    for path in FILES:
         package = package_of(path)
         for module in own_imports(path):
             private = next((i for i, part in enumerate(module) if part.startswith("_")), None)
@@ -119,7 +126,7 @@ def test_private_modules_are_for_their_own_package():
 
 def test_no_circle_of_modules():
     imports = {}
-    for path in TREES:
+    for path in FILES:
         name = ".".join([*package_of(path), path.stem]).removesuffix(".__init__")
         imports[name] = {".".join(module) for module in own_imports(path)}
     done, open_now = set(), []
@@ -139,14 +146,14 @@ def test_no_circle_of_modules():
 
 def test_only_core_dependencies_are_imported():
     allowed = CORE | set(sys.stdlib_module_names)
-    for path in TREES:
+    for path in FILES:
         others = {module for module in imported_modules(path) if module.split(".")[0] not in allowed}
         assert not others, f"{path} imports {others}, which are no core dependencies"
 
 
 def test_private_scikit_learn_is_imported_in_one_place():
-    for path, tree in TREES.items():
-        for node in ast.walk(tree):
+    for path in FILES:
+        for node in nodes(path):
             if isinstance(node, ast.ImportFrom) and node.module.startswith("sklearn") and path.name != "_validation.py":
                 names = [*node.module.split("."), *(alias.name for alias in node.names)]
                 private = [name for name in names if name.startswith("_")]

@@ -1,6 +1,7 @@
 """Bad inputs to every public name: each is a clear error or one warning, none is silent."""
 
 import re
+import traceback
 import warnings
 from pathlib import Path
 
@@ -154,10 +155,7 @@ def chain(model=TRUSS, **parts):
 
 THETA = [
     ("a string", lambda: check_theta("stiff", NAMES), "error", "theta is 'stiff'; expected numbers"),
-    ("None", lambda: check_theta(None, NAMES), "error", "theta is None"),
     ("a mapping", lambda: check_theta({"top": 1.0}, NAMES), "error", "theta is .*expected numbers"),
-    ("complex", lambda: check_theta(ONES + 1j, NAMES), "error", "theta is complex"),
-    ("sparse", lambda: check_theta(scipy.sparse.csr_array(ONES), NAMES), "error", "theta is a sparse"),
     ("ragged rows", lambda: check_theta([[1, 1, 1, 1], [1, 1]], NAMES), "error", "theta is .*expected numbers"),
     ("too few columns", lambda: check_theta(ONES[:, :3], NAMES), "error", r"shape \(3, 3\); expected \(n_samples, 4\)"),
     ("a number", lambda: check_theta(1.0, NAMES), "error", r"shape \(\); expected"),
@@ -181,7 +179,6 @@ THETA = [
 ]
 
 BOUNDS = [
-    ("None", lambda: check_bounds(None, NAMES), "error", "bounds is None"),
     ("a string", lambda: check_bounds("wide", NAMES), "error", "bounds is 'wide'; expected"),
     ("zero width", lambda: check_bounds(0, NAMES), "error", "half-width between 0 and 1"),
     ("percent", lambda: check_bounds(30, NAMES), "error", "bounds is 30.*half-width between 0 and 1"),
@@ -194,7 +191,6 @@ BOUNDS = [
     ("lowest of zero", lambda: check_bounds([[0.0, 0.8]] * 4, NAMES), "error", "0 < lowest < highest"),
     ("highest infinite", lambda: check_bounds([[0.5, INF]] * 4, NAMES), "error", "0 < lowest < highest"),
     ("NaN in a row", lambda: check_bounds([[0.5, NAN]] * 4, NAMES), "error", "0 < lowest < highest"),
-    ("complex", lambda: check_bounds(0.3j, NAMES), "error", "bounds is complex"),
     ("a parameter left out", lambda: check_bounds({"top": 0.3}, NAMES), "error", "'bottom'.* are missing"),
     (
         "an unknown parameter",
@@ -223,7 +219,6 @@ BOUNDS = [
         "'bottom' are 30; expected",
     ),
     ("text pair", lambda: check_bounds(dict.fromkeys(NAMES, ("a", "b")), NAMES), "error", "bounds.*expected"),
-    ("prior None", lambda: check_prior(None, NAMES), "error", "prior is None; expected numbers"),
     ("prior of text", lambda: check_prior("wide", NAMES), "error", "prior is 'wide'; expected"),
     ("prior zero", lambda: check_prior(0, NAMES), "error", r"prior is 0.* above 0, a number or one for each"),
     ("prior negative", lambda: check_prior([0.1, -0.1, 0.1, 0.1], NAMES), "error", "standard deviations above 0"),
@@ -231,7 +226,6 @@ BOUNDS = [
     ("prior infinite", lambda: check_prior(INF, NAMES), "error", "prior is inf; expected"),
     ("prior of other width", lambda: check_prior([0.1, 0.1], NAMES), "error", r"prior is \[0.1 0.1\]; expected"),
     ("prior a table", lambda: check_prior([[0.1] * 4], NAMES), "error", "one for each of"),
-    ("prior complex", lambda: check_prior(0.1j, NAMES), "error", "prior is complex"),
     ("prior of one parameter", lambda: check_prior({"top": 0.1}, NAMES), "error", "prior: .*'bottom'.* are missing"),
     ("prior of a group", lambda: check_prior(dict.fromkeys([*NAMES, "deck"], 0.1), NAMES), "error", "'deck'.* unknown"),
     ("prior of pairs", lambda: check_prior(dict.fromkeys(NAMES, (0.1, 0.2)), NAMES), "error", "one for each of"),
@@ -255,29 +249,22 @@ NOISE = [
         "error",
         r"noise is \[0.01 0.01\].*each of the 6 modes",
     ),
-    ("noise None", lambda: check_noise(None, 6), "error", "noise.*expected"),
-    ("frequencies None", lambda: add_noise(None, 0.01), "error", "frequencies.*expected"),
-    ("frequencies complex", lambda: add_noise(NOMINAL + 1j, 0.01), "error", "complex"),
     ("a generator", lambda: add_noise(NOMINAL, 0.01, random_state=GENERATOR), "error", "random_state is"),
     ("noise in percent", lambda: add_noise(NOMINAL, 1), "error", "noise is 1"),
     ("noise a string", lambda: check_noise("low", 6), "error", "noise.*expected"),
-    ("noise complex", lambda: check_noise(0.01j, 6), "error", "complex"),
 ]
 
 AFFINE = [
     ("parameters None", lambda: TRUSS.with_parameters(None), "error", "expected"),
     ("strengthened in percent", lambda: TRUSS.damaged({"top": -15}), "error", "-15"),
-    ("text", lambda: affine([["a"]], [[1.0]]), "error", "stiffness.*expected"),
     ("no terms", lambda: AffineModel({}, EYE, n_modes=1), "error", "stiffness"),
     ("stiffness None", lambda: AffineModel(None, EYE, n_modes=1), "error", "stiffness"),
     ("a bare matrix", lambda: AffineModel(EYE, EYE, n_modes=1), "error", "no term names a parameter; expected"),
     ("not square", lambda: affine(np.ones((2, 3))), "error", r"shape \(2, 3\)"),
     ("not symmetric", lambda: affine([[2.0, 1.0], [0.0, 2.0]]), "error", "symmetric"),
     ("NaN", lambda: affine([[NAN, 0], [0, 1]]), "error", "finite"),
-    ("complex", lambda: affine(1j * EYE), "error", "complex"),
     ("a mechanism", lambda: affine([[1.0, -1.0], [-1.0, 1.0]]), "error", "mechanism"),
     ("other mass", lambda: affine(STIFF, np.eye(3)), "error", "mass.*shape"),
-    ("mass None", lambda: affine(STIFF, None), "error", "mass"),
     ("mass negative", lambda: affine(STIFF, -EYE), "error", "negative eigenvalue"),
     ("too many modes", lambda: affine(STIFF, n_modes=3), "error", "n_modes is 3"),
     ("no modes", lambda: affine(STIFF, n_modes=0), "error", "n_modes is 0"),
@@ -433,8 +420,6 @@ MODAL = [
     ("a seed of text", lambda: sample(TRUSS, random_state="7"), "error", "random_state is '7'"),
     ("a negative seed", lambda: sample(TRUSS, random_state=-1), "error", "random_state is -1"),
     ("step zero", lambda: linearise(ONE_MODE, [[1.0]], step=0), "error", "step is 0"),
-    ("mac of None", lambda: mac(None, EYE), "error", "expected"),
-    ("mac of text", lambda: mac([["a"]], EYE), "error", "expected"),
     ("mac of other rows", lambda: mac(np.ones((3, 1)), EYE), "error", "3 degrees of freedom and phi_b 2"),
     ("mac of a number", lambda: mac(1.0, 1.0), "error", "shape"),
     ("shapes of a program", lambda: shape_jacobian(ONE_MODE, [1.0]), "error", "no method 'local_modes'"),
@@ -452,7 +437,6 @@ MODAL = [
     ("order of None", lambda: share_reordered(None, ONES), "error", "None"),
     ("order in a program", lambda: share_reordered(ONE_MODE, [[1.0]]), "error", "no method 'modes'"),
     ("order of no rows", lambda: share_reordered(TRUSS, np.ones((0, 4))), "error", "theta"),
-    ("match with None", lambda: match_modes(TRUSS, None), "error", "frequencies is None|expected"),
     (
         "match with too many",
         lambda: match_modes(TRUSS, np.ones((1, 50))),
@@ -460,7 +444,6 @@ MODAL = [
         "50 modes were measured; expected at most",
     ),
     ("match with negative", lambda: match_modes(TRUSS, -NOMINAL), "error", "expected"),
-    ("match with text", lambda: match_modes(TRUSS, ["a"] * 6), "error", "expected"),
     ("match shapes, no dofs", lambda: match_modes(TRUSS, NOMINAL, shapes=np.ones((2, 6))), "error", "dofs"),
     (
         "match wrong shapes",
@@ -468,15 +451,8 @@ MODAL = [
         "error",
         r"shape \(3, 6\); expected \(2, 6\)",
     ),
-    ("no model", lambda: evaluate(None, ONES), "error", "model is None; expected"),
-    ("a class", lambda: evaluate(AffineModel, ONES), "error", "model is .*; expected"),
-    ("a regressor", lambda: evaluate(Ridge(), ONES), "error", r"model is Ridge\(\); expected"),
-    ("sample of None", lambda: sample(None), "error", "model is None; expected"),
-    ("linearise None", lambda: linearise(None, ONES), "error", "model is None; expected"),
     ("n_jobs text", lambda: evaluate(TRUSS, ONES, n_jobs="2"), "error", "n_jobs is '2'"),
     ("n_jobs zero", lambda: evaluate(TRUSS, ONES, n_jobs=0), "error", "n_jobs"),
-    ("mac of a sparse matrix", lambda: mac(scipy.sparse.eye_array(2), EYE), "error", "sparse"),
-    ("match with no model", lambda: match_modes(None, NOMINAL), "error", "model is None; expected"),
 ]
 
 PREPROCESSING = [
@@ -521,11 +497,7 @@ PREPROCESSING = [
     ("stamps lost", lambda: LAGS.transform(HOURLY.reset_index(drop=True)), "error", "stamp|Datetime"),
     ("one stamp", lambda: LagFeatures(2).fit(HOURLY[:1]), "error", "expected freq"),
     ("no rows", lambda: LagFeatures(2).fit(HOURLY[:0]), "error", "0 sample"),
-    ("text in X", lambda: LagFeatures(2).fit([["cold"], ["warm"]]), "error", "'cold'.*expected numbers"),
-    ("complex X", lambda: LagFeatures(2).fit([[1j], [2j]]), "error", "X holds complex numbers; expected"),
-    ("sparse X", lambda: LagFeatures(2).fit(scipy.sparse.eye_array(3)), "error", "[Ss]parse"),
     ("infinite X", lambda: LagFeatures(2).fit([[1.0], [INF]]), "error", "infinity"),
-    ("X None", lambda: LagFeatures(2).fit(None), "error", "Expected 2D array"),
     ("a vector", lambda: LagFeatures(2).fit([1.0, 2.0]), "error", "2D array"),
     ("other sensors", lambda: LAGS.transform(HOURLY.rename(columns={"T1": "T2"})), "error", "feature names"),
     ("before fit", lambda: LagFeatures(2).transform(HOURLY), "error", "not fitted"),
@@ -534,11 +506,9 @@ PREPROCESSING = [
     ("weights unknown", lambda: KNNGapImputer(weights="near").fit(F), "error", "'weights'"),
     ("imputer, other width", lambda: KNNGapImputer().fit(F).transform(F.iloc[:, :3]), "error", "feature"),
     ("imputer, infinite", lambda: KNNGapImputer().fit([[1.0], [INF]]), "error", "infinity"),
-    ("imputer, text", lambda: KNNGapImputer().fit([["a"], ["b"]]), "error", "'a'.*expected numbers"),
     ("imputer, empty", lambda: KNNGapImputer().fit(F[:0]), "error", "0 sample"),
     ("imputer, -999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "warning", "-999"),
     ("reference of other modes", lambda: BiasAligner([1.0, 2.0]).fit(F), "error", r"shape \(2,\)"),
-    ("reference of text", lambda: BiasAligner(["a"] * 6).fit(F), "error", "reference is .*expected numbers"),
     ("reference a string", lambda: BiasAligner("model").fit(F), "error", "'reference'"),
     ("reference of NaN", lambda: BiasAligner([NAN] * 6).fit(F), "error", "reference"),
     ("reference a class", lambda: BiasAligner(AffineModel).fit(F), "error", "reference"),
@@ -578,7 +548,6 @@ PREPROCESSING = [
         "error",
         r"\['f1'\] are missing in all 365",
     ),
-    ("aligner, text", lambda: BiasAligner().fit([["a"], ["b"]]), "error", "'a'.*expected numbers"),
     ("aligner, infinite", lambda: BiasAligner().fit([[1.0], [INF]]), "error", "infinity"),
     ("freq of business days", lambda: LagFeatures(2, freq=pd.offsets.BDay()).fit(HOURLY), "error", "freq is"),
     ("tolerance of months", lambda: LagFeatures(2, tolerance="1M").fit(HOURLY), "error", "tolerance is '1M'"),
@@ -608,10 +577,6 @@ DETECTION = [
     ),
     ("a mode twice", lambda: MahalanobisDetector().fit(F.join(F["f1"].rename("f7"))), "error", "expected"),
     ("an infinite value", lambda: MahalanobisDetector().fit(changed(F, 0, 0, INF)), "error", "infinity"),
-    ("text", lambda: MahalanobisDetector().fit([["a"], ["b"]]), "error", "numeric|expected numbers"),
-    ("complex", lambda: MahalanobisDetector().fit(F.to_numpy() + 1j), "error", "[Cc]omplex"),
-    ("sparse", lambda: MahalanobisDetector().fit(scipy.sparse.csr_array(F)), "error", "[Ss]parse"),
-    ("None", lambda: MahalanobisDetector().fit(None), "error", "None"),
     ("other modes", lambda: DETECTOR.predict(F.iloc[:, ::-1]), "error", "feature names"),
     ("fewer modes", lambda: DETECTOR.damage_index(F.iloc[:, :5]), "error", "feature names"),
     ("no rows", lambda: DETECTOR.predict(F[:0]), "error", "0 sample"),
@@ -718,17 +683,12 @@ DETECTION = [
 ]
 
 METRICS = [
-    ("damage index None", lambda: probability_of_false_alarm(None, 3.0), "error", "damage_index is None"),
     ("damage index a table", lambda: probability_of_false_alarm([[1.0]], 3.0), "error", r"shape \(1, 1\)"),
-    ("damage index text", lambda: probability_of_detection(["a"], 3.0), "error", "damage_index is .*expected numbers"),
-    ("damage index complex", lambda: probability_of_detection([1j], 3.0), "error", "damage_index is complex"),
-    ("damage index sparse", lambda: probability_of_detection(scipy.sparse.eye_array(2), 3.0), "error", "sparse"),
     ("threshold None", lambda: probability_of_false_alarm([1.0], None), "error", "threshold is None"),
     ("threshold NaN", lambda: probability_of_false_alarm([1.0], NAN), "error", "threshold is nan"),
     ("threshold infinite", lambda: probability_of_detection([1.0], INF), "error", "threshold is inf"),
     ("thresholds", lambda: probability_of_detection([1.0], [1.0, 2.0]), "error", "threshold is"),
     ("time to detection of a table", lambda: time_to_detection([[1.0]], 3.0), "error", r"shape \(1, 1\)"),
-    ("time to detection of None", lambda: time_to_detection(None, 3.0), "error", "damage_index is None"),
     ("time to detection, threshold NaN", lambda: time_to_detection([1.0], NAN), "error", "threshold is nan"),
     ("time to detection, unsorted", lambda: time_to_detection(DATED[::-1], 3.0, DATED.index[0]), "error", "in order"),
     ("onset too late", lambda: time_to_detection([1.0], 3.0, 1), "error", "onset is 1 for 1 records"),
@@ -744,7 +704,6 @@ METRICS = [
     ("severity in percent", lambda: minimum_detectable_damage([10, 20], [0.5, 1]), "error", "severities are"),
     ("severity NaN", lambda: minimum_detectable_damage([NAN], [0.5]), "error", "severities are"),
     ("severities none", lambda: minimum_detectable_damage([], []), "error", "expected two vectors"),
-    ("severities text", lambda: minimum_detectable_damage(["a"], [1.0]), "error", "severities is .*expected numbers"),
     ("other width", lambda: mape(F, F.to_numpy()[:, :5]), "error", r"y_pred \(365, 5\)"),
     ("other rows", lambda: mape(F.to_numpy(), F.to_numpy()[1:]), "error", r"\(364, 6\)"),
     ("other index", lambda: mape(F, F.shift(freq="1D")), "error", "different indices"),
@@ -753,10 +712,6 @@ METRICS = [
     ("frequency zero", lambda: mape(changed(F, 0, 0, 0.0), F), "error", "'f1' in y_true is 0"),
     ("frequency -999", lambda: mape(changed(F, 0, 0, -999.0), F), "error", "'f1' in y_true is -999"),
     ("predicted -999", lambda: mape(F, changed(F, 0, 0, -999.0)), "error", "'f1' in y_pred is -999"),
-    ("text", lambda: mape([["a"]], [[1.0]]), "error", "y_true is .*expected numbers"),
-    ("None", lambda: mape(None, F), "error", "y_true is None"),
-    ("complex", lambda: mape(NOMINAL + 1j, NOMINAL), "error", "y_true is complex"),
-    ("sparse", lambda: mape(scipy.sparse.csr_array(NOMINAL), NOMINAL), "error", "y_true is a sparse"),
     ("three axes", lambda: mape(NOMINAL[np.newaxis], NOMINAL[np.newaxis]), "error", "shape"),
     ("few scenarios", lambda: error_table(F, F, scenarios=["a"]), "error", r"scenarios has shape \(1,\)"),
     ("a missing scenario", lambda: error_table(F, F, scenarios=[None] * 365), "error", "scenario of row 0 is missing"),
@@ -764,7 +719,6 @@ METRICS = [
     ("scenarios a string", lambda: error_table(F, F, scenarios="all"), "error", "scenarios has shape"),
     ("r2 of other shapes", lambda: complete_r2(F, NOMINAL), "error", "shape"),
     ("r2 infinite", lambda: complete_r2([[1.0], [INF]], [[1.0], [2.0]]), "error", "inf"),
-    ("r2 None", lambda: complete_r2(F, None), "error", "y_pred is None"),
     ("scored, no estimator", lambda: frequency_scorer(None, T, F), "error", "estimator is None; expected"),
     ("scored, a class", lambda: frequency_scorer(Ridge, T, F), "error", "estimator is .*; expected"),
     ("scored, other modes", lambda: frequency_scorer(DummyRegressor().fit(T, F), T, F.iloc[:, :2]), "error", "shape"),
@@ -786,8 +740,6 @@ METRICS = [
 ]
 
 UPDATING = [
-    ("no model", lambda: sensitivity(None), "error", "model is None; expected"),
-    ("a class", lambda: sensitivity(AffineModel), "error", "model is .*expected"),
     ("no Jacobian", lambda: sensitivity(ONE_MODE), "error", "no method 'jacobian'"),
     ("an unknown method", lambda: sensitivity(TRUSS, method="forward"), "error", "method is 'forward'"),
     ("step of zero", lambda: sensitivity(TRUSS, method="central", step=0), "error", "step is 0"),
@@ -814,17 +766,10 @@ UPDATING = [
         "shape_noise is",
     ),
     ("unknown dofs", lambda: identifiability(TRUSS, noise=0.01, dofs=[99], shape_noise=0.1), "error", "dofs holds 99"),
-    ("no model", lambda: identifiability(None, noise=0.01), "error", "model is None; expected"),
     ("not square", lambda: cramer_rao([[1.0, 0.0]]), "error", r"shape \(1, 2\)"),
     ("a number", lambda: cramer_rao(1.0), "error", r"shape \(\)"),
-    ("None", lambda: cramer_rao(None), "error", "information is None"),
-    ("text", lambda: cramer_rao([["a"]]), "error", "information is .*expected numbers"),
-    ("complex", lambda: cramer_rao([[1j]]), "error", "information is complex"),
     ("not symmetric", lambda: cramer_rao([[1.0, 0.5], [0.0, 1.0]]), "error", "symmetric"),
     ("negative information", lambda: cramer_rao([[-1.0]]), "error", "negative"),
-    ("model None", lambda: updater(None).fit(NOMINAL), "error", "'model'"),
-    ("model a class", lambda: updater(AffineModel).fit(NOMINAL), "error", "model is"),
-    ("model of text", lambda: updater("truss").fit(NOMINAL), "error", "'model'"),
     ("bounds without one", lambda: updater(bounds=[[1.1, 1.3]] * 4).fit(NOMINAL), "error", "contain 1"),
     ("bounds of other names", lambda: updater(bounds={"E": 0.3}).fit(NOMINAL), "error", r"\['E'\] are unknown"),
     ("bounds text", lambda: updater(bounds="wide").fit(NOMINAL), "error", "'bounds'"),
@@ -837,10 +782,6 @@ UPDATING = [
     ("n_jobs text", lambda: updater(n_jobs="2").fit(NOMINAL), "error", "'n_jobs'"),
     ("n_jobs zero", lambda: updater(n_jobs=0).fit(NOMINAL), "error", "n_jobs"),
     ("a generator", lambda: updater(random_state=GENERATOR).fit(NOMINAL), "error", "'random_state'"),
-    ("F None", lambda: updater().fit(None), "error", "F is None; expected numbers"),
-    ("F of text", lambda: updater().fit(["a"] * 6), "error", "expected numbers"),
-    ("F complex", lambda: updater().fit(NOMINAL + 1j), "error", "complex"),
-    ("F sparse", lambda: updater().fit(scipy.sparse.csr_array(NOMINAL)), "error", "[Ss]parse"),
     ("F of other modes", lambda: updater().fit(NOMINAL[:, :5]), "error", "5 columns; expected the 6 modes"),
     ("F negative", lambda: updater().fit(-NOMINAL), "error", "expected Hz above 0"),
     ("F -999", lambda: updater().fit(changed(F, 2, 0, -999.0)), "error", "'f1' of record 2 is -999"),
@@ -933,8 +874,6 @@ DATASETS = [
     ("a generator", lambda: make_truss_campaign(random_state=GENERATOR), "error", "random_state is Generator"),
     ("kelvin", lambda: steel_modulus([293.15, 300.0]), "error", "kelvin|temperature"),
     ("text", lambda: steel_modulus("cold"), "error", "temperature is 'cold'; expected numbers"),
-    ("None", lambda: steel_modulus(None), "error", "temperature is None"),
-    ("complex", lambda: steel_modulus(1j), "error", "temperature is complex"),
     ("no file", lambda: load_z24("no_such_file.csv"), "error", "no_such_file.csv is not a file"),
     ("a folder", lambda: load_z24(Path(__file__).parent), "error", "is not a file"),
     ("not that data", lambda: load_z24(__file__), "error", "header"),
@@ -948,10 +887,7 @@ DATASETS = [
 SURROGATE = [
     ("scored on other modes", lambda: CHAIN.score(T, F.iloc[:, :5]), "error", "5 columns; expected|shape"),
     ("a frequency of -999", lambda: chain().fit(T, changed(F, 0, 0, -999.0)), "error", "-999"),
-    ("frequencies text", lambda: INVERSE.transform([["a"] * 6]), "error", "'a'.*expected numbers"),
     ("no model, no theta", lambda: InverseSurrogate().fit(), "error", "expected theta"),
-    ("model a class", lambda: InverseSurrogate(AffineModel).fit(), "error", "model is"),
-    ("model of text", lambda: InverseSurrogate("truss").fit(), "error", "'model'"),
     ("regressor of text", lambda: InverseSurrogate(TRUSS, "mlp").fit(), "error", "'regressor'"),
     ("regressor a class", lambda: InverseSurrogate(TRUSS, Ridge).fit(), "error", "instance of scikit-learn"),
     ("bounds in percent", lambda: InverseSurrogate(TRUSS, bounds=30).fit(), "error", "half-width between 0 and 1"),
@@ -1007,7 +943,6 @@ SURROGATE = [
     ),
     ("theta of other width", lambda: INVERSE.inverse_transform([[1.0, 1.0]]), "error", r"shape \(1, 2\)"),
     ("fewer theta than F", lambda: InverseSurrogate().fit(F.to_numpy(), ONES), "error", "365|inconsistent"),
-    ("mapper, no theta", lambda: TemperatureMapper(Ridge()).fit(T, None), "error", "y"),
     ("mapper, text", lambda: TemperatureMapper("ridge").fit(T, np.ones((365, 4))), "error", "'regressor'"),
     (
         "mapper, a class",
@@ -1023,36 +958,7 @@ SURROGATE = [
         "error",
         "feature names",
     ),
-    (
-        "sensitivities of other parameters",
-        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(3)).fit(T, np.ones((365, 4))),
-        "error",
-        r"shape \(3, 3\); expected finite numbers, \(n_modes, 4\)",
-    ),
-    (
-        "sensitivities of NaN",
-        lambda: TemperatureMapper(Ridge(), sensitivities=NAN * np.eye(4)).fit(T, np.ones((365, 4))),
-        "error",
-        "sensitivities have shape .*finite numbers",
-    ),
-    (
-        "sensitivities of negative parameters",
-        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(4)).fit(T, -np.ones((365, 4))),
-        "error",
-        "theta falls to -1; expected positive multipliers",
-    ),
-    (
-        "damping negative",
-        lambda: TemperatureMapper(Ridge(), sensitivities=np.eye(4), damping=[-1.0] * 4).fit(T, np.ones((365, 4))),
-        "error",
-        "damping is .*; expected one number from 0, or 4",
-    ),
-    (
-        "damping of other parameters",
-        lambda: TemperatureMapper(Ridge(), damping=[1.0, 1.0]).fit(T, np.ones((365, 4))),
-        "error",
-        r"damping is \[1. 1.\]; expected one number from 0, or 4",
-    ),
+    ("coordinates of text", lambda: TemperatureMapper(coordinates="modes").fit(T, ONES), "error", "'coordinates'"),
     (
         "weights of other rows",
         lambda: TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=[1.0, 2.0]),
@@ -1060,19 +966,12 @@ SURROGATE = [
         r"sample_weight.shape == \(2,\), expected \(365,\)",
     ),
     ("a network of text", lambda: paper_network("big"), "error", "'big'"),
-    ("no model", lambda: chain(None).fit(T, F), "error", "'model'"),
-    ("a class", lambda: chain(AffineModel).fit(T, F), "error", "model is"),
-    ("no frequencies", lambda: chain().fit(T, None), "error", "y"),
-    ("no temperatures", lambda: chain().fit(None, F), "error", "Expected 2D array"),
     ("other lengths", lambda: chain().fit(T, F[1:]), "error", "365 rows and frequencies 364"),
     ("other index", lambda: chain().fit(T, F.shift(freq="1D")), "error", "different indices"),
     ("other number of modes", lambda: chain().fit(T, F.iloc[:, :5]), "error", "5 columns; expected the 6 modes"),
     ("a sensor of NaN", lambda: chain().fit(changed(T, slice(None), 0, NAN), F), "error", "'T1' is NaN in all"),
     ("a constant sensor", lambda: chain().fit(changed(T, slice(None), 0, 5.0), F), "error", "'T1' is constant"),
     ("a mode of NaN", lambda: chain().fit(T, changed(F, slice(None), 1, NAN)), "error", "'f2' is NaN in all"),
-    ("text", lambda: chain().fit([["cold"]] * 365, F), "error", "'cold'.*expected numbers"),
-    ("complex", lambda: chain().fit(T, F.to_numpy() + 1j), "error", "[Cc]omplex"),
-    ("sparse", lambda: chain().fit(scipy.sparse.csr_array(T), F), "error", "[Ss]parse"),
     ("infinite", lambda: chain().fit(changed(T, 0, 0, INF), F), "error", "infinity"),
     ("one row", lambda: chain().fit(T[:1], F[:1]), "error", "1 sample"),
     ("rad/s", lambda: chain().fit(T, F * 2 * np.pi), "warning", "rad/s"),
@@ -1102,8 +1001,6 @@ SURROGATE = [
     ("interval before fit", lambda: chain().predict_interval(T), "error", "not fitted"),
     ("residuals before fit", lambda: chain().residuals_, "error", "not fitted"),
     ("interval of other sensors", lambda: CHAIN.predict_interval(T.iloc[:, :2]), "error", "feature names"),
-    ("unknown coordinates", lambda: chain(coordinates="modes").fit(T, F), "error", "'coordinates'"),
-    ("weighted by text", lambda: chain(weighted="yes").fit(T, F), "error", "'weighted'"),
     ("fitted noise misspelt", lambda: CHAIN.simulate(T, noise="fit"), "error", "noise is 'fit'; expected \"fitted\""),
     ("unknown damage", lambda: CHAIN.simulate(T, damage={"deck": 0.1}), "error", "'deck'"),
     ("damage in percent", lambda: CHAIN.simulate(T, damage={"top": 30}), "error", "30"),
@@ -1185,20 +1082,127 @@ FROM_THE_DEPTHS = re.compile(
 """Messages of numpy, SciPy, pandas and Python about what a wrong input led to."""
 
 
-@pytest.mark.parametrize(
-    ("call", "kind", "message"),
-    [pytest.param(*row[1:], id=f"{room}: {row[0]}") for room, rows in ROWS.items() for row in rows],
-)
-def test_bad_input_is_named(call, kind, message):
+def complaint(call, kind, message):
+    """What is wrong with the answer to a call with bad input; None if it is a clear error or one warning."""
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        try:
+            call()
+        except EXPECTED_ERRORS as error:
+            if kind != "error" or not re.search(message, str(error)):
+                return f"{error!r}, expected {kind} {message!r}"
+            if FROM_THE_DEPTHS.search(str(error).partition("expected")[0]):
+                return f"{error!r} says what it led to, not what is wrong"
+            where = traceback.extract_tb(error.__traceback__)[-1].filename
+            return None if where.startswith(CHECKED_BY) else f"{error!r} comes from {where}"
+        except Exception as error:
+            return f"{error!r}, expected {kind} {message!r}"
     if kind == "error":
-        with pytest.raises(EXPECTED_ERRORS, match=message) as caught:
-            call()
-        got = str(caught.value).partition("expected")[0]
-        assert not FROM_THE_DEPTHS.search(got)
-        assert str(caught.traceback[-1].path).startswith(CHECKED_BY)
-    else:
-        with warnings.catch_warnings(record=True) as given:
-            warnings.simplefilter("always")
-            call()
-        assert {(warning.category, warning.filename) for warning in given} == {(UserWarning, __file__)}
-        assert sum(bool(re.search(message, str(warning.message))) for warning in given) == 1
+        return f"no error, expected {message!r}"
+    if {(warning.category, warning.filename) for warning in given} != {(UserWarning, __file__)}:
+        return f"warnings are {[str(warning) for warning in given]}, expected UserWarning at the user's line"
+    said = sum(bool(re.search(message, str(warning.message))) for warning in given)
+    return None if said == 1 else f"{said} warnings say {message!r}: {[str(warning.message) for warning in given]}"
+
+
+def assert_no_complaints(rows):
+    complaints = [(cause, complaint(call, kind, message)) for cause, call, kind, message in rows]
+    wrong = [f"{cause}: {text}" for cause, text in complaints if text]
+    assert not wrong, "\n" + "\n".join(wrong)
+
+
+@pytest.mark.parametrize("room", ROWS)
+def test_bad_input_is_named(room):
+    assert_no_complaints(ROWS[room])
+
+
+NO_NUMBERS = {  # a value, and what the message says
+    "text": ([["cold"]], "expected numbers|expected .*, a number|numeric"),
+    "nothing": (None, "None|Expected 2D array"),
+    "complex numbers": ([[1j]], "[Cc]omplex"),
+    "a sparse matrix": (scipy.sparse.csr_array(np.ones((1, 1))), "[Ss]parse"),
+}
+ARRAYS = [  # what the message names, a call that takes an array of numbers, and what the call may take
+    ("theta", lambda bad: check_theta(bad, NAMES), ()),
+    ("theta", lambda bad: TRUSS.frequencies(bad), ()),
+    ("theta", lambda bad: TRUSS.jacobian(bad), ()),
+    ("theta", lambda bad: evaluate(TRUSS, bad), ()),
+    ("theta", lambda bad: linearise(TRUSS, bad), ()),
+    ("theta", lambda bad: shape_jacobian(TRUSS, bad), ()),
+    ("theta", lambda bad: share_reordered(TRUSS, bad), ()),
+    ("theta", lambda bad: sensitivity(TRUSS, bad), ("nothing",)),
+    ("theta", lambda bad: identifiability(TRUSS, bad, noise=0.01), ("nothing",)),
+    ("theta", lambda bad: INVERSE.inverse_transform(bad), ()),
+    ("bounds", lambda bad: check_bounds(bad, NAMES), ()),
+    ("prior", lambda bad: check_prior(bad, NAMES), ()),
+    ("noise", lambda bad: check_noise(bad, 6), ()),
+    ("frequencies", lambda bad: add_noise(bad, 0.01), ()),
+    ("frequencies", lambda bad: match_modes(TRUSS, bad), ()),
+    ("phi_a", lambda bad: mac(bad, EYE[:1]), ("complex numbers",)),
+    ("stiffness", lambda bad: affine(bad), ("a sparse matrix",)),
+    ("mass", lambda bad: affine([[1.0]], bad), ("a sparse matrix",)),
+    ("reference", lambda bad: BiasAligner(bad).fit(F), ("nothing",)),
+    ("damage_index", lambda bad: probability_of_detection(bad, 3.0), ()),
+    ("damage_index", lambda bad: probability_of_false_alarm(bad, 3.0), ()),
+    ("damage_index", lambda bad: time_to_detection(bad, 3.0), ()),
+    ("severities", lambda bad: minimum_detectable_damage(bad, [1.0]), ()),
+    ("pod", lambda bad: minimum_detectable_damage([0.1], bad), ()),
+    ("y_true", lambda bad: mape(bad, F), ()),
+    ("y_pred", lambda bad: mape(F, bad), ()),
+    ("y_pred", lambda bad: error_table(F, bad), ()),
+    ("y_pred", lambda bad: complete_r2(F, bad), ()),
+    ("information", lambda bad: cramer_rao(bad), ()),
+    ("F", lambda bad: updater().fit(bad), ()),
+    ("frequency_std", lambda bad: updater().fit(NOMINAL, frequency_std=bad), ("nothing",)),
+    ("temperature", lambda bad: steel_modulus(bad), ()),
+    ("", lambda bad: LagFeatures(2).fit(bad), ()),
+    ("", lambda bad: HingeFeatures().fit(bad), ()),
+    ("", lambda bad: KNNGapImputer().fit(bad), ()),
+    ("", lambda bad: BiasAligner().fit(bad), ()),
+    ("", lambda bad: MahalanobisDetector().fit(bad), ()),
+    ("", lambda bad: DETECTOR.predict(bad), ()),
+    ("", lambda bad: WindowedAlarm(2).fit(bad), ()),
+    ("", lambda bad: OutlierDetector(IsolationForest()).fit(bad), ()),
+    ("", lambda bad: compensator(targets=[0]).fit(bad), ()),
+    ("", lambda bad: INVERSE.transform(bad), ()),
+    ("", lambda bad: InverseSurrogate().fit(bad, [[1.0]]), ()),
+    ("", lambda bad: InverseSurrogate().fit([[1.0]], bad), ()),
+    ("", lambda bad: TemperatureMapper(LINEAR).fit(bad, [[1.0]]), ()),
+    ("", lambda bad: TemperatureMapper(LINEAR).fit([[1.0]], bad), ()),
+    ("", lambda bad: chain().fit(bad, F), ()),
+    ("", lambda bad: chain().fit(T, bad), ()),
+    ("", lambda bad: CHAIN.predict(bad), ()),
+    ("", lambda bad: CHAIN.simulate(bad), ()),
+]
+
+
+@pytest.mark.parametrize("cause", NO_NUMBERS)
+def test_what_is_no_array_of_numbers_is_named(cause):
+    value, message = NO_NUMBERS[cause]
+    assert_no_complaints(
+        (f"{name or 'X or y'} of call {i}", lambda call=call: call(value), "error", rf"(?s){name}.*({message})")
+        for i, (name, call, takes) in enumerate(ARRAYS)
+        if cause not in takes
+    )
+
+
+TAKES_A_MODEL = [
+    lambda bad: evaluate(bad, ONES),
+    lambda bad: sample(bad),
+    lambda bad: linearise(bad, ONES),
+    lambda bad: match_modes(bad, NOMINAL),
+    lambda bad: share_reordered(bad, ONES),
+    lambda bad: sensitivity(bad),
+    lambda bad: identifiability(bad, noise=0.01),
+    lambda bad: updater(bad).fit(NOMINAL),
+    lambda bad: InverseSurrogate(bad).fit(F.to_numpy(), None),
+    lambda bad: chain(bad).fit(T, F),
+]
+
+
+@pytest.mark.parametrize("value", [None, "truss", AffineModel, LINEAR], ids=str)
+def test_what_is_no_model_is_named(value):
+    message = r"model is .*; expected|'model' parameter .* must be|None; expected theta"
+    assert_no_complaints(
+        (f"call {i}", lambda call=call: call(value), "error", message) for i, call in enumerate(TAKES_A_MODEL)
+    )

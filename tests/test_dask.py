@@ -37,7 +37,7 @@ def cluster():
     ids=["dense", "sparse", "reduced", "program"],
 )
 def test_samples_are_those_of_one_process(model):
-    n_samples = 600 if model is TRUSS else 40
+    n_samples = 600 if model is TRUSS else 24
     expected = sample(model, 0.2, n_samples, random_state=0)
     with joblib.parallel_config("dask"):
         drawn = sample(model, 0.2, n_samples, random_state=0)
@@ -57,16 +57,16 @@ def test_a_grid_search_is_that_of_one_process():
     year = make_truss_campaign(random_state=0)
     chain = DataInformedFEM(
         TRUSS,
-        inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=200),
+        inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=100),
         mapper=TemperatureMapper(Ridge()),
         random_state=0,
     )
-    grid = {"inverse__noise": [0.005, 0.01], "mapper__regressor__alpha": [0.1, 10.0]}
-    search = GridSearchCV(chain, grid, cv=KFold(3), scoring=frequency_scorer, refit="neg_mape")
+    grid = {"mapper__regressor__alpha": [0.1, 10.0]}
+    search = GridSearchCV(chain, grid, cv=KFold(2), scoring=frequency_scorer, refit="neg_mape")
     here = clone(search).fit(year.temperatures, year.frequencies)
     with joblib.parallel_config("dask"):
         there = clone(search).fit(year.temperatures, year.frequencies)
-    for scores in ("split0_test_neg_mape", "split1_test_neg_mape", "split2_test_neg_mape"):
+    for scores in ("split0_test_neg_mape", "split1_test_neg_mape"):
         np.testing.assert_array_equal(there.cv_results_[scores], here.cv_results_[scores])
     weather = make_truss_campaign(random_state=1).temperatures
     np.testing.assert_array_equal(there.predict(weather), here.predict(weather))

@@ -8,7 +8,6 @@ import re
 import typing
 
 import pandas as pd
-import pytest
 from numpydoc.docscrape import ClassDoc, FunctionDoc
 from numpydoc.validate import validate
 
@@ -54,8 +53,10 @@ def public_callables():
 
 
 CALLABLES = list(public_callables())
-PROTOCOLS = {name for name, thing in public_objects() if getattr(thing, "_is_protocol", False)}
-ELEMENT_METHODS = ("dofs", "ends", "stiffness", "mass")
+OBJECTS = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
+PROTOCOLS = {name for name, thing in OBJECTS if getattr(thing, "_is_protocol", False)}
+ELEMENT_METHODS = ("properties", "dofs", "ends", "stiffness", "mass")
+LONGEST_SIGNATURE = 700  # characters that help() prints
 
 
 def is_contract_of_an_element(name):
@@ -64,87 +65,101 @@ def is_contract_of_an_element(name):
     return owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
 
 
-@pytest.mark.parametrize(("name", "function", "documented"), CALLABLES, ids=[c[0] for c in CALLABLES])
-def test_documented_parameters_are_the_signatures(name, function, documented):
-    if is_contract_of_an_element(name) or name in PROTOCOLS:
-        assert inspect.getdoc(documented)
-        return
-    expected = [
-        ("**" if p.kind is p.VAR_KEYWORD else "") + p.name
-        for p in inspect.signature(function).parameters.values()
-        if p.name not in ("self", "cls")
-    ]
-    documented_names = [part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")]
-    assert documented_names == expected
+DOCUMENTED = [c for c in CALLABLES if not is_contract_of_an_element(c[0]) and c[0] not in PROTOCOLS]
+CLASSES = [(name, thing) for name, thing in OBJECTS if inspect.isclass(thing)]
 
 
-@pytest.mark.parametrize(("name", "function", "documented"), CALLABLES, ids=[c[0] for c in CALLABLES])
-def test_every_public_callable_is_typed(name, function, documented):
-    if name in PROTOCOLS:
-        return  # its members are properties and methods, which are checked on the classes that follow it
+def own_parameters(function):
+    return [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
+
+
+def assert_none(wrong):
+    assert not wrong, "\n" + "\n".join(map(str, wrong))
+
+
+def test_everything_public_has_a_docstring():
+    assert_none([name for name, _, documented in CALLABLES if not inspect.getdoc(documented)])
+
+
+def test_documented_parameters_are_the_signatures():
+    wrong = []
+    for name, function, documented in DOCUMENTED:
+        expected = [("**" if p.kind is p.VAR_KEYWORD else "") + p.name for p in own_parameters(function)]
+        names = [part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")]
+        if names != expected:
+            wrong.append(f"{name}: documented {names}, expected {expected}")
+    assert_none(wrong)
+
+
+def test_documented_defaults_are_the_signatures():
+    wrong = []
+    for name, function, documented in DOCUMENTED:
+        defaults = {p.name: p.default for p in own_parameters(function)}
+        for entry in FunctionDoc(documented)["Parameters"]:
+            for parameter in entry.name.split(", ") if "default=" in entry.type else ():
+                stated, default = entry.type.split("default=")[1], defaults.get(parameter)
+                shown = "numpy.nan" if repr(default) == "nan" else repr(default).replace("'", '"')
+                if stated != shown.replace("e-0", "e-"):
+                    wrong.append(f"{name}: {parameter} has default={stated}, expected {shown}")
+    assert_none(wrong)
+
+
+def test_every_public_callable_is_typed():
+    wrong = []
     for_type_checkers = vars(skthermo.fem) | {"Samples": Samples, "pd": pd}
-    hints = typing.get_type_hints(function, localns=for_type_checkers, include_extras=True)
-    parameters = [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
-    untyped = [p.name for p in parameters if p.name not in hints]
-    assert not untyped
-    assert function.__name__ == "__init__" or "return" in hints
+    for name, function, _ in CALLABLES:
+        if name in PROTOCOLS:
+            continue  # its members are properties and methods, which are checked on the classes that follow it
+        hints = typing.get_type_hints(function, localns=for_type_checkers, include_extras=True)
+        expected = {p.name for p in own_parameters(function)} | (
+            {"return"} if function.__name__ != "__init__" else set()
+        )
+        wrong += [f"{name}: {missing}" for missing in expected - set(hints)]
+    assert_none(wrong)
+
+
+def test_signatures_are_readable():
+    wrong = []
+    for name, function, _ in CALLABLES:
+        printed = str(inspect.signature(function))
+        if len(printed) > LONGEST_SIGNATURE or "_SupportsArray" in printed:
+            wrong.append(f"{name} prints {len(printed)} characters")
+    assert_none(wrong)
 
 
 def faults(name):
-    return [(code, message) for code, message in validate(name)["errors"] if code not in NOT_ASKED]
+    return [f"{name}: {code} {message}" for code, message in validate(name)["errors"] if code not in NOT_ASKED]
 
 
-DOCUMENTED = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
+def test_docstrings_follow_numpydoc():
+    methods = {name for name, _, _ in DOCUMENTED if name.count(".") > 2}
+    objects = {name for name, _ in OBJECTS} - PROTOCOLS
+    assert_none([fault for name in sorted(objects | methods) for fault in faults(name)])
 
 
-@pytest.mark.parametrize(("name", "thing"), DOCUMENTED, ids=[d[0] for d in DOCUMENTED])
-def test_docstrings_follow_numpydoc_and_show_an_example(name, thing):
-    if name in PROTOCOLS:
-        assert "Attributes" in inspect.getdoc(thing)
-        return
-    assert not faults(name)
-    assert ">>>" in inspect.getdoc(thing), "expected an example that runs"
+def test_protocols_list_their_attributes_and_all_else_shows_an_example_that_runs():
+    expected = {name: "Attributes" if name in PROTOCOLS else ">>>" for name, _ in OBJECTS}
+    assert_none([name for name, thing in OBJECTS if expected[name] not in inspect.getdoc(thing)])
 
 
-METHODS = [c[0] for c in CALLABLES if c[0].count(".") > 2 and not is_contract_of_an_element(c[0])]
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_docstrings_of_methods_follow_numpydoc(name):
-    assert not faults(name)
-
-
-CLASSES = [d for d in DOCUMENTED if inspect.isclass(d[1])]
-
-
-@pytest.mark.parametrize(("name", "thing"), CLASSES, ids=[c[0] for c in CLASSES])
-def test_every_public_property_has_a_summary(name, thing):
-    properties = [m for m in public_members(thing).values() if isinstance(m, property | functools.cached_property)]
-    assert all((inspect.getdoc(member) or "").partition("\n")[0].endswith(".") for member in properties)
+def test_every_public_property_has_a_summary():
+    wrong = []
+    for name, thing in CLASSES:
+        for attribute, member in public_members(thing).items():
+            if isinstance(member, property | functools.cached_property):
+                summary = (inspect.getdoc(member) or "").partition("\n")[0]
+                wrong += [] if summary.endswith(".") else [f"{name}.{attribute}"]
+    assert_none(wrong)
 
 
 ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
 
 
-@pytest.mark.parametrize(("name", "thing"), CLASSES, ids=[c[0] for c in CLASSES])
-def test_every_fitted_attribute_is_documented(name, thing):
-    ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
-    fitted = {attribute for base in ours for attribute in ASSIGNED.findall(inspect.getsource(base))}
-    documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
-    assert fitted <= documented
-
-
-DOCUMENTED_DEFAULTS = [c for c in CALLABLES if not is_contract_of_an_element(c[0]) and c[0] not in PROTOCOLS]
-
-
-@pytest.mark.parametrize(
-    ("name", "function", "documented"), DOCUMENTED_DEFAULTS, ids=[c[0] for c in DOCUMENTED_DEFAULTS]
-)
-def test_documented_defaults_are_the_signatures(name, function, documented):
-    signature = inspect.signature(function).parameters
-    for parameter in FunctionDoc(documented)["Parameters"]:
-        for name in parameter.name.split(", ") if "default=" in parameter.type else ():
-            stated = parameter.type.split("default=")[1]
-            default = signature[name].default
-            shown = "numpy.nan" if repr(default) == "nan" else repr(default).replace("'", '"')
-            assert stated == shown.replace("e-0", "e-")
+def test_every_fitted_attribute_is_documented():
+    wrong = []
+    for name, thing in CLASSES:
+        ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
+        fitted = {attribute for base in ours for attribute in ASSIGNED.findall(inspect.getsource(base))}
+        documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
+        wrong += [f"{name}.{attribute}" for attribute in fitted - documented]
+    assert_none(wrong)

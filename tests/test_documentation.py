@@ -46,6 +46,11 @@ def test_a_pages_examples_print_what_it_shows(page):
     assert tried > failed == 0
 
 
+def test_pages_import_nothing_private():
+    private = {page.name: re.findall(r"(?:from|import) skthermo[\w.]*\._.*", page.read_text()) for page in PAGES}
+    assert not {page: imports for page, imports in private.items() if imports}
+
+
 def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
 

@@ -9,14 +9,11 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._arrays import Matrix
-from skthermo._io._matlab import read_matlab
-from skthermo._io._matrix_market import read_matrix_market
-from skthermo._io._memory_limit import MemoryLimit
-from skthermo._io._npz import read_npz, read_sparse_npz
-from skthermo._io._triplets import HALF_SUFFIXES, read_half
+from skthermo._io._damaged import read_files, read_matlab
 
-READERS = {".mtx": read_matrix_market, ".npz": read_sparse_npz} | dict.fromkeys(HALF_SUFFIXES, read_half)
-FORMATS = f"a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of files {', '.join(READERS)}"
+HALVES = dict.fromkeys((".sti", ".mas", ".txk", ".txm"), "lines of row, column and value")
+FORMS = {".mtx": "Matrix Market", ".npz": "a sparse matrix of scipy.sparse.save_npz"} | HALVES
+FORMATS = f"a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of files {', '.join(FORMS)}"
 
 
 def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
@@ -34,15 +31,15 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str,
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected {FORMATS}")
     if path.is_dir():
-        matrices = _read_folder(path, is_used)
-    elif path.suffix.lower() == ".mat":
-        matrices = read_matlab(path, complex_too=True)
-    elif path.suffix.lower() == ".npz":
-        arrays = read_npz(path, MemoryLimit(path.stat().st_size))
-        matrices = {name: _matrix(array) for name, array in arrays.items()}
-    else:
+        return _read_folder(path, is_used)
+    if path.suffix.lower() not in (".mat", ".npz"):
         raise ValueError(f"{path} is none of these: {FORMATS}")
-    return {name: _real_if_exact(matrix) for name, matrix in matrices.items()}
+    values = read_matlab(path) if path.suffix.lower() == ".mat" else read_files([(path, ".npz")])[0]
+    return {name: value if _is_matrix(value) else None for name, value in values.items()}
+
+
+def _is_matrix(value: Any) -> bool:
+    return scipy.sparse.issparse(value) or (isinstance(value, np.ndarray) and value.ndim == 2)
 
 
 def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
@@ -50,41 +47,19 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matr
 
     Files that state no size are taken to be of the largest of their sizes: the last rows of a mass may be zero.
     """
-    found = [file for file in folder.iterdir() if file.suffix.lower() in READERS]
+    found = [file for file in folder.iterdir() if file.suffix.lower() in FORMS]
     files = sorted(found, key=lambda file: [int(s) if s.isdecimal() else s for s in re.split(r"(\d+)", file.name)])
-    limit = MemoryLimit(sum(file.stat().st_size for file in files if is_used(file.stem)))
-    matrices: dict[str, Matrix | None] = {}
-    suffixes: dict[str, str] = {}
-    for file in files:
-        if not is_used(file.stem):
-            matrices[file.stem] = None
-            continue
-        suffix = file.suffix.lower()
-        if file.stem in suffixes:
-            both = f"{suffixes[file.stem]} and as {suffix}"
-            raise ValueError(f"{folder} holds {file.stem!r} as {both}; expected one of them, or another name for one")
-        suffixes[file.stem] = suffix
-        matrices[file.stem] = _matrix(READERS[suffix](file, limit))
-    if not matrices:
+    if not files:
         raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
-    halves: list[Any] = [matrices[name] for name, suffix in suffixes.items() if suffix in HALF_SUFFIXES]
+    used: dict[str, Path] = {}
+    for file in filter(lambda file: is_used(file.stem), files):
+        if file.stem in used:
+            both = f"{used[file.stem].suffix.lower()} and as {file.suffix.lower()}"
+            raise ValueError(f"{folder} holds {file.stem!r} as {both}; expected one of them, or another name for one")
+        used[file.stem] = file
+    read = read_files([(file, FORMS[file.suffix.lower()]) for file in used.values()]) if used else []
+    matrices = dict.fromkeys(file.stem for file in files) | dict(zip(used, read, strict=True))
+    halves: list[Any] = [matrices[name] for name, file in used.items() if file.suffix.lower() in HALVES]
     for half in halves:
         half.resize([max(matrix.shape[0] for matrix in halves)] * 2)
     return matrices
-
-
-def _matrix(matrix) -> Matrix | None:
-    if matrix.ndim != 2 or matrix.dtype.kind not in "fiubc":
-        return None
-    dtype = complex if matrix.dtype.kind == "c" else float
-    if scipy.sparse.issparse(matrix):
-        return scipy.sparse.csc_array(matrix, dtype=dtype)
-    return matrix.astype(dtype, copy=False)
-
-
-def _real_if_exact(matrix: Matrix | None) -> Matrix | None:
-    """The real part, where the imaginary part is zero."""
-    if matrix is None or not np.iscomplexobj(matrix):
-        return matrix
-    values = np.asarray(matrix.data if scipy.sparse.issparse(matrix) else matrix)
-    return matrix if values.imag.any() else matrix.real

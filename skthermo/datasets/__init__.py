@@ -1,12 +1,9 @@
 """Structures and monitoring campaigns to learn and test with."""
 
-from skthermo.datasets._campaign import make_truss_campaign, steel_modulus
-from skthermo.datasets._kw51 import make_kw51
 from skthermo.datasets._kw51_campaign import make_kw51_campaign
 from skthermo.datasets._kw51_file import load_kw51
-from skthermo.datasets._kw51_sensors import kw51_sensors
-from skthermo.datasets._kw51_structure import kw51_structure
-from skthermo.datasets._truss import make_truss
+from skthermo.datasets._kw51_model import kw51_sensors, kw51_structure, make_kw51
+from skthermo.datasets._truss import make_truss, make_truss_campaign, steel_modulus
 from skthermo.datasets._z24 import load_z24
 from skthermo.datasets._z24_model import make_z24
 

@@ -1,28 +1,129 @@
-"""Synthetic monitoring of the railway bridge KW51."""
+"""Synthetic monitoring of the railway bridge KW51: retrofit, drift, damage, noise and gaps."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
 from skthermo._arguments import check_noise
-from skthermo._arrays import as_random_state, positive_integer
-from skthermo.datasets._kw51_changes import stiffness_factors
-from skthermo.datasets._kw51_monitoring import (
-    NOISE,
-    draw_damping,
-    measured_shapes,
-    missing_modes,
-    missing_temperatures,
+from skthermo._arrays import Array, as_random_state, positive_integer
+from skthermo.datasets._kw51_file import state_of
+from skthermo.datasets._kw51_model import kw51_sensors
+from skthermo.datasets._kw51_truth import (
+    STIFFENED,
+    progress_of,
+    retrofit_mass,
+    simulate,
+    thermal_multipliers,
+    truth_model,
 )
-from skthermo.datasets._kw51_retrofit import STIFFENED, progress_of, retrofit_mass, state_of
-from skthermo.datasets._kw51_sensors import kw51_sensors
-from skthermo.datasets._kw51_simulation import simulate
-from skthermo.datasets._kw51_truth import thermal_multipliers, truth_model
-from skthermo.datasets._kw51_weather import N_HOURS, draw_weather
+from skthermo.datasets._kw51_weather import N_HOURS, REFERENCE, draw_weather, smooth_noise
 from skthermo.datasets._results import KW51Campaign
+
+NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
+COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
+WIND = np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
+OUTAGE = 0.02
+BLOCK_HOURS = 4.0
+
+FIRST_TEMPERATURE = pd.Timestamp("2018-11-21 12:00")
+TEMPERATURE_GAPS = 0.0122
+
+DAMPING = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004])
+DAMPING_BY_KELVIN, DAMPING_SCATTER = 0.006, 0.25
+
+SHAPE_NOISE = 0.01
+
+YEAR = 8766.0  # hours
+
+
+def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
+    """Hours without temperature: until the sensor was installed, and a few blocks later."""
+    block = smooth_noise(len(index), 1, 2 * BLOCK_HOURS, random)[:, 0] < ndtri(TEMPERATURE_GAPS)
+    return block | (index < FIRST_TEMPERATURE)
+
+
+def missing_modes(n_hours: int, random: np.random.RandomState) -> NDArray[np.bool_]:
+    """Hours (n_hours, 6) in which a mode was not identified: in blocks, lateral modes of the arches together."""
+    wind, outage, *own = smooth_noise(n_hours, 2 + len(COVERAGE), BLOCK_HOURS, random).T
+    excitation = np.sqrt(WIND) * wind[:, np.newaxis] + np.sqrt(1 - WIND) * np.array(own).T
+    return (excitation < ndtri(1 - COVERAGE / (1 - OUTAGE))) | (outage < ndtri(OUTAGE))[:, np.newaxis]
+
+
+def draw_damping(steel: Array, random: np.random.RandomState) -> Array:
+    """Damping ratios (n_hours, 6), lower when it is warm, with the scatter of an identification."""
+    mean = DAMPING * (1 - DAMPING_BY_KELVIN * (steel[:, np.newaxis] - REFERENCE))
+    scatter = DAMPING_SCATTER * random.standard_normal(mean.shape)
+    return mean * np.exp(scatter - DAMPING_SCATTER**2 / 2)
+
+
+def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.complex128]:
+    """Shapes (n, 6, n_sensors) of unit length and random phase, with complex noise."""
+    noise = random.standard_normal((2, *clean.shape)) / np.sqrt(2)
+    phase = np.exp(2j * np.pi * random.uniform(size=(*clean.shape[:2], 1)))
+    level = SHAPE_NOISE * np.sqrt((clean**2).mean(axis=2, keepdims=True))
+    noisy = (clean + level * (noise[0] + 1j * noise[1])) * phase
+    return noisy / np.linalg.norm(noisy, axis=2, keepdims=True)
+
+
+def stiffness_factors(
+    index: pd.DatetimeIndex,
+    strengthened: Mapping[str, pd.Series],
+    drift: Mapping[str, float] | None,
+    damage: Mapping[str, float] | None,
+    damage_from: Any,
+) -> pd.DataFrame:
+    """Factor of the stiffness of each changed group in every hour.
+
+    Raises
+    ------
+    ValueError
+        If a group is unknown, a value is not a number, no stiffness is left, or the time of damage is not in the index.
+    """
+    years = pd.Series(np.arange(len(index)) / YEAR, index)
+    is_damaged = pd.Series(index >= _onset(index, damage_from), index)
+    lost = {
+        "drift": {group: rate * years for group, rate in _by_group(drift, "drift").items()},
+        "damage": {group: severity * is_damaged for group, severity in _by_group(damage, "damage").items()},
+    }
+    factors = {group: 1 + share for group, share in strengthened.items()}
+    for what, groups in lost.items():
+        for group, share in groups.items():
+            if share.max() >= 1:
+                raise ValueError(f"{what} of group {group!r} takes away {share.max():g} of its stiffness; expected < 1")
+            factors[group] = factors.get(group, 1.0) * (1 - share)
+    return pd.DataFrame(factors, index)
+
+
+def _by_group(values: Mapping[str, float] | None, what: str) -> Mapping[str, float]:
+    """The values, checked."""
+    values = {} if values is None else values
+    groups = truth_model().groups
+    if not isinstance(values, Mapping) or not set(values) <= set(groups):
+        raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
+    for group, value in values.items():
+        if not isinstance(value, Real) or not np.isfinite(value):
+            raise ValueError(f"{what} of group {group!r} is {value!r}; expected a finite number")
+    return values
+
+
+def _onset(index: pd.DatetimeIndex, damage_from: Any) -> pd.Timestamp:
+    """When the damage begins."""
+    if damage_from is None:
+        return index[0]
+    try:
+        onset = pd.Timestamp(damage_from)
+        if index[0] <= onset <= index[-1]:
+            return onset
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"damage_from is {damage_from!r}; expected a time without time zone ({error})") from error
+    raise ValueError(f"damage_from is {damage_from!r}; expected a time from {index[0]} to {index[-1]}")
 
 
 def make_kw51_campaign(
@@ -220,7 +321,7 @@ def make_kw51_campaign(
         frequencies=pd.DataFrame(frequencies, index, modes),
         damping=pd.DataFrame(damping, index, ratios),
         sensors=list(sensors),
-        state=state_of(index, retrofit),
+        state=state_of(index) if retrofit else pd.Series("before", index, name="state"),
         clean_frequencies=pd.DataFrame(clean, index, modes),
         theta=theta,
         model=truth_model(),

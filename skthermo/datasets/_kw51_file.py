@@ -1,27 +1,29 @@
-"""Monitoring of the railway bridge KW51."""
+"""Monitoring of the railway bridge KW51, and what its values may be."""
+
+from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from skthermo._io import MemoryLimit, read_matlab_values, read_only_member
+from skthermo._arrays import Array
+from skthermo._io import read_matlab
 from skthermo._warnings import warn_user
-from skthermo.datasets._kw51_fields import (
-    check_finite,
-    check_possible,
-    check_shape,
-    labels_of,
-    numbers_of,
-    time_of,
-)
 from skthermo.datasets._results import KW51Monitoring
 
+MOST_LABELS = 1000
+UNIX_EPOCH = 719529  # as a MATLAB date number
+DATES = (730486, 767011)  # 2000-01-01 and 2100-01-01
+FREQUENCIES, DAMPING_RATIOS, CELSIUS = (0.1, 100.0), (-1.0, 1.0), (-60.0, 80.0)  # what they may be
+STAND_FOR_MISSING = (-99, -999, -9999, -99999, 9999, 99999, 999999)
+
 PUBLISHED_MD5 = "5cdb446519d1150228fab51b3a002239"
-LARGEST_FILE = 1_000_000_000  # bytes; the published zip file has 13 million
 MOST_MODES = 1000
 TEMPERATURES = ("tBD31A", "tVL")
 FIELDS = ["sdn", "f", "xi", "m", "labels_m", "env", "labels_env"]
@@ -111,13 +113,9 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     file = Path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
-    if (size := file.stat().st_size) > LARGEST_FILE:
-        raise ValueError(f"{file}: {size / 1e6:.0f} MB; expected at most {LARGEST_FILE / 1e6:.0f} MB")
-    stored, limit = file.read_bytes(), MemoryLimit(size)
-    is_zip = stored.startswith(b"PK\x03\x04") or file.suffix.lower() == ".zip"
-    content = read_only_member(stored, ".mat", str(file), limit) if is_zip else stored
-    data = _data(read_matlab_values(content, str(file), limit), file)
-    if not is_zip:
+    data = _data(read_matlab(file), file)
+    stored = file.read_bytes()
+    if stored[126:128] in (b"IM", b"MI"):
         return KW51Monitoring(**data, is_published=None)
     md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
     if md5 != PUBLISHED_MD5:
@@ -138,34 +136,115 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
     missing = [name for name in FIELDS if name not in modes]
     if missing:
         raise ValueError(f"{file}: no field {missing} in 'modes'; found {sorted(modes)[:50]}")
-    sdn, f, xi, env = (numbers_of(modes[name], f"{file}: field {name!r}") for name in ("sdn", "f", "xi", "env"))
-    m = numbers_of(modes["m"], f"{file}: field 'm'", complex_too=True)
-    sensors, channels = (labels_of(modes[name], f"{file}: field {name!r}") for name in ("labels_m", "labels_env"))
+    sdn, f, xi, env = (_numbers_of(modes[name], f"{file}: field {name!r}") for name in ("sdn", "f", "xi", "env"))
+    m = _numbers_of(modes["m"], f"{file}: field 'm'", complex_too=True)
+    sensors, channels = (_labels_of(modes[name], f"{file}: field {name!r}") for name in ("labels_m", "labels_env"))
     if f.ndim != 2 or not f.size or f.shape[1] > MOST_MODES:
         raise ValueError(f"{file}: field 'f' has shape {f.shape}; expected records times at most {MOST_MODES} modes")
     n_records, n_modes = f.shape
-    check_shape(sdn.T if len(sdn) == 1 else sdn, (n_records, 1), f"{file}: field 'sdn'")
-    check_shape(xi, f.shape, f"{file}: field 'xi'")
-    check_shape(env, (n_records, len(channels)), f"{file}: field 'env'")
-    check_shape(m, (n_records, n_modes, len(sensors)), f"{file}: field 'm'")
+    _check_shape(sdn.T if len(sdn) == 1 else sdn, (n_records, 1), f"{file}: field 'sdn'")
+    _check_shape(xi, f.shape, f"{file}: field 'xi'")
+    _check_shape(env, (n_records, len(channels)), f"{file}: field 'env'")
+    _check_shape(m, (n_records, n_modes, len(sensors)), f"{file}: field 'm'")
     f_names, xi_names = ([f"{name}{number}" for number in range(1, n_modes + 1)] for name in ("f", "xi"))
-    check_possible(f, f_names, ["f"] * n_modes, f"{file}: field 'f'")
-    check_possible(xi, xi_names, ["xi"] * n_modes, f"{file}: field 'xi'")
-    is_temperature = np.isin(channels, TEMPERATURES)
-    thermal, other = ([channels[i] for i in np.flatnonzero(chosen)] for chosen in (is_temperature, ~is_temperature))
-    check_possible(env[:, is_temperature], thermal, thermal, f"{file}: field 'env'")
-    check_finite(env[:, ~is_temperature], other, f"{file}: field 'env'")
+    _check_possible(f, f_names, [FREQUENCIES] * n_modes, f"{file}: field 'f'")
+    _check_possible(xi, xi_names, [DAMPING_RATIOS] * n_modes, f"{file}: field 'xi'")
+    doubtful = np.isin(env, STAND_FOR_MISSING) & ~np.isin(channels, TEMPERATURES)
+    limits = [CELSIUS if channel in TEMPERATURES else None for channel in channels]
+    _check_possible(np.where(doubtful, np.nan, env), channels, limits, f"{file}: field 'env'")
+    if doubtful.any():
+        row, column = np.argwhere(doubtful)[0]
+        warn_user(
+            f"{file}: field 'env' has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, "
+            f"column {channels[column]!r}: {env[row, column]:g}; expected measured values, or NaN",
+            kind="stand-ins",
+        )
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):
-            check_possible(part[:, :, number], f_names, ["m"] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
-    time = time_of(sdn.ravel(), f"{file}: field 'sdn'")
-    state = np.select([time < RETROFIT_BEGINS, time < AFTER_RETROFIT], ["before", "during"], "after")
+            _check_possible(part[:, :, number], f_names, [None] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
+    time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
     return {
         "temperatures": pd.DataFrame(env, index=time, columns=channels),
         "frequencies": pd.DataFrame(f, index=time, columns=f_names),
         "damping": pd.DataFrame(xi, index=time, columns=xi_names),
         "shapes": shapes,
         "sensors": sensors,
-        "state": pd.Series(state.tolist(), index=time, name="state"),
+        "state": state_of(time),
     }
+
+
+def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:
+    """An array of numbers."""
+    if not isinstance(value, np.ndarray):
+        raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
+    if np.iscomplexobj(value) and not complex_too:
+        raise ValueError(f"{what} has complex numbers; expected real ones")
+    return value
+
+
+def _labels_of(value: Any, what: str) -> list[str]:
+    """Texts of a cell array, nested or not, or of the rows of a matrix of characters."""
+    labels = [text.strip() for text in _texts(value, what)]
+    are_names = all(label and label.isprintable() for label in labels)
+    if not are_names or len(set(labels)) != len(labels) or not 0 < len(labels) <= MOST_LABELS:
+        found = [label[:50] for label in labels[:50]]
+        raise ValueError(f"{what} has {len(labels)} names, {found}; expected 1 to {MOST_LABELS} that differ")
+    return labels
+
+
+def _texts(value: Any, what: str) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list):
+        for part in value or [""]:  # MATLAB's empty text has no rows
+            yield from _texts(part, what)
+    else:
+        raise ValueError(f"{what} holds something else than texts; expected a cell array of names")
+
+
+def _check_shape(values: NDArray, shape: tuple[int, ...], what: str) -> None:
+    """Raise an error for another shape than expected; MATLAB leaves out last axes of length one."""
+    if values.shape + (1,) * (len(shape) - values.ndim) != shape:
+        raise ValueError(
+            f"{what} has shape {values.shape}; expected {shape}, the records and modes of 'f' and the names in "
+            "'labels_m' and 'labels_env'"
+        )
+
+
+def _check_possible(values: Array, columns: list[str], limits: list[tuple[float, float] | None], what: str) -> None:
+    """Raise an error for the first value that cannot be measured, such as -999; a column may have limits."""
+    wrong = np.isinf(values) | np.isin(values, STAND_FOR_MISSING)
+    for column, limit in enumerate(limits):
+        if limit:
+            wrong[:, column] |= (values[:, column] < limit[0]) | (values[:, column] > limit[1])
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        expected = "{:g} to {:g}".format(*limits[column]) if limits[column] else "a measured value"
+        raise ValueError(
+            f"{what}, row {row}, column {columns[column]!r} is {values[row, column]:g}; expected {expected}, or NaN "
+            "where it is missing"
+        )
+
+
+def _time_of(numbers: Array, what: str) -> pd.DatetimeIndex:
+    """MATLAB date numbers as time stamps to the second; each may stand there once."""
+    wrong = ~((numbers >= DATES[0]) & (numbers < DATES[1]))
+    if wrong.any():
+        row = np.flatnonzero(wrong)[0]
+        raise ValueError(
+            f"{what}, row {row} is {numbers[row]}; expected a MATLAB date number from {DATES[0]} (year 2000) to "
+            f"{DATES[1]} (2100)"
+        )
+    seconds = np.rint((numbers - UNIX_EPOCH) * 86400).astype("datetime64[s]")
+    time = pd.DatetimeIndex(seconds.astype("datetime64[ns]"), name="time")
+    if time.has_duplicates:
+        row = np.flatnonzero(time.duplicated())[0]
+        raise ValueError(f"{what}, row {row} repeats {time[row]}; expected each time stamp once")
+    return time
+
+
+def state_of(time: pd.DatetimeIndex) -> pd.Series:
+    """ "before", "during" or "after" the retrofit."""
+    state = np.select([time < RETROFIT_BEGINS, time < AFTER_RETROFIT], ["before", "during"], "after")
+    return pd.Series(state.tolist(), index=time, name="state")

@@ -1,12 +1,26 @@
-"""The 28-bar planar truss."""
+"""The 28-bar planar truss, and its synthetic monitoring."""
+
+from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from importlib.resources import files
 
-from skthermo.fem import AffineModel, Bar, Structure
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import as_random_state, positive_integer, real_array
+from skthermo.datasets._results import TrussCampaign
+from skthermo.fem import AffineModel, Bar, Structure, add_noise
 
 PARAMETERS = ("bottom", "top", "diagonal", "vertical")
 ZONES = ("T1", "T2", "T3")
+SEASON = np.array([[15, 15], [15, 20], [17, 25]])  # mean and amplitude in C, eqs. (11)-(13)
+DAILY = np.array([20, 16, 20])
+SCATTER = np.array([3, 2, 8])
+PHASE = np.array([0, 0, np.pi / 6])
+KELVIN = 150.0  # no structure gets this hot in degrees Celsius
 
 
 def make_truss(n_modes: int = 6) -> AffineModel:
@@ -56,4 +70,133 @@ def truss_structure() -> Structure:
         members={name: Bar(str(start), str(end), **steel) for name, (start, end) in sheet["members"].items()},
         supports=sheet["supports"],
         groups={group: [str(member) for member in members] for group, members in groups.items()},
+    )
+
+
+def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
+    """Multiplier of Young's modulus at a temperature, equation (10).
+
+    E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
+
+    Parameters
+    ----------
+    temperature : array-like
+        In degrees Celsius.
+
+    Returns
+    -------
+    ndarray
+        Dimensionless, of the same shape.
+
+    Raises
+    ------
+    ValueError
+        If temperatures are not numbers, or all above 150 C, as kelvin are.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Seif et al., Temperature-dependent material modeling for structural steels: formulation and application, National
+    Institute of Standards and Technology, 2016 [SCG16]_, from which the paper has the law.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import steel_modulus
+    >>> steel_modulus([-10.0, 20.0, 40.0]).round(4)
+    array([1.1658, 1.    , 0.933 ])
+    """
+    celsius = real_array(temperature, "temperature")
+    if celsius.size and (celsius > KELVIN).all():
+        raise ValueError(f"temperature is {celsius.min():g} or more, kelvin? expected degrees Celsius")
+    return 1 - (celsius - 20) / 200 * np.exp(-0.01 * celsius)
+
+
+def make_truss_campaign(
+    n_years: int = 1,
+    *,
+    samples_per_year: int = 365,
+    samples_per_day: int = 1,
+    noise: ArrayLike = 0.01,
+    damage: Mapping[str, float] | None = None,
+    random_state: int | np.random.RandomState | None = None,
+) -> TrussCampaign:
+    """Synthetic monitoring of the 28-bar truss: temperatures, and frequencies by its thermo-mechanical law.
+
+    The ground truth of Kamali et al. (2026), Section 3: the temperatures at three thermocouples vary with season, time
+    of day and at random (eqs. (11)-(13)), each sets Young's modulus (eq. (10)) of the members in its zone, and an
+    eigenvalue analysis gives the frequencies.
+
+    Parameters
+    ----------
+    n_years : int, default=1
+        Length of the campaign.
+    samples_per_year : int, default=365
+        Records in one seasonal cycle, S.
+    samples_per_day : int, default=1
+        Records in one daily cycle, n_d. Hourly data have 24, and 8760 in a year.
+    noise : float or array-like of shape (6,), default=0.01
+        Relative standard deviation of the Gaussian noise on every frequency.
+    damage : mapping of str to float, optional
+        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``.
+    random_state : int, RandomState or None, default=None
+        Seed. With the same integer, campaigns that differ in ``damage`` or ``noise`` have the
+        same temperatures.
+
+    Returns
+    -------
+    Bunch
+        With these attributes:
+
+        temperatures : DataFrame of shape (n_records, 3)
+            ``T1`` to ``T3`` in degrees Celsius.
+        frequencies : DataFrame of shape (n_records, 6)
+            ``f1`` to ``f6`` in Hz, with noise and damage.
+        clean_frequencies : DataFrame of shape (n_records, 6)
+            Without noise.
+        theta : DataFrame of shape (n_records, 3)
+            Multipliers of Young's modulus in the three zones.
+        model : AffineModel
+            The undamaged thermo-mechanical model, whose parameters are the zones and whose
+            damage groups are those of `make_truss`.
+
+    Raises
+    ------
+    ValueError
+        If a count is not a positive integer, or damage or noise are wrong.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> campaign = make_truss_campaign(random_state=0)
+    >>> campaign.temperatures.shape, campaign.frequencies.shape
+    ((365, 3), (365, 6))
+    """
+    n_years = positive_integer(n_years, "n_years")
+    samples_per_year = positive_integer(samples_per_year, "samples_per_year")
+    samples_per_day = positive_integer(samples_per_day, "samples_per_day")
+    random = as_random_state(random_state)
+    index = pd.date_range(
+        "2025-01-01", periods=n_years * samples_per_year, freq=pd.Timedelta(days=1) / samples_per_day, name="time"
+    )
+    record = np.arange(1, len(index) + 1)[:, np.newaxis]
+    temperatures = pd.DataFrame(
+        SEASON[:, 0]
+        + SEASON[:, 1] * np.sin(2 * np.pi * record / samples_per_year + PHASE)
+        + DAILY * np.sin(2 * np.pi * record / samples_per_day + PHASE)
+        + SCATTER * random.standard_normal((len(index), len(ZONES))),
+        index=index,
+        columns=ZONES,
+    )
+    model = truss_structure().assemble(ZONES, groups=PARAMETERS)
+    theta = steel_modulus(temperatures)
+    clean = model.damaged(damage or {}).frequencies(theta)
+    noisy = add_noise(clean, noise, random_state=random)
+    modes = [f"f{i + 1}" for i in range(model.n_modes)]
+    return TrussCampaign(
+        temperatures=temperatures,
+        frequencies=pd.DataFrame(noisy, index=index, columns=modes),
+        clean_frequencies=pd.DataFrame(clean, index=index, columns=modes),
+        theta=pd.DataFrame(theta, index=index, columns=ZONES),
+        model=model,
     )

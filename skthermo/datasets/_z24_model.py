@@ -1,5 +1,7 @@
 """The Z24 bridge as a stick of beams on springs."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from itertools import pairwise
 from math import ceil
@@ -61,7 +63,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     ================  ==========  =======  =================================================================
     quantity          value       unit     reason
     ================  ==========  =======  =================================================================
-    spans             14, 30, 14  m        [PD01]_; straight, without the bridge's skew, alike at both ends
+    spans             14, 30, 14  m        [PD01]_; straight, without the bridge's skew, same at both ends
     pier height       5.5         m        from the girder's axis to the footing; assumed
     element length    1           m        at most; halving it moves no frequency by 0.1 %
     girder E          37.5e9      Pa       concrete, where FE models of this bridge begin [TD04]_

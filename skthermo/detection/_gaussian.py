@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, patterns
 from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
@@ -62,16 +62,6 @@ class Gaussian:
         fill, rest = _conditionals(self.covariance, masks)
         complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
         return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
-
-
-def patterns(present: Mask) -> tuple[Mask, NDArray[np.intp]]:
-    """Different rows of a mask, and which of them each row is."""
-    if present.all():
-        return present[:1], np.zeros(len(present), dtype=np.intp)
-    packed = np.packbits(present, axis=1)
-    keys = np.ascontiguousarray(packed).view(np.dtype((np.void, packed.shape[1]))).ravel()
-    first, of_row = np.unique(keys, return_index=True, return_inverse=True)[1:]
-    return present[first], of_row.ravel()
 
 
 def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:

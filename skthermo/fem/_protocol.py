@@ -1,5 +1,7 @@
 """The interface of FE models: required and optional methods."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
@@ -125,10 +127,6 @@ class DamageableModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     groups : mapping of str
         The damage groups.
     """
@@ -137,7 +135,7 @@ class DamageableModel(FEModel, Protocol):
     def groups(self) -> Mapping[str, Any]:
         """The damage groups by name."""
 
-    def damaged(self, damage: Mapping[str, float]) -> "DamageableModel":
+    def damaged(self, damage: Mapping[str, float]) -> DamageableModel:
         """A new model with the stiffness of each group times (1 - severity).
 
         Parameters
@@ -153,14 +151,10 @@ class DamageableModel(FEModel, Protocol):
 
 
 class LocalModel(FEModel, Protocol):
-    """An FE model that gives everything about its modes at one theta, for model updating.
+    """An FE model that gives its modes at one theta with their derivatives, as model updating needs them.
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     n_dof : int
         Number of degrees of freedom.
     track : bool
@@ -176,7 +170,7 @@ class LocalModel(FEModel, Protocol):
         """Whether a column follows its mode rather than its rank."""
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> Any:
-        """Modes at one theta, with what their derivatives need.
+        """Modes at one theta, and their derivatives on demand.
 
         Parameters
         ----------
@@ -197,10 +191,6 @@ class BatchModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
     rows_per_chunk : int
         How many rows are solved together.
     prefer : str

@@ -1,7 +1,7 @@
 """Probability of false alarm and of detection, time to detection, minimum detectable damage."""
 
-import operator
-from numbers import Real
+from __future__ import annotations
+
 from typing import Any, overload
 
 import numpy as np
@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import real_array
+from skthermo._times import row_times, time_of
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
@@ -168,34 +169,17 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     2.0
     """
     index, limit = _checked(damage_index, threshold)
-    times: Any = getattr(damage_index, "index", None)
-    is_time = isinstance(times, pd.DatetimeIndex)
-    times = times.as_unit("ns") if is_time else pd.RangeIndex(len(index))
-    if not times.is_monotonic_increasing:
+    times = row_times(damage_index)
+    if (np.diff(times) < 0).any():
         raise ValueError("the damage index is not in order of time; expected records in order")
-    start = _start(times, onset)
+    start = 0.0 if onset is None else time_of(damage_index, onset, "onset")
+    if not len(times) or start > times[-1]:
+        raise ValueError(f"onset is {onset!r} for {len(times)} records; expected one not after the last record")
     first = int(times.searchsorted(start))
     alarms = np.flatnonzero(index[first:] > limit)
-    if is_time:
-        return times[first + alarms[0]] - start if alarms.size else pd.NaT
+    if isinstance(getattr(damage_index, "index", None), pd.DatetimeIndex):
+        return pd.Timedelta(int(times[first + alarms[0]] - start), "ns") if alarms.size else pd.NaT
     return float(alarms[0]) if alarms.size else float("nan")
-
-
-def _start(times: Any, onset: Any) -> Any:
-    """The onset as a time or a position, which is not after the last record."""
-    is_time, is_number = isinstance(times, pd.DatetimeIndex), isinstance(onset, Real)
-    try:
-        if is_number or onset is None or not is_time:
-            position = 0 if onset is None else operator.index(onset)
-            if 0 <= position < len(times):
-                return times[position]
-        elif (start := pd.Timestamp(onset).as_unit("ns")) <= times[-1]:
-            return start
-    except (IndexError, TypeError, ValueError):
-        pass
-    zone = f" in the time zone {times.tz}" if is_time and times.tz is not None else ""
-    expected = f"a position from 0, or a time{zone}" if is_time else "a position from 0"
-    raise ValueError(f"onset is {onset!r} for {len(times)} records; expected {expected}, not after the last record")
 
 
 def _checked(damage_index: ArrayLike, threshold: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

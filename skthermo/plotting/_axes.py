@@ -1,4 +1,4 @@
-"""New axes, or those that the user gives; panels, dates and legends."""
+"""New axes, or those that the user gives; panels, dates, legends, and maps of colours."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
@@ -12,18 +12,15 @@ from skthermo.plotting._style import GREY, drawing, label_of, plain, pyplot
 HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""
 
+DARK = 0.55
+"""Share of the limit above which a cell of a map is so dark that its number is white."""
+
 Axes: TypeAlias = Any
 """Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
 
 
 def one_axes(ax: Axes, size: tuple[float, float]) -> Axes:
-    """The axes that are given, or those of a new figure.
-
-    Raises
-    ------
-    ValueError
-        If several are given.
-    """
+    """The axes that are given, or those of a new figure."""
     if ax is None:
         return pyplot().subplots(figsize=size, layout="constrained")[1]
     return panels(ax, ["one display"], size)[0]
@@ -32,13 +29,7 @@ def one_axes(ax: Axes, size: tuple[float, float]) -> Axes:
 def panels(
     ax: Axes, names: Sequence[Any], size: tuple[float, float], n_columns: int = 1, share_x: bool = False
 ) -> np.ndarray:
-    """One axes for each name: those that are given, or those of a new figure.
-
-    Raises
-    ------
-    ValueError
-        If the number of axes is not that of the names, or something else is given.
-    """
+    """One axes for each name: those that are given, or those of a new figure."""
     if ax is None:
         n_columns = min(n_columns, len(names))
         n_rows = -(-len(names) // n_columns)
@@ -58,13 +49,7 @@ def panels(
 
 
 def panel_names(titles: Sequence[str] | None, columns: Sequence[Any]) -> list[str]:
-    """Names of the panels: those that are given, or those of the columns.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many titles as columns.
-    """
+    """Names of the panels: those that are given, or those of the columns."""
     if titles is not None and len(titles) != len(columns):
         raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
     return [label_of(name) for name in (columns if titles is None else titles)]
@@ -119,17 +104,11 @@ def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Inde
 
 
 def on_axis(place: Any, index: pd.Index) -> Any:
-    """A time in the zone of the index, or a number; on an axis of time, a number is the position of a record.
-
-    Raises
-    ------
-    ValueError
-        If there is no such record, or the place is a time on an axis of numbers.
-    """
+    """A time in the zone of the index, or a number; on an axis of time, a number is the position of a record."""
     is_number = isinstance(place, Real)
     if not isinstance(index, pd.DatetimeIndex):
         if not is_number:
-            raise ValueError(f"{place!r} is no number; expected one, since the records have no DatetimeIndex")
+            raise ValueError(f"{place!r} is not a number; expected one, since the records have no DatetimeIndex")
         return place
     if is_number:
         if not 0 <= place < len(index):
@@ -138,7 +117,23 @@ def on_axis(place: Any, index: pd.Index) -> Any:
     try:
         time = pd.Timestamp(place)
     except (TypeError, ValueError):
-        raise ValueError(f"{place!r} is no time; expected one, such as '2025-03-01', or a record's number") from None
+        raise ValueError(f"{place!r} is not a time; expected one, such as '2025-03-01', or a record's number") from None
     if time.tz is not None and index.tz is not None:
         time = time.tz_convert(index.tz)
     return time.tz_localize(None).to_datetime64()
+
+
+def draw_heat_map(ax: Axes, table: pd.DataFrame, limit: float | None, smallest: float = 0.0) -> Axes:
+    """Draw cells coloured from -limit to limit with their numbers; values below ``smallest`` stay without a number."""
+    values = table.to_numpy(dtype=float)
+    known = np.abs(values[np.isfinite(values)])
+    largest = limit or (known.max() if known.size and known.max() > 0 else 1.0)
+    image = ax.imshow(values, cmap="RdBu_r", vmin=-largest, vmax=largest, aspect="auto")
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value) and abs(value) >= smallest:
+            colour = "white" if abs(value) > DARK * largest else "black"
+            ax.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize="small", color=colour)
+    ax.set_xticks(range(table.shape[1]), [label_of(name) for name in table.columns])
+    ax.set_yticks(range(table.shape[0]), [label_of(name) for name in table.index])
+    ax.tick_params(length=0)
+    return image

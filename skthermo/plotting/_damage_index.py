@@ -1,18 +1,22 @@
 """Damage indices of detectors over time."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.pipeline import Pipeline
 
+from skthermo._pipelines import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
 from skthermo.plotting._tables import as_tables, in_time
 
 
+@dataclass(eq=False, repr=False)
 class DamageIndexDisplay:
     """Damage index of every record, the threshold above which it is an alarm, and the onset of damage.
 
@@ -57,28 +61,16 @@ class DamageIndexDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(
-        self,
-        scenarios: Mapping[str, Mapping[str, pd.DataFrame]],
-        thresholds: Mapping[str, float],
-        *,
-        onset: Any = None,
-        label: str = DAMAGE_INDEX,
-    ):
-        self.scenarios = scenarios
-        self.thresholds = thresholds
-        self.onset = onset
-        self.label = label
+    scenarios: Mapping[str, Mapping[str, pd.DataFrame]]
+    thresholds: Mapping[str, float]
+    _: KW_ONLY
+    onset: Any = None
+    label: str = DAMAGE_INDEX
 
     @classmethod
     def from_estimator(
-        cls,
-        estimator: Any,
-        X: Mapping[str, ArrayLike] | ArrayLike,
-        *,
-        onset: Any = None,
-        **options: Any,
-    ) -> "DamageIndexDisplay":
+        cls, estimator: Any, X: Mapping[str, ArrayLike] | ArrayLike, *, onset: Any = None, **options: Any
+    ) -> DamageIndexDisplay:
         """Draw the damage index that a fitted detector gives to records.
 
         Parameters
@@ -102,7 +94,7 @@ class DamageIndexDisplay:
         ValueError
             If the detector has no scores or no threshold.
         """
-        last = estimator[-1] if isinstance(estimator, Pipeline) else estimator
+        last = last_step(estimator)
         if not hasattr(estimator, "score_samples"):
             raise ValueError(f"{estimator!r:.200} has no method 'score_samples'; expected an outlier detector")
         threshold = getattr(last, "threshold_", None)
@@ -122,7 +114,7 @@ class DamageIndexDisplay:
         onset: Any = None,
         label: str = DAMAGE_INDEX,
         **options: Any,
-    ) -> "DamageIndexDisplay":
+    ) -> DamageIndexDisplay:
         """Draw damage indices.
 
         Parameters
@@ -158,7 +150,7 @@ class DamageIndexDisplay:
         onset: Any = None,
         label: str = DAMAGE_INDEX,
         **options: Any,
-    ) -> "DamageIndexDisplay":
+    ) -> DamageIndexDisplay:
         """Draw damage indices, one panel for each scenario.
 
         Parameters
@@ -205,7 +197,7 @@ class DamageIndexDisplay:
         colours: Mapping[str, str] | None = None,
         threshold_label: str = "threshold",
         log: bool = False,
-    ) -> "DamageIndexDisplay":
+    ) -> DamageIndexDisplay:
         """Draw into axes.
 
         Parameters

@@ -1,5 +1,8 @@
-"""What the report of a fit says, drawn."""
+"""Errors, offsets and doubts of a fitted chain."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,7 @@ WIDTH, LETTERS = 4.6, 8
 """Inches of a panel whose bars have names of up to so many letters; longer names make it wider."""
 
 
+@dataclass(eq=False, repr=False)
 class FitReportDisplay:
     """Errors and offsets of each mode, and what is doubtful about each parameter, as the report of a fit has them.
 
@@ -46,11 +50,10 @@ class FitReportDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(self, report: FitReport):
-        self.report = report
+    report: FitReport
 
     @classmethod
-    def from_estimator(cls, estimator: Any, **options: Any) -> "FitReportDisplay":
+    def from_estimator(cls, estimator: Any, **options: Any) -> FitReportDisplay:
         """Draw the report of a fitted chain.
 
         Parameters
@@ -73,7 +76,7 @@ class FitReportDisplay:
             raise ValueError(f"{estimator!r:.200} has no report_; expected a fitted DataInformedFEM")
         return cls(estimator.report_).plot(**options)
 
-    def plot(self, ax: Axes = None) -> "FitReportDisplay":
+    def plot(self, ax: Axes = None) -> FitReportDisplay:
         """Draw into axes.
 
         Parameters

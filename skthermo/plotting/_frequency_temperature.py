@@ -1,6 +1,9 @@
 """Frequencies over temperature."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,7 @@ from skthermo.plotting._style import label_of, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like
 
 
+@dataclass(eq=False, repr=False)
 class FrequencyTemperatureDisplay:
     """Frequencies over the temperature of one sensor, a panel for each mode, measured and predicted.
 
@@ -52,33 +56,18 @@ class FrequencyTemperatureDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(
-        self,
-        temperature: pd.Series,
-        measured: pd.DataFrame,
-        predicted: pd.DataFrame | None = None,
-        *,
-        labels: tuple[str, str] = ("measured", "predicted"),
-        quantity: str = "frequency",
-        unit: str = "Hz",
-    ):
-        self.temperature = temperature
-        self.measured = measured
-        self.predicted = predicted
-        self.labels = labels
-        self.quantity = quantity
-        self.unit = unit
+    temperature: pd.Series
+    measured: pd.DataFrame
+    predicted: pd.DataFrame | None = None
+    _: KW_ONLY
+    labels: tuple[str, str] = ("measured", "predicted")
+    quantity: str = "frequency"
+    unit: str = "Hz"
 
     @classmethod
     def from_estimator(
-        cls,
-        estimator: Any,
-        X: ArrayLike,
-        y: ArrayLike,
-        *,
-        sensor: Hashable | None = None,
-        **options: Any,
-    ) -> "FrequencyTemperatureDisplay":
+        cls, estimator: Any, X: ArrayLike, y: ArrayLike, *, sensor: Hashable | None = None, **options: Any
+    ) -> FrequencyTemperatureDisplay:
         """Draw measured frequencies, and those that a fitted estimator predicts.
 
         Parameters
@@ -118,7 +107,7 @@ class FrequencyTemperatureDisplay:
         quantity: str = "frequency",
         unit: str = "Hz",
         **options: Any,
-    ) -> "FrequencyTemperatureDisplay":
+    ) -> FrequencyTemperatureDisplay:
         """Draw frequencies, or parameters, over a temperature.
 
         Parameters
@@ -162,7 +151,7 @@ class FrequencyTemperatureDisplay:
 
     def plot(
         self, ax: Axes = None, *, titles: Sequence[str] | None = None, n_columns: int = 4
-    ) -> "FrequencyTemperatureDisplay":
+    ) -> FrequencyTemperatureDisplay:
         """Draw into axes.
 
         Parameters

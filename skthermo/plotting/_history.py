@@ -1,6 +1,9 @@
 """Histories of frequencies or parameters."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 import pandas as pd
@@ -11,6 +14,7 @@ from skthermo.plotting._style import line_style, marker_style, shortened, with_u
 from skthermo.plotting._tables import as_tables, in_time, with_breaks
 
 
+@dataclass(eq=False, repr=False)
 class HistoryDisplay:
     """Histories of frequencies or parameters, one panel for each column.
 
@@ -45,10 +49,10 @@ class HistoryDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(self, histories: Mapping[str, pd.DataFrame], *, quantity: str = "", unit: str = "Hz"):
-        self.histories = histories
-        self.quantity = quantity
-        self.unit = unit
+    histories: Mapping[str, pd.DataFrame]
+    _: KW_ONLY
+    quantity: str = ""
+    unit: str = "Hz"
 
     @classmethod
     def from_estimator(
@@ -59,7 +63,7 @@ class HistoryDisplay:
         *,
         what: Literal["parameters", "frequencies"] = "parameters",
         **options: Any,
-    ) -> "HistoryDisplay":
+    ) -> HistoryDisplay:
         """Draw what a fitted chain estimates from frequencies, and what it predicts from temperatures.
 
         Parameters
@@ -104,13 +108,8 @@ class HistoryDisplay:
 
     @classmethod
     def from_predictions(
-        cls,
-        histories: Mapping[str, ArrayLike] | ArrayLike,
-        *,
-        unit: str = "Hz",
-        quantity: str = "",
-        **options: Any,
-    ) -> "HistoryDisplay":
+        cls, histories: Mapping[str, ArrayLike] | ArrayLike, *, unit: str = "Hz", quantity: str = "", **options: Any
+    ) -> HistoryDisplay:
         """Draw tables over time, or over the number of the record.
 
         Parameters
@@ -143,7 +142,7 @@ class HistoryDisplay:
         kind: Literal["auto", "points", "lines"] = "auto",
         marks: Mapping[str, Any] | None = None,
         n_columns: int = 1,
-    ) -> "HistoryDisplay":
+    ) -> HistoryDisplay:
         """Draw into axes.
 
         Parameters

@@ -1,11 +1,13 @@
 """Identified damage: how severe, what it explains, and what cannot be told apart."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from skthermo.plotting._axes import Axes, panels
-from skthermo.plotting._heat_map import draw_heat_map
+from skthermo.plotting._axes import Axes, draw_heat_map, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, shortened
 
 NEEDED = {
@@ -16,10 +18,11 @@ NEEDED = {
 N_ERRORS = 2
 """Standard errors on either side of an estimate."""
 
-SHORT = 8
+SHORT_NAME = 8
 """Number of letters up to which names of modes fit beside each other."""
 
 
+@dataclass(eq=False, repr=False)
 class IdentifiedDamageDisplay:
     """Severity of each group, shift of each mode beside what the damage explains, and collinearity of the groups.
 
@@ -65,11 +68,10 @@ class IdentifiedDamageDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(self, identified: Any):
-        self.identified = identified
+    identified: Any
 
     @classmethod
-    def from_predictions(cls, identified: Any, **options: Any) -> "IdentifiedDamageDisplay":
+    def from_predictions(cls, identified: Any, **options: Any) -> IdentifiedDamageDisplay:
         """Draw identified damage.
 
         Parameters
@@ -98,7 +100,7 @@ class IdentifiedDamageDisplay:
                 )
         return cls(identified).plot(**options)
 
-    def plot(self, ax: Axes = None) -> "IdentifiedDamageDisplay":
+    def plot(self, ax: Axes = None) -> IdentifiedDamageDisplay:
         """Draw into axes.
 
         Parameters
@@ -163,7 +165,7 @@ class IdentifiedDamageDisplay:
         self.explained_ = ax.plot(places + 0.1, shifts["explained"].to_numpy(), **style)[0]
         ax.axhline(0, color=BLACK, linewidth=0.8)
         ax.set_xticks(places, [label_of(name) for name in shifts.index])
-        if max(len(str(name)) for name in shifts.index) > SHORT:
+        if max(len(str(name)) for name in shifts.index) > SHORT_NAME:
             lean(ax)
         ax.set(title="shift of frequencies", ylabel="shift (%)", xlim=(-0.5, len(shifts) - 0.5))
         ax.legend(frameon=False, fontsize="small")

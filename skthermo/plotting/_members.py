@@ -16,14 +16,17 @@ ELEVATION, AZIMUTH = 22, -60
 Cell = tuple[float, float, float, float]
 
 
-def structure_axes(ax: Axes, structure: Structure, width: float) -> Axes:
-    """Axes of the structure's dimension: those that are given, or those of a new figure.
+def check_structure(structure: Any, groups: Iterable[str] | None) -> None:
+    """Raise an error for what is not a structure, or for groups that it does not have."""
+    if not isinstance(structure, Structure):
+        raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
+    for group in groups or ():
+        if group not in structure.groups:
+            raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
 
-    Raises
-    ------
-    ValueError
-        If two-dimensional axes are given for a structure in space.
-    """
+
+def structure_axes(ax: Axes, structure: Structure, width: float) -> Axes:
+    """Axes of the structure's dimension: those that are given, or those of a new figure."""
     if ax is None:
         height = width * height_of(np.array(list(structure.nodes.values()))) + 0.8
         if structure.dimension == 2:

@@ -1,6 +1,9 @@
 """Mode shapes of structures."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,7 @@ from skthermo.plotting._members import (
     Cell,
     add_lines,
     add_surfaces,
+    check_structure,
     corners,
     draw_supports,
     height_of,
@@ -27,6 +31,7 @@ GAP = 0.015
 """Space between the panels of a figure, as a share of it."""
 
 
+@dataclass(eq=False, repr=False)
 class ModeShapesDisplay:
     """Mode shapes over the structure at rest, with their frequencies.
 
@@ -70,20 +75,12 @@ class ModeShapesDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        frequencies: Array,
-        shapes: Array,
-        modes: Sequence[int],
-        *,
-        groups: Sequence[str] | None = None,
-    ):
-        self.structure = structure
-        self.frequencies = frequencies
-        self.shapes = shapes
-        self.modes = modes
-        self.groups = groups
+    structure: Structure
+    frequencies: Array
+    shapes: Array
+    modes: Sequence[int]
+    _: KW_ONLY
+    groups: Sequence[str] | None = None
 
     @classmethod
     def from_structure(
@@ -95,7 +92,7 @@ class ModeShapesDisplay:
         *,
         groups: Sequence[str] | None = None,
         **options: Any,
-    ) -> "ModeShapesDisplay":
+    ) -> ModeShapesDisplay:
         """Draw modes of a structure.
 
         Parameters
@@ -123,11 +120,7 @@ class ModeShapesDisplay:
             If the model has no mode shapes, or not those of the structure's degrees of freedom, or a mode or group is
             unknown.
         """
-        if not isinstance(structure, Structure):
-            raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
-        for group in groups or ():
-            if group not in structure.groups:
-                raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
+        check_structure(structure, groups)
         if model is None:
             if not structure.groups:
                 raise ValueError("structure has no groups; expected model, such as structure.assemble(...)")
@@ -158,7 +151,7 @@ class ModeShapesDisplay:
         colour: str | Mapping[str, str] = ORANGE,
         linewidth: float = 1.5,
         n_columns: int = 2,
-    ) -> "ModeShapesDisplay":
+    ) -> ModeShapesDisplay:
         """Draw into axes.
 
         Parameters

@@ -1,5 +1,8 @@
 """Curves of the probability of detection."""
 
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,7 @@ QUANTILE = 1.959964
 N_DRAWN = 200
 
 
+@dataclass(eq=False, repr=False)
 class PODCurveDisplay:
     """Probability of detection over severity: observed shares, fitted curve and its confidence bounds.
 
@@ -58,12 +62,12 @@ class PODCurveDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(self, curve: Any, *, label: str | None = None):
-        self.curve = curve
-        self.label = label
+    curve: Any
+    _: KW_ONLY
+    label: str | None = None
 
     @classmethod
-    def from_predictions(cls, curve: Any, *, label: str | None = None, **options: Any) -> "PODCurveDisplay":
+    def from_predictions(cls, curve: Any, *, label: str | None = None, **options: Any) -> PODCurveDisplay:
         """Draw a curve.
 
         Parameters
@@ -89,7 +93,7 @@ class PODCurveDisplay:
             raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
         return cls(curve, label=label).plot(**options)
 
-    def plot(self, ax: Axes = None, *, colour: str | None = None, marks: bool = True) -> "PODCurveDisplay":
+    def plot(self, ax: Axes = None, *, colour: str | None = None, marks: bool = True) -> PODCurveDisplay:
         """Draw into axes.
 
         Parameters

@@ -1,6 +1,9 @@
 """Measured and predicted frequencies."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +17,7 @@ from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_sty
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
 
+@dataclass(eq=False, repr=False)
 class PredictionDisplay:
     """Measured and predicted frequencies or parameters, in time with intervals, or one over the other.
 
@@ -57,35 +61,19 @@ class PredictionDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(
-        self,
-        measured: pd.DataFrame,
-        predicted: pd.DataFrame,
-        lowest: pd.DataFrame | None = None,
-        highest: pd.DataFrame | None = None,
-        *,
-        labels: tuple[str, str] = ("measured", "predicted"),
-        interval_label: str = "interval",
-        unit: str = "Hz",
-    ):
-        self.measured = measured
-        self.predicted = predicted
-        self.lowest = lowest
-        self.highest = highest
-        self.labels = labels
-        self.interval_label = interval_label
-        self.unit = unit
+    measured: pd.DataFrame
+    predicted: pd.DataFrame
+    lowest: pd.DataFrame | None = None
+    highest: pd.DataFrame | None = None
+    _: KW_ONLY
+    labels: tuple[str, str] = ("measured", "predicted")
+    interval_label: str = "interval"
+    unit: str = "Hz"
 
     @classmethod
     def from_estimator(
-        cls,
-        estimator: Any,
-        X: ArrayLike,
-        y: ArrayLike,
-        *,
-        confidence: float | None = 0.9,
-        **options: Any,
-    ) -> "PredictionDisplay":
+        cls, estimator: Any, X: ArrayLike, y: ArrayLike, *, confidence: float | None = 0.9, **options: Any
+    ) -> PredictionDisplay:
         """Draw measured frequencies and what a fitted estimator predicts.
 
         Parameters
@@ -140,7 +128,7 @@ class PredictionDisplay:
         interval_label: str = "interval",
         unit: str = "Hz",
         **options: Any,
-    ) -> "PredictionDisplay":
+    ) -> PredictionDisplay:
         """Draw measured and predicted values, or true and estimated ones.
 
         Parameters
@@ -189,7 +177,7 @@ class PredictionDisplay:
         titles: Sequence[str] | None = None,
         marks: Mapping[str, Any] | None = None,
         n_columns: int | None = None,
-    ) -> "PredictionDisplay":
+    ) -> PredictionDisplay:
         """Draw into axes.
 
         Parameters

@@ -1,5 +1,8 @@
 """Sensitivities as a map."""
 
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 import pandas as pd
@@ -7,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from skthermo._arrays import real_array
 from skthermo.fem import FEModel
-from skthermo.plotting._axes import Axes, one_axes
-from skthermo.plotting._heat_map import draw_heat_map
+from skthermo.plotting._axes import Axes, draw_heat_map, one_axes
 from skthermo.updating import sensitivity
 
 
+@dataclass(eq=False, repr=False)
 class SensitivityDisplay:
     """Normalised sensitivities of frequencies to parameters, a row for each parameter and a column for each mode.
 
@@ -48,9 +51,9 @@ class SensitivityDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(self, sensitivity: pd.DataFrame, *, label: str = "normalised sensitivity"):
-        self.sensitivity = sensitivity
-        self.label = label
+    sensitivity: pd.DataFrame
+    _: KW_ONLY
+    label: str = "normalised sensitivity"
 
     @classmethod
     def from_model(
@@ -60,7 +63,7 @@ class SensitivityDisplay:
         *,
         method: Literal["exact", "central"] = "exact",
         **options: Any,
-    ) -> "SensitivityDisplay":
+    ) -> SensitivityDisplay:
         """Draw the sensitivities of a model.
 
         Parameters
@@ -83,7 +86,7 @@ class SensitivityDisplay:
     @classmethod
     def from_predictions(
         cls, sensitivity: pd.DataFrame, *, label: str = "normalised sensitivity", **options: Any
-    ) -> "SensitivityDisplay":
+    ) -> SensitivityDisplay:
         """Draw a table of sensitivities.
 
         Parameters
@@ -114,7 +117,7 @@ class SensitivityDisplay:
 
     def plot(
         self, ax: Axes = None, *, limit: float | None = None, smallest: float = 0.005, colorbar: bool = True
-    ) -> "SensitivityDisplay":
+    ) -> SensitivityDisplay:
         """Draw into axes.
 
         Parameters

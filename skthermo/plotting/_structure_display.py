@@ -1,7 +1,10 @@
 """Structures with a value for each member."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,7 @@ from skthermo.plotting._members import (
     add_lines,
     add_points,
     add_surfaces,
+    check_structure,
     corners,
     draw_supports,
     set_view,
@@ -25,6 +29,7 @@ from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shorte
 WIDTH, THIN = 2.5, 0.8
 
 
+@dataclass(eq=False, repr=False)
 class StructureDisplay:
     """Members of a structure in two or three dimensions, coloured by value or by group, and its supports.
 
@@ -64,18 +69,11 @@ class StructureDisplay:
     >>> plt.close(display.figure_)
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        values: Array | None = None,
-        *,
-        groups: Sequence[str] | None = None,
-        label: str | None = None,
-    ):
-        self.structure = structure
-        self.values = values
-        self.groups = groups
-        self.label = label
+    structure: Structure
+    values: Array | None = None
+    _: KW_ONLY
+    groups: Sequence[str] | None = None
+    label: str | None = None
 
     @classmethod
     def from_structure(
@@ -86,7 +84,7 @@ class StructureDisplay:
         groups: Sequence[str] | None = None,
         label: str | None = None,
         **options: Any,
-    ) -> "StructureDisplay":
+    ) -> StructureDisplay:
         """Draw a structure.
 
         Parameters
@@ -112,13 +110,9 @@ class StructureDisplay:
             If a group or member is unknown, two groups give a member different values, or the number of values is not
             that of the members.
         """
-        if not isinstance(structure, Structure):
-            raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
+        check_structure(structure, groups)
         if values is not None and groups is not None:
             raise ValueError("values and groups are both given; expected one of them to colour the members")
-        for group in groups or ():
-            if group not in structure.groups:
-                raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
 
@@ -129,7 +123,7 @@ class StructureDisplay:
         cmap: str = "viridis",
         limits: tuple[float, float] | None = None,
         linewidth: float | Mapping[str, float] = 2.5,
-    ) -> "StructureDisplay":
+    ) -> StructureDisplay:
         """Draw into axes.
 
         Parameters

@@ -14,8 +14,8 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
 
 MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
-LONGEST = 30
-"""Number of letters from which names would take the room of what is drawn."""
+LONGEST_NAME = 30
+"""Number of letters above which a name is shortened."""
 
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 
@@ -33,8 +33,8 @@ def pyplot() -> ModuleType:
 def shortened(name: Hashable) -> str:
     """A name for a legend, a title or a tick: a very long one loses its middle, dollar signs stay as they are."""
     text = str(name)
-    if len(text) > LONGEST:
-        text = f"{text[: LONGEST // 2].rstrip()} ... {text[-LONGEST // 3 :].lstrip()}"
+    if len(text) > LONGEST_NAME:
+        text = f"{text[: LONGEST_NAME // 2].rstrip()} ... {text[-LONGEST_NAME // 3 :].lstrip()}"
     return plain(text)
 
 
@@ -80,8 +80,4 @@ def marker_style(number: int, n_points: int) -> dict[str, object]:
 
 def line_style(number: int, dashes: int = 0) -> dict[str, object]:
     """Options of plot for lines: colour, and dashes that tell them apart in greyscale too."""
-    return {
-        "linestyle": LINES[dashes % len(LINES)],
-        "color": COLOURS[number % len(COLOURS)],
-        "linewidth": 1.0,
-    }
+    return {"linestyle": LINES[dashes % len(LINES)], "color": COLOURS[number % len(COLOURS)], "linewidth": 1.0}

@@ -15,13 +15,7 @@ LONG_GAP = 10
 
 
 def as_table(values: Any, what: str, prefix: str = "f") -> pd.DataFrame:
-    """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0.
-
-    Raises
-    ------
-    ValueError
-        If the values are not numbers in one or two dimensions.
-    """
+    """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0."""
     if isinstance(values, pd.Series):
         values = values.to_frame(f"{prefix}1" if values.name is None else values.name)
     real_array(values, what)
@@ -34,13 +28,7 @@ def as_table(values: Any, what: str, prefix: str = "f") -> pd.DataFrame:
 
 
 def check_like(first: Any, other: Any, names: tuple[str, str]) -> None:
-    """Raise an error if two tables differ in shape or index.
-
-    Raises
-    ------
-    ValueError
-        Says how they differ.
-    """
+    """Raise an error if two tables differ in shape or index."""
     check_same_rows(first, other, names)
     if np.shape(as_columns(first)) != np.shape(as_columns(other)):
         raise ValueError(
@@ -50,13 +38,7 @@ def check_like(first: Any, other: Any, names: tuple[str, str]) -> None:
 
 
 def as_tables(histories: Any, what: str, prefix: str = "f") -> dict[str, pd.DataFrame]:
-    """Labelled tables with the same number of columns, which may have different rows.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or they have different columns.
-    """
+    """Labelled tables with the same number of columns, which may have different rows."""
     if not isinstance(histories, Mapping):
         histories = {"": histories}
     tables = {str(label): as_table(values, f"{what} {label!r}", prefix) for label, values in histories.items()}

@@ -1,5 +1,7 @@
 """Removes the offset between measured frequencies and those of an FE model."""
 
+from __future__ import annotations
+
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -68,7 +70,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self.method = method
 
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> "BiasAligner":
+    def fit(self, X: ArrayLike, y: None = None) -> BiasAligner:
         """Compute the means of measured frequencies.
 
         Parameters
@@ -174,7 +176,7 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             )
         return reference
 
-    def __sklearn_clone__(self) -> "BiasAligner":
+    def __sklearn_clone__(self) -> BiasAligner:
         return clone_sharing_models(self)
 
     def __sklearn_tags__(self):

@@ -1,5 +1,7 @@
 """Broken lines: features whose slopes change at knots."""
 
+from __future__ import annotations
+
 from numbers import Integral
 from typing import overload
 
@@ -13,6 +15,7 @@ from skthermo._validation import (
     Interval,
     TransformerMixin,
     _check_feature_names_in,
+    _check_sample_weight,
     _fit_context,
     check_is_fitted,
     validate_data,
@@ -23,7 +26,9 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
     """Append max(x - knot, 0) for some knots of every column, so that linear regression fits broken lines.
 
     Frequencies over temperature are broken lines: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
-    go on straight. Ridge regression penalises their changes of slope.
+    go on straight. By linear regression, scikit-learn's ``SplineTransformer(degree=1, extrapolation="linear")`` gives
+    the same lines. Hinges do what it cannot: missing values pass through, and ridge regression penalises changes of
+    slope rather than values.
 
     Parameters
     ----------
@@ -41,7 +46,7 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
 
     See Also
     --------
-    sklearn.preprocessing.SplineTransformer : Splines of any degree; ridge regression then penalises values, not slopes.
+    sklearn.preprocessing.SplineTransformer : Splines of any degree.
 
     Notes
     -----
@@ -66,7 +71,7 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         self.n_knots = n_knots
 
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> "HingeFeatures":
+    def fit(self, X: ArrayLike, y: None = None, sample_weight: ArrayLike | None = None) -> HingeFeatures:
         """Place the knots.
 
         Parameters
@@ -75,6 +80,8 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
             Temperatures in degrees Celsius, or any other inputs; NaN is ignored.
         y : None
             Ignored.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row: how often its values count.
 
         Returns
         -------
@@ -84,14 +91,22 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If a column is NaN in every row.
+            If a column is NaN in every row, or in every row that has a weight.
         """
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
+        weights = None
+        if sample_weight is not None:
+            weights = _check_sample_weight(sample_weight, values, ensure_non_negative=True)
+            values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
         empty = np.isnan(values).all(axis=0)
         if empty.any():
             name = _check_feature_names_in(self, None)[empty][0]
             raise ValueError(f"{name!r} is NaN in every row; expected values to place knots at")
-        self.knots_ = np.nanquantile(values, np.linspace(0, 1, self.n_knots + 2)[1:-1], axis=0)
+        shares = np.linspace(0, 1, self.n_knots + 2)[1:-1]
+        if weights is None:
+            self.knots_ = np.nanquantile(values, shares, axis=0)
+        else:
+            self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
         return self
 
     @overload
@@ -138,3 +153,17 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def weighted_quantiles(values: NDArray[np.float64], shares: NDArray, weights: NDArray) -> NDArray[np.float64]:
+    """Quantiles of a column that NumPy's would be if each row were repeated as often as its weight says.
+
+    NumPy interpolates between two rows, as does the mean over a window of unit weight that is used here.
+    """
+    known = ~np.isnan(values)
+    order = np.argsort(values[known], kind="stable")
+    values, weights = values[known][order], weights[known][order]
+    position, integral = (np.append(0.0, np.cumsum(steps)) for steps in (weights, weights * values))
+    window = min(1.0, position[-1])
+    start = shares * (position[-1] - window)
+    return (np.interp(start + window, position, integral) - np.interp(start, position, integral)) / window

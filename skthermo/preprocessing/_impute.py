@@ -1,5 +1,7 @@
 """Fills gaps in monitoring records."""
 
+from __future__ import annotations
+
 from typing import Any, overload
 
 import numpy as np
@@ -7,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
+from skthermo._arrays import rows_by_pattern
 from skthermo._frames import frame_like, warn_of_markers
 from skthermo._validation import (
     _check_feature_names_in,
@@ -18,7 +21,7 @@ from skthermo._validation import (
     validate_data,
     with_nan,
 )
-from skthermo.preprocessing._nearest import Donors, row_patterns
+from skthermo.preprocessing._nearest import Donors
 
 FLOATS = [np.float64, np.float32]
 
@@ -108,7 +111,7 @@ class KNNGapImputer(KNNImputer):
             keep_empty_features=keep_empty_features,
         )
 
-    def fit(self, X: ArrayLike, y: None = None) -> "KNNGapImputer":
+    def fit(self, X: ArrayLike, y: None = None) -> KNNGapImputer:
         """Store the records among which neighbours are searched.
 
         Parameters
@@ -183,7 +186,7 @@ class KNNGapImputer(KNNImputer):
     def _filled(self, values: NDArray) -> NDArray:
         """Fill each missing column of rows with the same missing columns with means of their nearest donors."""
         filled = values.copy()
-        for missing, rows in row_patterns(np.isnan(values)):
+        for missing, rows in rows_by_pattern(np.isnan(values)):
             observed = ~missing
             for column in np.flatnonzero(missing & ~self.is_empty_):
                 distances, donors = self.donors_.nearest(values[rows], observed, column, self.n_neighbors)

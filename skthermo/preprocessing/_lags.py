@@ -1,5 +1,7 @@
 """Earlier temperatures as additional columns."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from numbers import Integral
@@ -24,9 +26,8 @@ from skthermo.preprocessing._stamps import as_duration, as_stamps
 
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row
-MAX_LAGS = 10_000  # or as many as there are rows
-MAX_BYTES = 16 * 2**30
-FARTHEST = np.timedelta64(100 * 365, "D")
+MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end the interpreter
+LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
 class LagFeatures(TransformerMixin, BaseEstimator):
@@ -115,7 +116,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         self.padding = padding
 
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> "LagFeatures":
+    def fit(self, X: ArrayLike, y: None = None) -> LagFeatures:
         """Read the lags and, on a DatetimeIndex, store the records.
 
         Parameters
@@ -134,13 +135,12 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         ------
         ValueError
             If the lags are not different non-negative integers; if they are more than 10,000 and more than the
-            rows, reach back more than 100 years or give a result of more than 16 GiB; if ``freq`` or
-            ``tolerance`` is given without a DatetimeIndex, is not positive or has no fixed length, as a month;
-            if a stamp is missing or occurs twice; if the index holds durations, or stamps as text.
+            rows, or reach back more than 100 years; if ``freq`` or ``tolerance`` is given without a DatetimeIndex, is
+            not positive or has no fixed length, as a month; if a stamp is missing or occurs twice; if the index holds
+            durations, or stamps as text.
         """
         values = self._validated(X, reset=True)
         self.lags_ = _read_lags(self.lags, len(values))
-        self._check_size(values)
         self.freq_ = self.tolerance_ = self.history_ = self.stamps_ = self.time_zone_ = None
         stamps = _stamps(X)
         if stamps is None:
@@ -155,7 +155,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             self.tolerance_ = (
                 DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else as_duration(self.tolerance, "tolerance")
             )
-            if max(self.lags_) > FARTHEST / self.freq_:
+            if max(self.lags_) > LONGEST_LAG / self.freq_:
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
@@ -184,12 +184,10 @@ class LagFeatures(TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the number or names of sensors, or the kind of index, differ from `fit`; if the result would
-            take more than 16 GiB.
+            If the number or names of sensors, or the kind of index, differ from `fit`.
         """
         check_is_fitted(self)
         values = self._validated(X, reset=False)
-        self._check_size(values)
         stamps = _stamps(X)
         if (stamps is None) != (self.freq_ is None):
             kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
@@ -216,15 +214,6 @@ class LagFeatures(TransformerMixin, BaseEstimator):
 
     def _lag_names(self, sensors: Iterable[Any]) -> list[str]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
-
-    def _check_size(self, values: NDArray) -> None:
-        size = values.nbytes * len(self.lags_)
-        if size > MAX_BYTES:
-            raise ValueError(
-                f"{len(self.lags_)} lags of {values.shape[0]} rows and {values.shape[1]} sensors take "
-                f"{size / 2**30:.0f} GiB; expected at most {MAX_BYTES / 2**30:.0f} GiB: fewer lags, or fewer rows at "
-                "a time"
-            )
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-Array = NDArray[np.float64]
+from skthermo._arrays import Array, rows_by_pattern
+
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
@@ -23,22 +24,12 @@ FEW_PAIRS = 10_000_000  # below so many pairs of receiver and donor, computing a
 PAIRS_PER_POOL = 2000  # searching one pool takes about as long as so many distances
 
 
-def row_patterns(missing: Mask) -> list[tuple[Mask, Rows]]:
-    """The distinct rows of a mask, each with the positions at which it occurs."""
-    packed = np.packbits(missing, axis=1)
-    _, first, inverse = np.unique(packed, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(inverse.ravel(), kind="stable")
-    counts = np.bincount(inverse.ravel(), minlength=len(first))
-    groups = np.split(order, np.cumsum(counts)[:-1])
-    return [(missing[row], rows) for row, rows in zip(first, groups, strict=True)]
-
-
 class Donors:
     """Rows from which gaps are filled, grouped by their missing columns."""
 
     def __init__(self, values: Array):
         self.values = values
-        self.patterns = row_patterns(np.isnan(values))
+        self.patterns = rows_by_pattern(np.isnan(values))
 
     def mean(self, column: int) -> float:
         """Mean of a column, NaN ignored."""
@@ -50,7 +41,7 @@ class Donors:
         n_pairs = len(gappy) * len(self.values)
         if n_pairs < FEW_PAIRS:
             return False
-        return len(row_patterns(gappy)) * len(self.patterns) * PAIRS_PER_POOL < n_pairs
+        return len(rows_by_pattern(gappy)) * len(self.patterns) * PAIRS_PER_POOL < n_pairs
 
     def nearest(self, receivers: Array, observed: Mask, column: int, n_neighbors: int) -> tuple[Array, Rows]:
         """The nearest donors that have a value in a column.

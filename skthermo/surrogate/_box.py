@@ -1,18 +1,17 @@
 """The box of parameters that an inverse was trained in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arguments import check_bounds
+from skthermo._arrays import Array, Bounds
 
-NEAR = 2.0
-"""Half-widths from the middle of the box up to which parameters count as near it; a surrogate extrapolates well
-there."""
+NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
 
-MANY = 0.05
-"""Share of rows far outside the box that gives a warning."""
+MANY_FAR_ROWS = 0.05  # share of rows far outside the box that gives a warning
 
 
 @dataclass(frozen=True)
@@ -22,12 +21,17 @@ class Box:
     bounds: Array
     names: tuple[str, ...]
 
+    @classmethod
+    def of(cls, bounds: Bounds, names: Sequence[str]) -> "Box":
+        """The box of bounds in any of the ways that an estimator takes them."""
+        return cls(check_bounds(bounds, names), tuple(names))
+
     @property
     def near(self) -> Array:
         """Bounds of the region in or near the box; all positive."""
         middle, half = self.bounds.mean(axis=1), np.diff(self.bounds, axis=1)[:, 0] / 2
-        lowest = np.maximum(middle - NEAR * half, self.bounds[:, 0] / 2)
-        return np.column_stack([lowest, middle + NEAR * half])
+        lowest = np.maximum(middle - NEAR_HALF_WIDTHS * half, self.bounds[:, 0] / 2)
+        return np.column_stack([lowest, middle + NEAR_HALF_WIDTHS * half])
 
     def outside(self, theta: Array) -> NDArray[np.bool_]:
         """Which parameters of each row are outside the box; NaN is not."""
@@ -42,7 +46,7 @@ class Box:
         known = ~np.isnan(theta).any(axis=1)
         far = far[known]
         rows = far.any(axis=1)
-        if not rows.size or rows.mean() <= MANY:
+        if not rows.size or rows.mean() <= MANY_FAR_ROWS:
             return ""
         worst = int(far.sum(axis=0).argmax())
         values = theta[known][far[:, worst], worst]

@@ -1,16 +1,17 @@
 """The temperature mapper M2: temperatures to parameters."""
 
-from numbers import Real
+from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._arrays import Array, real_array
+from skthermo._arrays import Array
 from skthermo._frames import check_columns, check_temperatures, frame_like
-from skthermo._validation import HasMethods, Interval, _check_sample_weight, _fit_context, seeded
+from skthermo._validation import HasMethods, _check_sample_weight, _fit_context, check_is_fitted, seeded, validate_data
 from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
+from skthermo.surrogate._standardiser import FrequencyCoordinates
 
 
 class TemperatureMapper(MultiplierRegressor):
@@ -24,13 +25,10 @@ class TemperatureMapper(MultiplierRegressor):
         parameters are not positive, no logarithm is taken. By default broken lines,
         ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data.
         See `paper_network` for the paper's network.
-    sensitivities : array-like of shape (n_modes, n_parameters), optional
-        Derivatives d ln f / d ln theta of an FE model. The regressor then learns z = sensitivities ln theta, the change
-        of ln f to first order, so that errors of parameters count as much as they change the frequencies; theta follows
-        by damped least squares. `DataInformedFEM` gives those of its model.
-    damping : float or array-like of shape (n_parameters,), default=0.0
-        What damped least squares adds to the diagonal of sensitivities' sensitivities. It keeps parameters that hardly
-        change the frequencies near their means.
+    coordinates : FrequencyCoordinates, optional
+        Set by `DataInformedFEM` where its inverse refines. The regressor then learns the changes of ln f that belong to
+        ln theta to first order, so that errors of parameters count as much as they change the frequencies; theta
+        follows by damped least squares, which keeps parameters that hardly change the frequencies near their means.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -78,8 +76,7 @@ class TemperatureMapper(MultiplierRegressor):
     _default_regressor = staticmethod(default_lines)
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
-        "sensitivities": ["array-like", None],
-        "damping": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "coordinates": [FrequencyCoordinates, None],
         "random_state": ["random_state"],
     }
 
@@ -87,17 +84,15 @@ class TemperatureMapper(MultiplierRegressor):
         self,
         regressor: BaseEstimator | None = None,
         *,
-        sensitivities: ArrayLike | None = None,
-        damping: ArrayLike = 0.0,
+        coordinates: FrequencyCoordinates | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.regressor = regressor
-        self.sensitivities = sensitivities
-        self.damping = damping
+        self.coordinates = coordinates
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> "TemperatureMapper":
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> TemperatureMapper:
         """Learn the mapping from complete rows.
 
         Parameters
@@ -107,7 +102,8 @@ class TemperatureMapper(MultiplierRegressor):
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; a regressor whose ``fit`` takes no weights ignores them.
+            Weight of each row; a regressor whose ``fit`` takes no weights ignores them, and so do steps before it, as
+            that which places the knots of broken lines.
 
         Returns
         -------
@@ -118,8 +114,7 @@ class TemperatureMapper(MultiplierRegressor):
         ------
         ValueError
             If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
-            that stands for a missing value, such as -999, or fewer than two rows are complete; if ``sensitivities``
-            do not have a column for each parameter, or theta is not positive there.
+            that stands for a missing value, such as -999, or fewer than two rows are complete.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         named = frame_like(X, T)
@@ -131,27 +126,12 @@ class TemperatureMapper(MultiplierRegressor):
             theta,
             seeded(self.random_state),
             log_inputs=False,
-            coordinates=self._coordinates(theta),
-            damping=self._damping(theta),
+            coordinates=self.coordinates,
             sample_weight=weights,
         )
         return self
 
-    def _coordinates(self, theta: Array) -> Array | None:
-        if self.sensitivities is None:
-            return None
-        sensitivities = real_array(self.sensitivities, "sensitivities")
-        if sensitivities.ndim != 2 or sensitivities.shape[1] != theta.shape[1] or not np.isfinite(sensitivities).all():
-            raise ValueError(
-                f"sensitivities have shape {sensitivities.shape}; expected finite numbers, (n_modes, "
-                f"{theta.shape[1]}), a column for each parameter"
-            )
-        if (theta <= 0).any():
-            raise ValueError(f"theta falls to {np.nanmin(theta):g}; expected positive multipliers with sensitivities")
-        return sensitivities
-
-    def _damping(self, theta: Array) -> Array:
-        damping = real_array(self.damping, "damping")
-        if damping.shape not in ((), theta.shape[1:]) or not ((damping >= 0) & np.isfinite(damping)).all():
-            raise ValueError(f"damping is {damping}; expected one number from 0, or {theta.shape[1]}, one a parameter")
-        return damping
+    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
+        check_is_fitted(self)
+        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        return self._regress(inputs, return_std)

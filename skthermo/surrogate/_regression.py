@@ -1,5 +1,8 @@
 """Base of both surrogates: regression of standardised log multipliers on standardised inputs."""
 
+from __future__ import annotations
+
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, Literal, overload
 
@@ -14,19 +17,19 @@ from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import (
     check_array,
-    check_is_fitted,
     clone_sharing_models,
     seed_parts,
     validate_data,
 )
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._standardiser import Standardiser, is_positive
+from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
 
 
 class MultiplierRegressor(RegressorMixin, BaseEstimator):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
-    A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`.
+    A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hook:
+    `_predict_arrays` gives multipliers and standard deviations of rows of X, and calls `_regress`.
     ``_default_regressor`` makes the regressor where none is given.
     """
 
@@ -105,8 +108,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         random_state: np.random.RandomState | None,
         *,
         log_inputs: bool,
-        coordinates: Array | None = None,
-        damping: Array | float = 0.0,
+        coordinates: FrequencyCoordinates | None = None,
         sample_weight: Array | None = None,
     ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
@@ -118,10 +120,8 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         X, y = X[complete], y[complete]
         weights = None if sample_weight is None else sample_weight[complete]
         self.n_parameters_ = y.shape[1]
-        self.inputs_ = Standardiser.fitted(X, log=log_inputs and is_positive(X), sample_weight=weights)
-        self.targets_ = Standardiser.fitted(
-            y, log=is_positive(y), coordinates=coordinates, damping=damping, sample_weight=weights
-        )
+        self.inputs_ = Standardiser.fitted(X, log=log_inputs and bool((X > 0).all()), sample_weight=weights)
+        self.targets_ = Standardiser.fitted(y, log=bool((y > 0).all()), coordinates=coordinates, sample_weight=weights)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
         targets = self.targets_.transform(y)
@@ -129,12 +129,11 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
         with single_blas_thread():
             self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets, weights)
 
+    @abstractmethod
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""
-        check_is_fitted(self)
-        return self._estimate(self._read_inputs(X), return_std)
 
-    def _estimate(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
+    def _regress(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
         """What the regressor gives for inputs that have been read."""
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self.n_parameters_), np.nan)
@@ -150,16 +149,13 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
                 theta[complete] = self.targets_.inverse_transform(means)
         return theta, std
 
-    def _read_inputs(self, X: ArrayLike) -> Array:
-        return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-
     def _as_targets(self, X: Any, values: Array) -> Any:
         """Predictions as a vector or a frame if the training targets were."""
         if self.y_is_vector_:
             return values[:, 0]
         return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
 
-    def __sklearn_clone__(self) -> "MultiplierRegressor":
+    def __sklearn_clone__(self) -> MultiplierRegressor:
         return clone_sharing_models(self)
 
     def __sklearn_tags__(self):

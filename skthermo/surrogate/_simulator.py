@@ -11,24 +11,18 @@ from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
-MANY_ROWS = 2000
-"""Number of rows from which a full sparse model takes minutes."""
-
+MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
 
 DEFAULT_TOLERANCE = 1e-5
 
-MARGIN = 0.02
-"""Margin of severities around those asked for, within which a reduced model is accurate."""
+MARGIN, LEAST_MARGIN = 0.25, 0.05
+"""Margin of a reduced model's box around the learned parameters: a share of their range, and of their values."""
+
+MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
 def tolerance(model: FEModel, reduce: bool | float) -> float | None:
-    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
-
-    Raises
-    ------
-    ValueError
-        If the model cannot be reduced.
-    """
+    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction."""
     if not reduce:
         return None
     if not hasattr(model, "reduced"):
@@ -41,26 +35,22 @@ def tolerance(model: FEModel, reduce: bool | float) -> float | None:
 
 @dataclass(frozen=True)
 class Simulator:
-    """An FE model and, where there is one, its reduced model for a box.
-
-    Attributes
-    ----------
-    model : FE model
-        The full one.
-    reduced : FE model or None
-        The reduced model, which gives the same frequencies within the box.
-    box : ndarray of shape (n_parameters, 2) or None
-        Bounds of that box.
-    """
+    """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2)."""
 
     model: FEModel
     reduced: Any = None
     box: Array | None = None
 
     @classmethod
-    def within(cls, model: FEModel, box: Array, tol: float, random_state: int) -> "Simulator":
-        """The simulator with a reduced model for a box."""
-        return cls(model, model.reduced(box, tol=tol, random_state=random_state), box)
+    def around(cls, model: FEModel, theta: Array, reduce: bool | float) -> "Simulator":
+        """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta."""
+        tol = tolerance(model, reduce)
+        if tol is None:
+            return cls(model)
+        lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
+        margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
+        box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+        return cls(model, model.reduced(box, tol=tol, random_state=0), box)
 
     def changed(self, method: str, *args: Any, **options: Any) -> "Simulator":
         """The simulator of the structure that a method of the model gives, such as "damaged"."""
@@ -75,7 +65,7 @@ class Simulator:
 
     def with_damage_parameters(self, groups: list[str], lowest: float, highest: float) -> "Simulator":
         """The simulator whose rows of theta end with 1 - severity of each group."""
-        severities = (min(lowest, 0.0) - MARGIN, min(max(highest, 0.0) + MARGIN, 0.99))
+        severities = (min(lowest, 0.0) - MARGIN_OF_SEVERITY, min(max(highest, 0.0) + MARGIN_OF_SEVERITY, 0.99))
         changed = self.changed("with_damage_parameters", groups, severities=severities)
         if self.box is None:
             return changed
@@ -103,19 +93,20 @@ class Simulator:
     def linearise(
         self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None
     ) -> tuple[Array, ...]:
-        """Frequencies (n_samples, n_modes) and d f / d theta (n_samples, n_modes, n_parameters), without warnings.
+        """Frequencies, (n_samples, n_modes), and d ln f / d ln theta, (n_samples, n_modes, n_parameters), quietly.
 
-        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta.
+        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d ln theta.
         """
         outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
         results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if rows.any():
                 quiet = model.quiet() if hasattr(model, "quiet") else model
-                if dofs is None:
-                    solved: tuple[Array, ...] = linearise(quiet, theta[rows], n_jobs=n_jobs)
-                else:
-                    solved = linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs)
+                solved: Any = (
+                    linearise(quiet, theta[rows], relative=True, n_jobs=n_jobs)
+                    if dofs is None
+                    else _relative(theta[rows], *linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs))
+                )
                 results = results or [np.full((len(theta), *array.shape[1:]), np.nan) for array in solved]
                 for result, array in zip(results, solved, strict=True):
                     result[rows] = array
@@ -132,3 +123,9 @@ class Simulator:
                 "DataInformedFEM(..., reduce=True) gives the same frequencies to 1e-5 in a small part of the time",
                 "full model",
             )
+
+
+def _relative(theta: Array, frequencies: Array, jacobian: Array, shapes: Array, slopes: Array) -> tuple[Array, ...]:
+    """Frequencies and shapes with their derivatives by ln theta, of the frequencies those of ln f."""
+    relative = jacobian * theta[:, np.newaxis] / frequencies[:, :, np.newaxis]
+    return frequencies, relative, shapes, slopes * theta[:, np.newaxis, np.newaxis]

@@ -1,4 +1,4 @@
-"""Standardisation of inputs and targets: logarithms, other coordinates, zero mean, unit variance."""
+"""Standardisation of inputs and targets: logarithms, coordinates of frequencies, zero mean, unit variance."""
 
 from dataclasses import dataclass
 
@@ -9,29 +9,37 @@ from skthermo._arrays import Array
 
 
 @dataclass(frozen=True)
+class FrequencyCoordinates:
+    """Coordinates z = A ln theta: the changes of ln f that belong to changes of ln theta, to first order.
+
+    ``sensitivities`` is A, (n_modes, n_parameters): d ln f / d ln theta in units of any scale. ``damping``, a number or
+    (n_parameters,), is what damped least squares adds to the diagonal of A'A to find ln theta again.
+    """
+
+    sensitivities: Array
+    damping: Array | float = 0.0
+
+    @property
+    def inverse(self) -> Array:
+        """(A'A + damping)^-1 A', the pseudo-inverse without damping, (n_parameters, n_modes)."""
+        A = self.sensitivities
+        damping = np.broadcast_to(self.damping, (A.shape[1],))
+        return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
+
+
+@dataclass(frozen=True)
 class Standardiser:
     """z = (A x - mean) / scale, of x or of log x, and the inverse.
 
-    Attributes
-    ----------
-    mean, scale : ndarray of shape (n_coordinates,)
-        Mean and standard deviation of A x.
-    log : bool
-        Whether logarithms are taken; the inverse then gives positive values.
-    middle : ndarray of shape (n_columns,)
-        Mean of x, which the inverse keeps in directions that A does not see.
-    coordinates : ndarray of shape (n_coordinates, n_columns) or None
-        The matrix A; None is the identity.
-    damping : float or ndarray of shape (n_columns,)
-        What damped least squares adds to the diagonal of A'A to find x again.
+    ``coordinates`` hold the matrix A; without them it is the identity. ``middle`` is the mean of x, which the inverse
+    keeps in directions that A does not see.
     """
 
     mean: Array
     scale: Array
     log: bool
     middle: Array
-    coordinates: Array | None = None
-    damping: Array | float = 0.0
+    coordinates: FrequencyCoordinates | None = None
 
     @classmethod
     def fitted(
@@ -39,26 +47,24 @@ class Standardiser:
         values: Array,
         *,
         log: bool,
-        coordinates: Array | None = None,
-        damping: Array | float = 0.0,
+        coordinates: FrequencyCoordinates | None = None,
         sample_weight: Array | None = None,
     ) -> "Standardiser":
         """Mean and standard deviation of some values; the scale of a constant column is 1."""
         x = np.log(values) if log else values
-        z = x if coordinates is None else x @ coordinates.T
+        z = x if coordinates is None else x @ coordinates.sensitivities.T
         scaler = StandardScaler().fit(z, sample_weight=sample_weight)
-        middle = np.average(x, axis=0, weights=sample_weight)
-        return cls(scaler.mean_, scaler.scale_, log, middle, coordinates, damping)
+        return cls(scaler.mean_, scaler.scale_, log, np.average(x, axis=0, weights=sample_weight), coordinates)
 
     def transform(self, values: Array) -> Array:
         """Standardised values."""
         x = np.log(values) if self.log else values
-        return ((x if self.coordinates is None else x @ self.coordinates.T) - self.mean) / self.scale
+        return ((x if self.coordinates is None else x @ self.coordinates.sensitivities.T) - self.mean) / self.scale
 
     def inverse_transform(self, standardised: Array) -> Array:
         """Values from standardised values; a logarithm too large for a float becomes infinity."""
-        deviation = standardised * self.scale
-        x = self.mean + deviation if self.coordinates is None else self.middle + deviation @ self._inverse.T
+        deviation, A = standardised * self.scale, self.coordinates
+        x = self.mean + deviation if A is None else self.middle + deviation @ A.inverse.T
         with np.errstate(over="ignore"):
             return np.exp(x) if self.log else x
 
@@ -69,20 +75,5 @@ class Standardiser:
         """
         std = deviations * self.scale
         if self.coordinates is not None:
-            std = np.sqrt(std**2 @ self._inverse.T**2)
+            std = np.sqrt(std**2 @ self.coordinates.inverse.T**2)
         return std * (values if self.log else 1)
-
-    @property
-    def _inverse(self) -> Array:
-        return damped_inverse(self.coordinates, self.damping)
-
-
-def damped_inverse(A: Array, damping: Array | float) -> Array:
-    """(A'A + damping)^-1 A', the pseudo-inverse without damping."""
-    damping = np.broadcast_to(damping, (A.shape[1],))
-    return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
-
-
-def is_positive(values: Array) -> bool:
-    """Whether all values have a logarithm."""
-    return bool((values > 0).all())

@@ -1,4 +1,4 @@
-"""The model's modes paired with the measured ones."""
+"""The model's modes paired with the measured ones, and the differences of their shapes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from skthermo._arrays import Array, as_floats
+from skthermo._differences import central_differences
 from skthermo.fem import FEModel, LocalModel
 from skthermo.updating._measured import Measured
-from skthermo.updating._sensitivity import central_jacobian
 
 DIFFERENCE_STEP = 1e-3
 """Relative step of central differences for a model without ``jacobian``."""
@@ -22,24 +22,12 @@ that several modes look the same at them."""
 
 @dataclass
 class PairedModes:
-    """The model's modes at one theta, one for each measured mode and in their order.
-
-    Attributes
-    ----------
-    frequencies : ndarray of shape (n_measured,)
-        In Hz.
-    shapes : ndarray of shape (n_dofs, n_measured)
-        At the measured degrees of freedom, of unit modal mass.
-    ranks : ndarray of int of shape (n_measured,) or None
-        Which of the model's modes they are, the lowest being 0. None where modes are paired column by column.
-    derivatives : callable
-        Returns the derivatives of frequencies (n_measured, n_parameters) and shapes (n_dofs, n_measured, n_parameters).
-    """
+    """The model's modes at one theta, one for each measured mode and in their order."""
 
     frequencies: Array
-    shapes: Array
-    ranks: NDArray[np.intp] | None
-    derivatives: Callable[[], tuple[Array, Array]]
+    shapes: Array  # (n_dofs, n_measured) at the measured degrees of freedom
+    ranks: NDArray[np.intp] | None  # among the model's modes; None where modes are paired column by column
+    derivatives: Callable[[], tuple[Array, Array]]  # of frequencies and of shapes, by the parameters
 
 
 def paired_modes(model: FEModel, measured: Measured, theta: Array) -> PairedModes:
@@ -60,17 +48,33 @@ def mac_table(shapes: Array, measured: Array) -> Array:
     return (measured.T @ shapes) ** 2 / np.where(squares > 0, squares, np.inf)
 
 
+def tangents(shapes: Array, measured: Array) -> Array:
+    """Differences e = phi / (u' phi) - u between shapes phi and measured unit shapes u, (n_dofs, n_modes).
+
+    Whatever the scale and sign of phi, e is orthogonal to u, and its length is the tangent of the angle between them:
+    its square is 1 / MAC - 1.
+    """
+    return shapes / np.einsum("dm,dm->m", measured, shapes) - measured
+
+
+def tangent_derivatives(shapes: Array, d_shapes: Array, measured: Array) -> Array:
+    """Derivatives of `tangents`, from derivatives of the shapes (n_dofs, n_modes, n_parameters)."""
+    along = np.einsum("dm,dm->m", measured, shapes)[:, np.newaxis]
+    d_along = np.einsum("dm,dmp->mp", measured, d_shapes)
+    return d_shapes / along - shapes[:, :, np.newaxis] * (d_along / along**2)
+
+
 def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
     def frequencies_at(rows: Array) -> Array:
         return as_floats(model.frequencies(rows))  # not `evaluate`, which warns of every theta without modes
 
     def derivatives() -> tuple[Array, Array]:
-        jacobian = getattr(model, "jacobian", None)
-        gradient = jacobian(row)[0] if jacobian else central_jacobian(frequencies_at, row, DIFFERENCE_STEP)
-        return gradient[measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
+        exact = getattr(model, "jacobian", None)
+        slopes = exact(row) if exact else central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+        return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
-    frequencies = frequencies_at(row)[0, measured.columns]
-    return PairedModes(frequencies, np.empty((0, len(frequencies))), None, derivatives)
+    frequencies = frequencies_at(row)
+    return PairedModes(frequencies[0, measured.columns], np.empty((0, len(measured.columns))), None, derivatives)
 
 
 def _by_shape(model: LocalModel, measured: Measured, theta: Array) -> PairedModes:

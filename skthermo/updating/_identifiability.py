@@ -1,5 +1,7 @@
 """Which parameters measured modes can identify, and how accurately."""
 
+from __future__ import annotations
+
 from numbers import Real
 
 import numpy as np
@@ -11,17 +13,21 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
 from skthermo._arguments import check_noise
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
 from skthermo._models import check_model
 from skthermo.fem import FEModel, shape_jacobian
-from skthermo.updating._information import cramer_rao, shape_directions, tangent_derivatives
+from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 
-COLLINEAR = 0.99
+COLLINEAR_COSINE = 0.99
 """Cosine between two parameters' effects at and above which they cannot be told apart."""
 
-WELL_KNOWN = 0.1
+ACCURATE = 0.1
 """Largest relative standard deviation of the estimates of a recommended subset."""
+
+
+NO_INFORMATION = 1e-12
+"""Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
 
 
 class Identifiability(Bunch):
@@ -140,13 +146,60 @@ def identifiability(
     )
 
 
+def cramer_rao(information: ArrayLike) -> Array:
+    """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix.
+
+    Parameters
+    ----------
+    information : array-like of shape (n_parameters, n_parameters)
+        Symmetric, perhaps singular.
+
+    Returns
+    -------
+    ndarray of shape (n_parameters, n_parameters)
+        Parameters that are not determined have infinite variances and NaN covariances. All NaN if the
+        information has NaN.
+
+    Raises
+    ------
+    ValueError
+        If the information is not a symmetric matrix of numbers, or has a negative diagonal.
+
+    Examples
+    --------
+    >>> from skthermo.updating import cramer_rao
+    >>> cramer_rao([[4.0, 0.0], [0.0, 0.0]])
+    array([[0.25,  nan],
+           [ nan,  inf]])
+    """
+    information = real_array(information, "information")
+    if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
+        raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
+    if not np.isfinite(information).all():
+        return np.full_like(information, np.nan)
+    diagonal = np.diagonal(information)
+    if (diagonal < 0).any() or not np.allclose(information, information.T, rtol=1e-6, atol=1e-6 * diagonal.max()):
+        raise ValueError(
+            f"information is {information.tolist()!s:.200}; expected a symmetric matrix, none of its diagonal negative"
+        )
+    scale = np.sqrt(diagonal)
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    known = values > NO_INFORMATION * max(values[-1], np.finfo(float).tiny)
+    covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    unknown = (vectors[:, ~known] ** 2).sum(axis=1) > np.sqrt(NO_INFORMATION)
+    covariance[unknown] = covariance[:, unknown] = np.nan
+    covariance[unknown, unknown] = np.inf
+    return covariance
+
+
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
     if not isinstance(shape_noise, Real) or not 0 < shape_noise < np.inf:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)
-    slopes = tangent_derivatives(shapes, d_shapes, shape_directions(shapes)) * row[0]
+    slopes = tangent_derivatives(shapes, d_shapes, shapes / np.linalg.norm(shapes, axis=0)) * row[0]
     return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(shapes)) / shape_noise
 
 
@@ -160,7 +213,7 @@ def _deviations(rows: Array, level: float) -> Array:
 def _recommended(rows: Array, ranking: NDArray[np.intp], level: float) -> NDArray[np.intp]:
     """Longest prefix of the ranking whose parameters can be estimated well together."""
     for size in range(len(ranking), 0, -1):
-        if (_deviations(rows[:, ranking[:size]], level) <= WELL_KNOWN).all():
+        if (_deviations(rows[:, ranking[:size]], level) <= ACCURATE).all():
             return ranking[:size]
     return ranking[:0]
 
@@ -170,6 +223,6 @@ def collinear_groups(rows: Array) -> list[NDArray[np.intp]]:
     lengths = np.linalg.norm(rows, axis=0)
     nonzero = np.flatnonzero(lengths > 0)
     directions = rows[:, nonzero] / lengths[nonzero]
-    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR), directed=False)[1]
+    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR_COSINE), directed=False)[1]
     groups = (nonzero[labels == label] for label in np.unique(labels))
     return [group for group in groups if len(group) > 1]

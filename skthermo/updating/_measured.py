@@ -1,6 +1,5 @@
 """Checks of measured frequencies and shapes."""
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,36 +7,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arguments import check_dofs
 from skthermo._arrays import Array, real_array
+from skthermo._warnings import warn_user
 
 
 @dataclass
 class Measured:
-    """Modes that were measured, each with a frequency, a shape or both.
-
-    Attributes
-    ----------
-    names : list of str
-        Of these modes.
-    columns : ndarray of int of shape (n_measured,)
-        Their columns in F.
-    frequencies, deviations : ndarray of shape (n_measured,)
-        Mean over records in Hz, NaN where only the shape was measured; and the standard deviations, in Hz, by which
-        residuals are divided.
-    shapes : ndarray of shape (n_dofs, n_measured)
-        Of unit length, NaN where only the frequency was measured.
-    dofs : ndarray of int of shape (n_dofs,)
-        Where the shapes were measured; empty if none were.
-    shape_weights : ndarray of shape (n_measured,)
-        Zero where no shape was measured.
-    """
+    """Modes that were measured, each with a frequency, a shape or both."""
 
     names: list[str]
-    columns: NDArray[np.intp]
-    frequencies: Array
-    deviations: Array
-    shapes: Array
-    dofs: NDArray[np.intp]
-    shape_weights: Array
+    columns: NDArray[np.intp]  # of these modes in F
+    frequencies: Array  # means over records in Hz; NaN where only the shape was measured
+    deviations: Array  # standard deviations in Hz by which residuals are divided
+    shapes: Array  # (n_dofs, n_measured), of unit length; NaN where only the frequency was measured
+    dofs: NDArray[np.intp]  # empty where no shapes were measured
+    shape_weights: Array  # 0 where no shape was measured
 
     @property
     def has_frequency(self) -> NDArray[np.bool_]:
@@ -98,17 +81,16 @@ def read_measured(
     )
 
 
-def real_shapes(shapes: NDArray) -> Array:
+def _real_shapes(shapes: NDArray) -> Array:
     """Real parts of complex shapes, each rotated by the phase that makes its real part largest."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
     lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
-    warnings.warn(
+    warn_user(
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
         "shape's length, is dropped",
-        UserWarning,
-        stacklevel=7,  # past scikit-learn's wrapper of fit
+        "complex shapes",
     )
     return np.where(np.isnan(shapes), np.nan, turned.real)
 
@@ -131,7 +113,7 @@ def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tu
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = real_shapes(array) if np.iscomplexobj(array) else real_array(shapes, "shapes")
+    array = _real_shapes(array) if np.iscomplexobj(array) else real_array(shapes, "shapes")
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]

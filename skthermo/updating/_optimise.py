@@ -25,7 +25,7 @@ class Outcome(NamedTuple):
 
 
 class SearchHistory:
-    """What one optimisation has seen: its last point, its best one, and how many theta had no modes."""
+    """Record of one optimisation: its last and its best point, and how many theta had no modes."""
 
     def __init__(self, residuals: Residuals, start: Array):
         self._residuals = residuals

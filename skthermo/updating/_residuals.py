@@ -4,8 +4,7 @@ import numpy as np
 
 from skthermo._arrays import Array
 from skthermo.fem import FEModel
-from skthermo.updating._comparison import PairedModes, paired_modes
-from skthermo.updating._information import tangent_derivatives, tangents
+from skthermo.updating._comparison import PairedModes, paired_modes, tangent_derivatives, tangents
 from skthermo.updating._measured import Measured
 
 
@@ -15,18 +14,13 @@ class Residuals:
     A shape's residuals are its `tangents` e, of squared length E = 1 / MAC - 1. Together they have the loss
     ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2, whose slope weights them in the Gauss-Newton matrix.
     (1 - sqrt(MAC)) / sqrt(MAC) itself is quadratic in e: its derivative vanishes at the optimum.
-
-    Attributes
-    ----------
-    weighted : ndarray of int
-        Those of the measured modes whose shapes have a weight.
     """
 
     def __init__(self, model: FEModel, measured: Measured, prior: Array | None):
         self.model = model
         self.measured = measured
         self.prior = prior
-        self.weighted = np.flatnonzero(measured.shape_weights > 0)
+        self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
         self._n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
     def at(self, theta: Array) -> "Point":
@@ -37,19 +31,18 @@ class Residuals:
         """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
         rho = np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
         weights = self.measured.shape_weights[self.weighted] ** 2
-        groups = squares[self._n_plain :].reshape(len(self.weighted), len(self.measured.dofs))
-        E = groups.sum(axis=1)
+        per_mode = len(self.measured.dofs)
+        E = squares[self._n_plain :].reshape(len(self.weighted), per_mode).sum(axis=1)
         secant = np.sqrt(1 + E)
         values = weights * (E / (1 + secant)) ** 2
         slopes = weights * E / (secant * (1 + secant))
-        per_mode = groups.shape[1]
         rho[0, self._n_plain :] = np.repeat(values, per_mode) / max(per_mode, 1)
         rho[1, self._n_plain :] = np.repeat(slopes, per_mode)
         return rho
 
 
 class Point:
-    """Residuals at one theta, and their derivatives when asked for."""
+    """Residuals at one theta, and their derivatives on demand."""
 
     def __init__(self, residuals: Residuals, theta: Array, modes: PairedModes):
         self._residuals = residuals

@@ -1,6 +1,7 @@
 """How strongly parameters change frequencies."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
 from functools import partial
 from numbers import Real
 from typing import Literal
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_theta
 from skthermo._arrays import Array, real_array
+from skthermo._differences import central_differences
 from skthermo._models import check_model
 from skthermo.fem import FEModel, evaluate
 
@@ -76,24 +78,26 @@ def sensitivity(
     Name: f1, dtype: float64
     """
     row = theta_or_nominal(model, theta)
-    frequencies = evaluate(model, row)[0]
+    frequencies = evaluate(model, row)
     if not np.isfinite(frequencies).all():
-        raise ValueError(f"the model has the frequencies {frequencies} at theta = {row[0].tolist()}; expected numbers")
+        raise ValueError(
+            f"the model has the frequencies {frequencies[0]} at theta = {row[0].tolist()}; expected numbers"
+        )
     if method == "exact":
         if not hasattr(model, "jacobian"):
             raise ValueError(f"{model!r} has no method 'jacobian'; expected one that has, or method='central'")
-        gradient = model.jacobian(row)[0]
+        jacobian = model.jacobian(row)
     elif method == "central":
         if not isinstance(step, Real) or not SMALLEST_STEP <= step < 1:
             raise ValueError(
                 f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which rounding takes "
                 "more than half of the digits, to 1, such as 0.01"
             )
-        gradient = central_jacobian(partial(evaluate, model), row, step)
+        jacobian = central_differences(partial(evaluate, model), row, frequencies, step)
     else:
         raise ValueError(f"method is {method!r}; expected 'exact' or 'central'")
     names = [f"f{i + 1}" for i in range(model.n_modes)]
-    return pd.DataFrame(gradient * row / frequencies[:, np.newaxis], names, list(model.parameter_names))
+    return pd.DataFrame(jacobian[0] * row / frequencies.T, names, list(model.parameter_names))
 
 
 def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
@@ -136,14 +140,3 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
     check_model(model)
     names = model.parameter_names
     return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
-
-
-def central_jacobian(frequencies: Callable[[Array], Array], row: Array, step: float) -> Array:
-    """d f / d theta by central differences of a relative step, (n_modes, n_parameters); one-sided beside NaN."""
-    steps = np.diag(step * row[0])
-    sides = np.array(np.split(frequencies(np.vstack([row + steps, row - steps])), 2))
-    known = ~np.isnan(sides)
-    if not known.all():
-        sides = np.where(known, sides, frequencies(row))
-    widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * step * row[0][:, np.newaxis]
-    return ((sides[0] - sides[1]) / widths).T

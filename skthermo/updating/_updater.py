@@ -1,7 +1,10 @@
 """FE model updating."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from numbers import Integral, Real
 from typing import Literal
 
@@ -17,11 +20,18 @@ from skthermo._arrays import Array, Bounds, real_array
 from skthermo._frames import column_names
 from skthermo._models import check_model
 from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
-from skthermo.fem import FEModel
-from skthermo.updating._information import cramer_rao
+from skthermo.fem import CallableModel, FEModel
+from skthermo.updating._diagnostics import (
+    doubtful_frequencies,
+    doubtful_parameters,
+    false_matches,
+    modes_table,
+    starts_table,
+    unfinished,
+)
+from skthermo.updating._identifiability import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._report import doubtful_fits, false_matches, modes_table, rescaled, starts_table, unfinished
 from skthermo.updating._residuals import Residuals
 
 
@@ -175,7 +185,7 @@ class ModelUpdater(BaseEstimator):
         shapes: ArrayLike | None = None,
         dofs: ArrayLike | None = None,
         frequency_std: ArrayLike | None = None,
-    ) -> "ModelUpdater":
+    ) -> ModelUpdater:
         """Find the multipliers with which the model comes closest to the measurements.
 
         Parameters
@@ -214,7 +224,8 @@ class ModelUpdater(BaseEstimator):
             reduced.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
-        bounds, prior = self._read_bounds(), self._read_prior()
+        bounds = self._read_bounds()
+        prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
         n_parameters = len(bounds)
         if prior is None and n_parameters > measured.n_residuals:
             warnings.warn(
@@ -234,20 +245,15 @@ class ModelUpdater(BaseEstimator):
             )
 
         self.theta_ = best.theta
-        self.model_ = rescaled(self.model, best.theta)
+        self.model_ = _rescaled(self.model, best.theta)
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
         self.table_ = modes_table(model, measured, best.theta)
         doubts = [*false_matches(model, measured, best.theta)]
         if best.success:
-            doubts += doubtful_fits(
-                measured,
-                self.table_,
-                best.theta,
-                bounds,
-                self.covariance_ if prior is None else None,
-                self.model.parameter_names,
-            )
+            covariance = self.covariance_ if prior is None else None
+            doubts += doubtful_parameters(self.model.parameter_names, best.theta, bounds, covariance)
+            doubts += doubtful_frequencies(measured, self.table_)
         else:
             doubts.append(unfinished(best, residuals))
         for message in doubts:
@@ -284,9 +290,6 @@ class ModelUpdater(BaseEstimator):
                 raise ValueError(f"bounds of parameter {name!r} are [{lowest}, {highest}]; expected them to contain 1")
         return bounds
 
-    def _read_prior(self) -> Array | None:
-        return None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
-
     def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
         lowest, highest = bounds.T
         random_state = check_random_state(self.random_state)
@@ -295,10 +298,22 @@ class ModelUpdater(BaseEstimator):
         starts = np.vstack([np.ones(len(bounds)), drawn])
         return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
 
-    def __sklearn_clone__(self) -> "ModelUpdater":
+    def __sklearn_clone__(self) -> ModelUpdater:
         return clone_sharing_models(self)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+
+def _rescaled(model: FEModel, theta: Array) -> FEModel:
+    """A model whose nominal state is the given model at theta."""
+    if hasattr(model, "rescaled"):
+        return model.rescaled(theta)
+    function = partial(_frequencies_from, model, theta)
+    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
+
+
+def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
+    return model.frequencies(origin * theta)

@@ -10,7 +10,7 @@ import numpy as np
 from measure import median_seconds
 
 from skthermo.fem import Beam, Structure
-from skthermo.fem.affine._terms import DenseTerms, SparseTerms
+from skthermo.fem._terms import DenseTerms, SparseTerms
 from skthermo.fem.modal import ShiftInvertSolver, dense_solver
 
 SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}

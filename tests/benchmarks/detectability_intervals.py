@@ -13,7 +13,7 @@ import pandas as pd
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from skthermo.studies._intervals import INTERVALS, rate_of
+from skthermo.studies.detectability._intervals import rate_of
 
 RATES = (0.02, 0.3, 0.95)
 CORRELATIONS = (0.0, 0.5, 0.8, 0.95)
@@ -29,12 +29,12 @@ def decisions(random, rate, correlation, n_repeats, n_records):
     return noise - limits, norm.cdf(limits).mean()
 
 
-def coverage(interval, rate, correlation, size, n_simulations, confidence):
+def coverage(rate, correlation, size, n_simulations, confidence):
     """Percentage of intervals that hold the rate, their mean width, and the share of the records that is effective."""
     random, found, truth = np.random.RandomState(0), [], 0.0
-    for seed in range(n_simulations):
+    for _ in range(n_simulations):
         values, truth = decisions(random, rate, correlation, *size)
-        found.append(rate_of(values, interval, confidence, seed))
+        found.append(rate_of(values, confidence))
     held = np.mean([each.lowest <= truth <= each.highest for each in found])
     width = np.mean([each.highest - each.lowest for each in found])
     return 100 * held, 100 * width, 100 * np.mean([each.n_effective / each.n_records for each in found])
@@ -46,20 +46,17 @@ def main():
     parser.add_argument("--confidence", type=float, default=0.95)
     options = parser.parse_args()
     rows = {}
-    for interval in INTERVALS:
-        for n_repeats, n_records in SIZES:
-            for correlation in CORRELATIONS:
-                for rate in RATES:
-                    key = (interval, f"{n_repeats} x {n_records}", correlation, rate)
-                    size = (n_repeats, n_records)
-                    rows[key] = coverage(interval, rate, correlation, size, options.simulations, options.confidence)
-    names = ["interval", "repeats x records", "correlation", "rate"]
+    for size in SIZES:
+        for correlation in CORRELATIONS:
+            for rate in RATES:
+                found = coverage(rate, correlation, size, options.simulations, options.confidence)
+                rows[f"{size[0]} x {size[1]}", correlation, rate] = found
+    names = ["repeats x records", "correlation", "rate"]
     index = pd.MultiIndex.from_tuples(list(rows), names=names)
     table = pd.DataFrame(list(rows.values()), index=index, columns=["held, %", "width, points", "effective, %"])
     print(f"{options.confidence:.0%} intervals of {options.simulations} simulations each\n")
     print(table.unstack("rate").round(1).to_string(), end="\n\n")
-    held = table["held, %"].groupby("interval").agg(["min", "mean", "max"])
-    print(held.round(1).to_string())
+    print(table["held, %"].agg(["min", "mean", "max"]).round(1).to_string())
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Reading KW51's monitoring: files as they were published, in every way that MATLAB may have stored them; bad ones."""
 
 import hashlib
+import re
 import struct
 
 import numpy as np
@@ -14,7 +15,9 @@ from hypothesis.extra.numpy import arrays
 from skthermo.datasets import _kw51_file, load_kw51
 from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
 
-FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
+IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
+FUZZ = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*has the MD5 checksum:UserWarning")
 HOUR = pd.Timedelta("1h")
 
@@ -206,7 +209,7 @@ N = 12
 SHAPE = r"\(12, 14, 12\)"
 BAD = [
     ({"xi": None}, r"no field \['xi'\] in 'modes'; found \['env', 'f', "),
-    ({"f": "text"}, "field 'f' is text, a cell array or a struct; expected a full array"),
+    ({"f": "text"}, "field 'f' is text, a cell array, a struct or sparse; expected a full array"),
     ({"f": np.empty((0, 14))}, r"field 'f' has shape \(0, 14\); expected records"),
     ({"f": np.ones((N, 14, 2))}, r"field 'f' has shape \(12, 14, 2\)"),
     ({"f": np.ones((N, 1001))}, "expected records times at most 1000 modes"),
@@ -240,11 +243,12 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "message"), BAD)
-def test_bad_content_names_file_field_and_place(tmp_path, changes, message):
-    fields = {name: value for name, value in (kw51_fields() | changes).items() if value is not None}
-    with pytest.raises(ValueError, match=rf"broken\.mat: .*{message}"):
-        load_kw51(write(tmp_path / "broken.mat", fields))
+def test_bad_content_names_file_field_and_place(tmp_path):
+    for changes, message in BAD:
+        fields = {name: value for name, value in (kw51_fields() | changes).items() if value is not None}
+        with pytest.raises(ValueError, match=r"broken\.mat: ") as caught:
+            load_kw51(write(tmp_path / "broken.mat", fields))
+        assert re.search(message, str(caught.value)), f"{message}: {caught.value}"
 
 
 def test_a_doubtful_weather_channel_does_not_hide_the_rest(tmp_path):
@@ -254,7 +258,7 @@ def test_a_doubtful_weather_channel_does_not_hide_the_rest(tmp_path):
     assert data.temperatures["grVL"].iloc[4] == -999
 
 
-def test_files_of_another_kind_are_refused(tmp_path, monkeypatch):
+def test_files_of_another_kind_are_refused(tmp_path):
     file = tmp_path / "other.mat"
     with pytest.raises(FileNotFoundError, match=r"other\.mat is not a file"):
         load_kw51(file)
@@ -264,7 +268,7 @@ def test_files_of_another_kind_are_refused(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"other\.mat: the variables are \['data', 'nc'\]; expected a struct 'modes'"):
         load_kw51(file)
     file.write_bytes(b"")
-    with pytest.raises(ValueError, match=r"other\.mat: not a MATLAB v5 file"):
+    with pytest.raises(ValueError, match=r"other\.mat: not readable as MATLAB v5 \(another format"):
         load_kw51(file)
     for modes in (np.ones((2, 2)), "text"):
         with pytest.raises(ValueError, match=r"other\.mat: 'modes' is no single struct; expected a struct"):
@@ -272,9 +276,6 @@ def test_files_of_another_kind_are_refused(tmp_path, monkeypatch):
     several = np.zeros((2, 1), dtype=[(name, "O") for name in kw51_fields()])
     with pytest.raises(ValueError, match=r"other\.mat: 'modes' is no single struct"):
         load_kw51(write(file, several))
-    monkeypatch.setattr(_kw51_file, "LARGEST_FILE", 1000)
-    with pytest.raises(ValueError, match=r"other\.mat: \d+ MB; expected at most 0 MB"):
-        load_kw51(write(file, kw51_fields()))
 
 
 def outcome(file, content):
@@ -289,8 +290,9 @@ def outcome(file, content):
 SMALL = kw51_fields(frequencies=np.full((3, 2), 2.0), shapes=np.ones((3, 2, 2)) * 1j, channels=CHANNELS[:3])
 
 
+@IN_A_CHILD
 @NOT_PUBLISHED
-@FUZZ
+@settings(FUZZ, max_examples=3)
 @given(cut=st.integers(0, 10**6), position=st.integers(0, 10**6), byte=st.integers(0, 255))
 @pytest.mark.parametrize("form", ["mat", "packed", "zip"])
 def test_damaged_and_truncated_files_never_become_nonsense(tmp_path, form, cut, position, byte):

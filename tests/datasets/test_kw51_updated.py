@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skthermo.datasets import make_kw51
-from skthermo.datasets._kw51 import UPDATED as THETA
+from skthermo.datasets._kw51_model import UPDATED as THETA
 from skthermo.updating import ModelUpdater
 
 MEASURED = np.array([0.51, 1.24, 1.89, 2.45, 2.58, 2.92])

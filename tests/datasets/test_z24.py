@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from skthermo.datasets import load_z24
 
+pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
+IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 MODES = ["f1", "f2", "f3", "f4"]
 RNG = np.random.default_rng(0)
@@ -128,7 +130,7 @@ def test_bad_matlab_names_file_and_field(tmp_path, changes, message):
 
 def test_a_table_far_too_large_is_refused(tmp_path):
     (tmp_path / "large.csv").write_text(csv_text() + "0,1\n" * 4_000_000)
-    with pytest.raises(ValueError, match=r"large\.csv: .* MB of memory; expected at most 256 MB"):
+    with pytest.raises(ValueError, match=r"large\.csv: \d+ MB; expected at most 13 MB"):
         load_z24(tmp_path / "large.csv")
 
 
@@ -165,9 +167,20 @@ def packed_file(tmp_path):
 
 @FUZZ
 @given(cut=st.integers(0, 10_000), position=st.integers(0, 10_000), byte=st.integers(0, 255))
-@pytest.mark.parametrize("form", ["csv_file", "mat_file", "packed_file"])
+def test_damaged_and_truncated_tables_never_become_nonsense(csv_file, cut, position, byte):
+    check_damaged(csv_file, cut, position, byte)
+
+
+@IN_A_CHILD
+@settings(FUZZ, max_examples=3)
+@given(cut=st.integers(0, 10_000), position=st.integers(0, 10_000), byte=st.integers(0, 255))
+@pytest.mark.parametrize("form", ["mat_file", "packed_file"])
 def test_damaged_and_truncated_files_never_become_nonsense(form, request, cut, position, byte):
-    file = request.getfixturevalue(form)
+    check_damaged(request.getfixturevalue(form), cut, position, byte)
+
+
+def check_damaged(file, cut, position, byte):
+    """One byte changed, and the end cut off."""
     content = bytearray(file.read_bytes())
     content[position % len(content)] = byte
     check_outcome(file.with_name(f"damaged{file.suffix}"), bytes(content))

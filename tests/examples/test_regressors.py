@@ -1,11 +1,13 @@
 """Laws of the study of regressors, at its smallest size."""
 
+import functools
+
 import numpy as np
 import pytest
 from pandas.testing import assert_frame_equal
 from sklearn.base import clone
 
-from skthermo.surrogate import InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import InverseSurrogate, TemperatureMapper, paper_network
 from tests.examples.frozen_bridge import frozen_bridge
 from tests.examples.pages import recipes
 
@@ -17,6 +19,14 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore:Got `batch_size` less than 1 or larger",
     r"ignore:\d+ of \d+ (theta are outside|rows have temperatures far outside)",
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _networks_of_few_epochs():
+    """The laws hold for a paper's network that has hardly learned."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(EXAMPLE, "paper_network", functools.partial(paper_network, max_iter=20))
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -61,6 +61,8 @@ def test_mass_parameters_have_derivatives_of_the_other_sign():
     model = AffineModel({("k",): [[4.0]]}, {("m",): [[1.0]]}, n_modes=1)
     frequencies, jacobian = linearise(model, [[2.0, 3.0]])
     np.testing.assert_allclose(jacobian[0, 0] / frequencies[0], [0.5 / 2.0, -0.5 / 3.0], rtol=1e-12)
+    relative = linearise(model, [[2.0, 3.0], [0.5, 1.5]], relative=True)[1]
+    np.testing.assert_allclose(relative[:, 0], [[0.5, -0.5], [0.5, -0.5]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("step", [0, 1.5, "small"])

@@ -22,10 +22,11 @@ def test_a_fine_mesh_is_no_mechanism(direction):
     np.testing.assert_allclose(frequencies[0, 0], exact, rtol=2e-3)
 
 
-@pytest.mark.parametrize("n_beams", [5, 40, 400, 2000])
-@pytest.mark.parametrize("supports", [{}, {0: "xyz"}, {0: "xyz", -1: "xyz"}])
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
-def test_a_mechanism_is_one_in_every_mesh(n_beams, supports, direction):
-    ends = {n_beams if node < 0 else node: along for node, along in supports.items()}
+def test_a_mechanism_is_one_in_every_mesh(direction):
+    for n_beams in (5, 40, 400):
+        for ends in ({}, {0: "xyz"}, {0: "xyz", n_beams: "xyz"}):
+            with pytest.raises(ValueError, match="the structure is a mechanism"):
+                cantilever(n_beams, ends, direction=direction)
     with pytest.raises(ValueError, match="the structure is a mechanism"):
-        cantilever(n_beams, ends, direction=direction)
+        cantilever(2000, {0: "xyz", 2000: "xyz"}, direction=direction)

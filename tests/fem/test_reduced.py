@@ -112,6 +112,14 @@ def test_theta_outside_the_bounds_warns_once_a_call():
         REDUCED.frequencies([[0.7] * 4, [1.3] * 4])
 
 
+def test_a_rescaled_model_keeps_its_box():
+    origin = np.array([0.8, 1.0, 1.2, 1.1])
+    rescaled = REDUCED.rescaled(origin)
+    np.testing.assert_allclose(rescaled.frequencies(THETA / origin), REDUCED.frequencies(THETA), rtol=1e-9)
+    with pytest.warns(UserWarning, match="1 of 1 theta are outside the bounds"):
+        rescaled.frequencies([[0.8, 1.0, 1.0, 1.0]])
+
+
 def test_a_reduced_model_is_a_model_like_any():
     assert isinstance(REDUCED, FEModel)
     assert clone(REDUCED) is REDUCED

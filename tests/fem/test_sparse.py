@@ -11,8 +11,8 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
+from skthermo.fem._terms import DenseTerms, SparseTerms
 from skthermo.fem.affine._read_terms import DENSE_DOFS
-from skthermo.fem.affine._terms import DenseTerms, SparseTerms
 from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, SECTION, portal
 

@@ -59,14 +59,14 @@ def test_the_first_record_is_the_onset_by_default_also_on_stamps():
 @pytest.mark.parametrize(
     ("index", "onset", "message"),
     [
-        (INDEX, 6, "onset is 6 for 6 records; expected a position from 0, not after the last record"),
+        (INDEX, 6, "onset is 6 for 6 records; expected one not after the last record"),
         (INDEX, -1, "onset is -1 for 6 records; expected a position"),
         (INDEX, 0.5, "onset is 0.5 for 6 records; expected a position"),
         ([], None, "onset is None for 0 records"),
         (
             SERIES,
             "2026",
-            "onset is '2026' .*expected a position from 0, or a time, not after the last record",
+            "onset is '2026' for 6 records; expected one not after the last record",
         ),
         (SERIES, "soon", "onset is 'soon' for 6 records; expected a position from 0, or a time"),
         (

@@ -76,5 +76,5 @@ def test_the_onset_may_be_in_another_time_zone():
 
 def test_an_onset_that_is_no_time_is_named():
     index = pd.Series(1.0, pd.date_range("2024-07-01", periods=4))
-    with pytest.raises(ValueError, match="'soon' is no time; expected one"):
+    with pytest.raises(ValueError, match="'soon' is not a time; expected one"):
         DamageIndexDisplay.from_predictions(index, 2.0, onset="soon")

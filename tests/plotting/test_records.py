@@ -130,7 +130,7 @@ def test_marks_stand_at_a_time_or_at_a_record(later):
         assert display.axes_[0].texts[0].get_text().strip() == "hold-out"
     with pytest.raises(ValueError, match="no record number 999; expected a time, or 0 to 364"):
         HistoryDisplay.from_predictions(later.frequencies, marks={"x": 999})
-    with pytest.raises(ValueError, match="is no number"):
+    with pytest.raises(ValueError, match="is not a number"):
         HistoryDisplay.from_predictions(later.frequencies.to_numpy(), marks={"x": at})
 
 

@@ -68,6 +68,18 @@ def test_linear_regression_on_hinges_gives_any_broken_line(n_knots, seed):
     np.testing.assert_allclose(model.predict(beyond[:, np.newaxis]), broken(beyond), atol=1e-7)
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 6), st.integers(0, 10_000))
+def test_the_weight_of_a_row_is_how_often_it_counts(n_knots, seed):
+    rng = np.random.default_rng(seed)
+    X, weights = rng.normal(size=(30, 2)), rng.integers(0, 4, 30)
+    X[rng.random(30) < 0.2, 1] = np.nan
+    weighted = HingeFeatures(n_knots).fit(X, sample_weight=weights)
+    np.testing.assert_allclose(weighted.knots_, HingeFeatures(n_knots).fit(X.repeat(weights, axis=0)).knots_)
+    small = HingeFeatures(n_knots).fit(X, sample_weight=np.full(30, 1e-3)).knots_
+    assert ((small >= np.nanmin(X, axis=0)) & (small <= np.nanmax(X, axis=0))).all()
+
+
 def test_lines_of_two_sensors_add_up():
     rng = np.random.default_rng(0)
     air, deck = rng.uniform(-10, 30, (2, 500))
@@ -88,6 +100,8 @@ def test_ridge_regression_goes_on_straight_beyond_the_data():
 def test_columns_without_values_and_bad_numbers_of_knots_are_errors():
     with pytest.raises(ValueError, match="'deck' is NaN in every row; expected values to place knots at"):
         HingeFeatures().fit(AIR.assign(deck=np.nan))
+    with pytest.raises(ValueError, match="'deck' is NaN in every row"):
+        HingeFeatures().fit(AIR.assign(deck=AIR["deck"].where(AIR["air"] > 0)), sample_weight=AIR["air"] <= 0)
     for n_knots in (0, 1.5, "many"):
         with pytest.raises(ValueError, match="'n_knots'"):
             HingeFeatures(n_knots).fit(AIR)

@@ -14,7 +14,8 @@ from sklearn.utils import Bunch
 
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from skthermo.preprocessing._assignment import MISSED, assign, shape_agreement
+from skthermo.preprocessing.tracking._assignment import MISSED, assign
+from skthermo.preprocessing.tracking._reference import shape_agreement
 from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)
@@ -300,7 +301,7 @@ def test_rad_per_second_is_an_error(factor):
         ({"shapes": GOOD.shapes.transpose(0, 2, 1)}, r"shapes have shape \(12, 6, 3\); expected \(12, 3"),
         ({"shapes": GOOD.shapes * np.inf}, "infinite"),
         ({"shapes": [["a"]]}, "expected numbers, real or complex"),
-        ({"shapes": [[1, 2], [3]]}, "no array of numbers"),
+        ({"shapes": [[1, 2], [3]]}, "is not numeric"),
         ({"damping": GOOD.damping * 1j}, "complex"),
         ({"damping": GOOD.damping[:5]}, "frequencies has 12 rows and damping 5"),
         ({"frequencies": list(GOOD.frequencies), "shapes": list(GOOD.shapes)[:5]}, "shapes has 5 records"),

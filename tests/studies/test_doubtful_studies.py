@@ -7,7 +7,7 @@ from sklearn.linear_model import Ridge
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
-from skthermo.studies._summary import band_of
+from skthermo.studies.detectability._judged import band_of
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -22,7 +22,7 @@ def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expecte
     random, inside = np.random.default_rng(0), []
     for _ in range(2000):
         rates = random.uniform(0, 1, n_repeats + 1)
-        decisions = np.where(np.arange(1000) < 1000 * rates[:, np.newaxis], -1.0, 1.0)
+        decisions = np.where(np.arange(200) < 200 * rates[:, np.newaxis], -1.0, 1.0)
         lowest, highest = band_of(decisions[:-1], 0.95)
         inside.append(lowest <= (decisions[-1] < 0).mean() <= highest)
     assert np.mean(inside) == pytest.approx(expected, abs=0.04)
@@ -45,6 +45,7 @@ def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
 def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     both = study(fem, [*sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]])
     both.run(WEATHER)
+    assert [both.is_undetected(family) for family in ("bottom", "vertical")] == [False, True]
     with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase.*as rare as for the healthy"):
         curve = both.minimum_detectable_damage(method="curve")
     assert 0.1 < curve.loc[("bottom", "data-informed"), "mdd"] < 0.3

@@ -155,25 +155,6 @@ def test_overlapping_groups_multiply(fem):
     assert (found.draws["bottom"] >= found.draws[["top", "diagonal"]].max(axis=1) - 1e-12).all()
 
 
-@pytest.mark.filterwarnings("ignore:damage of these groups does not explain")
-def test_standard_errors_are_those_of_repeats(fem):
-    """Independent records with the noise stated: nine in ten estimates, and more, within two standard errors."""
-    clean, truth, noise = simulated(fem, {"top": 0.1}), np.array([0.0, 0.1, 0.0]), 0.01
-    random = np.random.RandomState(0)
-    number = fem.expected_residuals(WEATHER, return_number=True)[1][0]
-    scatter = noise * np.sqrt(1 + len(clean) / number)  # of training and new records
-    found = []
-    for _ in range(30):
-        F = clean * (1 + scatter * random.standard_normal(clean.shape))
-        found.append(identify_damage(fem, WEATHER, F, GROUPS, noise=noise, random_state=0))
-    estimates = np.array([each.severities for each in found])
-    errors = np.array([each.standard_errors for each in found])
-    held = (np.abs(estimates - truth) <= 2 * errors).mean(axis=0)
-    assert (held > 0.85).all()
-    assert np.median(errors[:, 1]) == pytest.approx(estimates[:, 1].std(), rel=0.25)
-    assert np.mean([each.misfit_p_value < 0.1 for each in found]) == pytest.approx(0.1, abs=0.1)
-
-
 def test_known_standard_error_of_a_single_group(fem):
     """With one group, the standard error is that of weighted least squares."""
     F, noise = simulated(fem, {"top": 0.2}), 0.01
@@ -187,6 +168,16 @@ def test_known_standard_error_of_a_single_group(fem):
     assert found.table.loc["top", "error_alone"] == pytest.approx(expected, rel=1e-4)
     assert found.table.loc["top", "standard_error"] == pytest.approx(expected, rel=0.1)
     assert found.single.loc["top", "severity"] == pytest.approx(0.2, abs=1e-4)
+
+
+def test_significance_is_that_of_all_groups_together(fem):
+    """Bonferroni: with three groups, one is significant if its p-value is below a third of the error rate."""
+    F, options = simulated(fem, {"top": 0.01}), {"groups": GROUPS, "noise": 0.01, "random_state": 0}
+    p_value = identify_damage(fem, WEATHER, F, **options).table.loc["top", "p_value"]
+    assert 0 < p_value < 0.25
+    for factor, is_significant in ((2.9, False), (3.1, True)):
+        found = identify_damage(fem, WEATHER, F, significance=factor * p_value, **options)
+        assert found.table.loc["top", "significant"] == is_significant
 
 
 def test_draws_make_a_scenario(fem):

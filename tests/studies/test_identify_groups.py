@@ -177,7 +177,7 @@ def test_a_mode_of_which_all_training_records_are_of_one_period():
         ({"significance": 1.0}, "significance is 1.0; expected a probability between 0 and 1"),
         ({"shapes": (np.ones((2, 6)), np.ones((2, 6)))}, "shapes came without dofs"),
         ({"dofs": [0, 1]}, "dofs came without shapes"),
-        ({"shapes": np.ones((2, 2, 6)), "dofs": [0, 1]}, "shapes is no pair"),
+        ({"shapes": np.ones((2, 2, 6)), "dofs": [0, 1]}, "shapes is not a pair"),
         ({"shapes": (np.ones((2, 6)), np.ones((3, 6))), "dofs": [0, 1]}, r"the damaged shapes have shape \(3, 6\)"),
         ({"shapes": (np.ones((2, 6)), np.zeros((2, 6))), "dofs": [0, 1]}, "the damaged shape of mode 0 is zero"),
         ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0, 99]}, "dofs reach from 0 to 99; expected 0 to 22"),

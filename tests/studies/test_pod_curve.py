@@ -133,7 +133,7 @@ def test_impossible_questions_are_errors():
         curve.predict(-0.2)
 
 
-def warned_share(pod, n_records, n_draws=300):
+def warned_share(pod, n_records, n_draws=100):
     """Share of binomial data of which the curve is said to miss the points."""
     random, n_warned = np.random.RandomState(0), 0
     for _ in range(n_draws):
@@ -169,6 +169,6 @@ def test_bounds_hold_a90_as_often_as_they_say(log):
     intercept = -slope * x[2]
     truth = (logit(0.9) - intercept) / slope
     truth = np.exp(truth) if log else truth
-    draws = random.binomial(100, expit(intercept + slope * x), size=(500, 5))
+    draws = random.binomial(100, expit(intercept + slope * x), size=(250, 5))
     bounds = [pod_curve(SEVERITIES, draw, np.full(5, 100), log=log).a90_95 for draw in draws]
     assert 0.92 < np.mean(np.array(bounds) >= truth) < 0.98

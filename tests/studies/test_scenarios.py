@@ -92,10 +92,10 @@ def test_sudden_damage_is_there_from_its_onset():
     ("rows", "onset", "end", "message"),
     [
         (ROWS, 10, None, "expected an onset that is not after the last record"),
-        (ROWS, -1, None, "expected an onset that is not after the last record"),
+        (ROWS, -1, None, "onset is -1 for 10 records; expected a position from 0$"),
         (ROWS, 4, 3, "an end that is not before it"),
-        (ROWS, "2025-01-03", None, "onset is '2025-01-03'; expected the number of a record$"),
-        (DAYS, "soon", None, "onset is 'soon'; expected the number of a record, or a time"),
+        (ROWS, "2025-01-03", None, "onset is '2025-01-03' for 10 records; expected a position from 0$"),
+        (DAYS, "soon", None, "onset is 'soon' for 10 records; expected a position from 0, or a time$"),
         (DAYS, "2026-01-01", None, "expected an onset that is not after the last record"),
         (DAYS.tz_localize("UTC"), "2025-01-03", None, "a time in the time zone UTC"),
     ],

@@ -51,11 +51,11 @@ def test_same_bits_whatever_the_jobs(fem):
     scenarios = [*sweep(fem, (0.1, 0.3), ["bottom", "top"]), ProgressiveDamage("crack", {"top": 0.3}, 50, 90)]
     study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=3, random_state=0)
     weather = WEATHER[:150]
-    expected = study.run(weather, SIDE_BY_SIDE, interval="block-bootstrap")
+    expected = study.run(weather, SIDE_BY_SIDE)
     twin = clone(study).set_params(n_jobs=2)
-    pd.testing.assert_frame_equal(twin.run(weather, SIDE_BY_SIDE, interval="block-bootstrap"), expected)
+    pd.testing.assert_frame_equal(twin.run(weather, SIDE_BY_SIDE), expected)
     with parallel_config("threading"):
-        threads = twin.run(weather, SIDE_BY_SIDE, interval="block-bootstrap")
+        threads = twin.run(weather, SIDE_BY_SIDE)
     pd.testing.assert_frame_equal(threads, expected)
 
 
@@ -310,7 +310,6 @@ def test_impossible_studies_are_errors(fem, options, message):
         (MahalanobisDetector(), {"baseline": YEAR.frequencies.add_suffix(" Hz")}, "expected modes"),
         (MahalanobisDetector(), {"baseline": YEAR.temperatures}, "expected modes"),
         (MahalanobisDetector(), {"baseline": YEAR.frequencies.to_numpy()[:, :4]}, "expected 6 columns of frequencies"),
-        (MahalanobisDetector(), {"interval": "normal"}, "interval is 'normal'"),
         (MahalanobisDetector(), {"confidence": 95}, "confidence is 95"),
         (MahalanobisDetector(), {"reference": {"top": YEAR.frequencies}}, r"reference has the scenarios \['top'\]"),
         (MahalanobisDetector(), {"reference": YEAR.frequencies.to_numpy()}, "expected {name of scenario: frequencies}"),
@@ -328,8 +327,9 @@ def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
 
 def test_a_study_must_be_run_before_it_is_asked(fem):
     study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1)
-    with pytest.raises(ValueError, match="expected a call of run before"):
-        study.minimum_detectable_damage()
+    for ask in (study.minimum_detectable_damage, lambda: study.is_undetected("top")):
+        with pytest.raises(ValueError, match="expected a call of run before"):
+            ask()
     study.run(WEATHER)
     with pytest.raises(ValueError, match="family 'bottom', source 'data-informed' is not in the results"):
         study.pod_curve("bottom")

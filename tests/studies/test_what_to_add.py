@@ -11,8 +11,8 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import DetectabilityStudy, Scenario, pod_curve, sweep, what_to_add
-from skthermo.studies._candidate import Arrangement
-from skthermo.studies._world import World
+from skthermo.studies.detectability import Arrangement
+from skthermo.studies.extension._campaign import CampaignSimulator
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -130,8 +130,10 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
 
 
 def test_a_longer_baseline_begins_with_the_shorter_one_and_goes_on_in_time(fem):
-    worlds = [World(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, "fitted", n) for n in (365, 800)]
-    (short, tables), (long, others) = (world.draw(world.clean(), seed=3) for world in worlds)
+    simulators = [
+        CampaignSimulator(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, "fitted", n) for n in (365, 800)
+    ]
+    (short, tables), (long, others) = (each.draw(each.clean(), seed=3) for each in simulators)
     pd.testing.assert_frame_equal(short, long.iloc[:365], check_freq=False)
     assert len(long) == 800
     assert (np.diff(long.index) == np.timedelta64(1, "D")).all()

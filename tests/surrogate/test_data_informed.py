@@ -46,14 +46,16 @@ def test_predict_is_the_fe_model_and_nothing_else():
 @pytest.mark.parametrize("seeded", [True, False])
 def test_equals_scikit_learns_transformed_target_regressor(seeded):
     parts = (
-        (inverse(), mapper())
+        (inverse(refine=0), mapper())
         if seeded
-        else (InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, random_state=5), TemperatureMapper(random_state=6))
+        else (
+            InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, refine=0, random_state=5),
+            TemperatureMapper(random_state=6),
+        )
     )
     transformer = make_pipeline(BiasAligner(TRUSS), parts[0])
     words = TransformedTargetRegressor(parts[1], transformer=transformer, check_inverse=False).fit(T, F)
-    alike = {"coordinates": "parameters", "weighted": False}
-    whole = chain(inverse=parts[0], mapper=parts[1], **alike).fit(T, F)
+    whole = chain(inverse=parts[0], mapper=parts[1]).fit(T, F)
     np.testing.assert_allclose(whole.predict(LATER.temperatures), words.predict(LATER.temperatures), rtol=1e-12)
 
 
@@ -229,10 +231,10 @@ def test_nullable_frames_are_frames():
 
 
 def test_pandas_output_everywhere_changes_no_value():
-    transformer = make_pipeline(BiasAligner(TRUSS), inverse())
+    transformer = make_pipeline(BiasAligner(TRUSS), inverse(refine=0))
     words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
     with config_context(transform_output="pandas"):
-        alike = chain(coordinates="parameters", weighted=False).fit(T, F)
+        alike = chain(inverse=inverse(refine=0)).fit(T, F)
         np.testing.assert_allclose(words.fit(T, F).predict(T), alike.predict(T), rtol=1e-12)
         pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), FITTED.predict(T))
 

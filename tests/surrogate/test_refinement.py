@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign, make_z24
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate._posterior import Prior
+from skthermo.surrogate.refinement import Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 

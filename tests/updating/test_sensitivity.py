@@ -6,8 +6,7 @@ import pytest
 
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
-from skthermo.updating import identifiability, select_parameters, sensitivity
-from skthermo.updating._information import cramer_rao
+from skthermo.updating import cramer_rao, identifiability, select_parameters, sensitivity
 from tests.fem.frames import FRAME
 from tests.fem.test_local_modes import building_frame
 

@@ -175,7 +175,7 @@ def test_the_same_bits_whatever_the_number_of_jobs(model):
     dofs = np.arange(0, 20, 3)
     frequencies, shapes = measured(model, TRUTH, dofs)
     fits = [
-        ModelUpdater(model, shape_weight=10.0, n_starts=3, n_jobs=n_jobs, random_state=0).fit(
+        ModelUpdater(model, shape_weight=10.0, n_starts=2, n_jobs=n_jobs, random_state=0).fit(
             frequencies * [1.01, 0.99, 1, 1, 1, 1], shapes=shapes, dofs=dofs
         )
         for n_jobs in (1, 2)
@@ -220,35 +220,42 @@ def test_the_updated_model_composes_with_the_chain():
     np.testing.assert_allclose(updater.model_.damaged({"bottom": 0.5}).frequencies([np.ones(4)]), damaged, rtol=1e-9)
 
 
-@pytest.mark.parametrize("dofs", [None, [0, 3, 7, 9, 14, 17, 21]], ids=["frequencies", "and shapes"])
-def test_covariance_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound(dofs):
-    """Standard deviations of 200 fits are known to 5 %; three of these are 15 %."""
-    noise, shape_noise, n_fits = 0.002, 0.01, 200
+def test_covariance_is_the_noise_that_fits_pass_on_and_the_cramer_rao_bound():
+    """Each frequency is changed by a tenth of its noise, alone; what this changes in theta adds up."""
+    noise, share, truth = 0.002, 0.1, np.array([0.95, 1.05, 1.0, 0.98])
+    frequencies, _ = measured(TRUSS, truth)
+    updater = ModelUpdater(TRUSS, bounds=[[0.2, 3.0]] * 4)
+    fits = [
+        updater.fit(F, frequency_std=noise * frequencies).theta_ for F in frequencies * (1 + share * noise * np.eye(6))
+    ]
+    deviations = np.sqrt(np.diag(updater.fit(frequencies, frequency_std=noise * frequencies).covariance_))
+    bound = identifiability(TRUSS, truth, noise=noise).deviations.to_numpy() * truth
+    np.testing.assert_allclose(deviations, bound, rtol=1e-4)
+    identifiable = bound < 0.1  # where the model is linear over the noise
+    assert identifiable.sum() == 3
+    passed_on = np.linalg.norm((np.array(fits) - updater.theta_) / share, axis=0)
+    np.testing.assert_allclose(passed_on[identifiable], bound[identifiable], rtol=0.02)
+
+
+def test_covariance_with_shapes_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound():
+    """Standard deviations of 50 fits are known to 10 %; three of these are 30 %."""
+    noise, shape_noise, n_fits, dofs = 0.002, 0.01, 50, [0, 3, 7, 9, 14, 17, 21]
     random, truth = np.random.default_rng(0), np.array([0.95, 1.05, 1.0, 0.98])
     frequencies, shapes = measured(TRUSS, truth, dofs)
-    options, weight = {}, 0.0
-    if dofs:
-        options = {"dofs": dofs, "shape_noise": shape_noise}
-        weight = np.sqrt(2 * (len(dofs) - 1)) / shape_noise**2
+    std, level = noise * frequencies, shape_noise * np.sqrt(np.mean(shapes**2, axis=0))
+    weight = np.sqrt(2 * (len(dofs) - 1)) / shape_noise**2
     updater = ModelUpdater(TRUSS, bounds=[[0.2, 3.0]] * 4, shape_weight=weight)
-    found, deviations = [], []
+    found = []
     for _ in range(n_fits):
-        F = frequencies * (1 + noise * random.standard_normal(6))
-        with_shapes = {}
-        if dofs:
-            level = shape_noise * np.sqrt(np.mean(shapes**2, axis=0))
-            with_shapes = {"dofs": dofs, "shapes": shapes + level * random.standard_normal(shapes.shape)}
-        updater.fit(F, frequency_std=noise * frequencies, **with_shapes)
+        noisy = shapes + level * random.standard_normal(shapes.shape)
+        updater.fit(frequencies + std * random.standard_normal(6), shapes=noisy, dofs=dofs, frequency_std=std)
         found.append(updater.theta_)
-        deviations.append(np.sqrt(np.diag(updater.covariance_)))
-    bound = identifiability(TRUSS, truth, noise=noise, **options).deviations.to_numpy() * truth
-    scatter = np.std(found, axis=0, ddof=1)
-    identifiable = bound < 0.1  # where the model is linear over the scatter
-    assert identifiable.sum() >= 3
-    np.testing.assert_allclose(scatter[identifiable], bound[identifiable], rtol=0.15)
-    np.testing.assert_allclose(np.median(deviations, axis=0)[identifiable], bound[identifiable], rtol=0.1)
-    errors = (np.mean(found, axis=0) - truth) / (bound / np.sqrt(n_fits))
-    assert np.abs(errors[identifiable]).max() < 4
+    updater.fit(frequencies, shapes=shapes, dofs=dofs, frequency_std=std)
+    bound = identifiability(TRUSS, truth, noise=noise, dofs=dofs, shape_noise=shape_noise).deviations.to_numpy() * truth
+    assert (bound < 0.1).all()  # where the model is linear over the scatter
+    np.testing.assert_allclose(np.sqrt(np.diag(updater.covariance_)), bound, rtol=1e-3)
+    np.testing.assert_allclose(np.std(found, axis=0, ddof=1), bound, rtol=0.3)
+    assert np.abs((np.mean(found, axis=0) - truth) / (bound / np.sqrt(n_fits))).max() < 4
 
 
 def test_parameters_that_no_mode_feels_are_named():

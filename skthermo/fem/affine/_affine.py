@@ -1,12 +1,16 @@
 """FE models whose matrices are affine in products of the parameters."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_theta
 from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
+from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._core import AffineCore
@@ -20,7 +24,6 @@ from skthermo.fem.affine._read_terms import (
     read_terms,
 )
 from skthermo.fem.affine._reduced import ReducedModel
-from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal import check_supported, count_modes
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
@@ -126,7 +129,7 @@ class AffineModel(AffineBase):
             available=min(available, solvable),
         )
 
-    def damaged(self, damage: Mapping[str, float]) -> "AffineModel":
+    def damaged(self, damage: Mapping[str, float]) -> Self:
         """A new model with less stiffness (or more) in some groups and the same mass.
 
         Parameters
@@ -148,9 +151,9 @@ class AffineModel(AffineBase):
         factors = np.ones(len(self._core.stiffness.factors))
         for group, severity in check_severities(damage, self._groups).items():
             factors[list(self._groups[group])] *= 1 - severity
-        return self._twin(self._core.with_scaled_stiffness(factors))
+        return self._twin(_core=self._core.with_scaled_stiffness(factors))
 
-    def rescaled(self, theta: ArrayLike) -> "AffineModel":
+    def rescaled(self, theta: ArrayLike) -> Self:
         """A new model whose nominal state, theta = 1, is this model at a given theta.
 
         Parameters
@@ -169,7 +172,7 @@ class AffineModel(AffineBase):
             If theta has the wrong width or more than one row, or a value is not finite and positive.
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
-        return self._twin(self._core.rescaled(row))
+        return self._twin(_core=self._core.rescaled(row))
 
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
         """A small model that gives the same frequencies within a box, to a stated relative error.
@@ -201,17 +204,9 @@ class AffineModel(AffineBase):
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
-    ) -> "AffineModel":
-        twin = self._twin(change(self._core))
-        twin._parameter_names = names or self._parameter_names
-        return twin
+    ) -> Self:
+        return self._twin(_core=change(self._core), _parameter_names=names or self._parameter_names)
 
     @property
     def _full_core(self) -> AffineCore:
         return self._core
-
-    def _twin(self, core: AffineCore) -> "AffineModel":
-        twin = AffineModel.__new__(AffineModel)
-        twin._parameter_names, twin._groups, twin._core = self._parameter_names, self._groups, core
-        twin._is_quiet = self._is_quiet
-        return twin

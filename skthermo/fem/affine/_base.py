@@ -1,32 +1,32 @@
-"""The public methods of affine models: checks, chunks, threads, warnings."""
+"""What the full and the reduced affine model share: their public methods."""
+
+from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from copy import copy
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csc_array
 
-from skthermo._arguments import check_theta
-from skthermo._arrays import Array
+from skthermo._arguments import check_dofs, check_theta
+from skthermo._arrays import Array, MatrixLike
 from skthermo._threads import map_on_blas_threads
 from skthermo._warnings import warn_user
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.affine._interventions import Interventions
-from skthermo.fem.affine._read_terms import check_different, check_modes
-from skthermo.fem.affine._shape_slopes import ShapeSlopes
+from skthermo.fem.affine._read_terms import check_different, check_modes, read_matrix
 from skthermo.fem.modal import LocalModes
 
-Model = TypeVar("Model", bound="AffineBase")
 
-
-class AffineBase(Interventions, ShapeSlopes, ABC):
+class AffineBase(ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
-    A subclass stores ``_parameter_names``, ``_groups`` and ``_core`` and implements `_full_core`; ``_basis`` and
-    `_bounds_warning` are for models that are solved on a basis, within a box.
+    A subclass stores ``_parameter_names``, ``_groups`` and ``_core``. ``_basis`` and `_bounds_warning` are for models
+    that are solved on a basis, within a box.
     """
 
     _parameter_names: tuple[str, ...]
@@ -154,6 +154,39 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         frequencies, jacobian = self._in_chunks(self._core.linearised, theta)
         return frequencies, jacobian
 
+    def linearised_modes(self, theta: ArrayLike, dofs: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """Natural frequencies and mode shapes at many theta, and their exact derivatives.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+        dofs : array-like of int of shape (n_dofs,)
+            Degrees of freedom at which shapes are wanted, the first being 0.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz.
+        jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+            Derivatives d f / d theta in Hz.
+        shapes : ndarray of shape (n_samples, n_dofs, n_modes)
+            Of unit modal mass; signs are arbitrary.
+        derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
+            Derivatives d phi / d theta of these shapes. Where eigenvalues repeat, they do not exist and the values are
+            arbitrary.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width or a value that is not finite and positive, or ``dofs`` are not different
+            degrees of freedom of the model.
+        """
+        places = check_dofs(dofs, self.n_dof)
+        solve = partial(self._core.linearised_modes, dofs=places, basis=self._basis)
+        frequencies, jacobian, shapes, derivatives = self._in_chunks(solve, theta)
+        return frequencies, jacobian, shapes, derivatives
+
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
         """The lowest modes at one theta, with their derivatives.
 
@@ -188,7 +221,7 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         """
         return self._full_core.nominal_mac(shapes)
 
-    def matrices(self, theta: ArrayLike) -> tuple[csc_array, csc_array]:
+    def matrices(self, theta: ArrayLike) -> tuple[scipy.sparse.csc_array, scipy.sparse.csc_array]:
         """Stiffness and mass at one theta.
 
         Parameters
@@ -205,9 +238,11 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
         core = self._full_core
-        return csc_array(core.stiffness.assemble(row)[0]), csc_array(core.mass.assemble(row)[0])
+        return scipy.sparse.csc_array(core.stiffness.assemble(row)[0]), scipy.sparse.csc_array(
+            core.mass.assemble(row)[0]
+        )
 
-    def with_modes(self: Model, modes: Sequence[int]) -> Model:
+    def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.
 
         Parameters
@@ -238,7 +273,7 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         ranks = check_modes(modes, self._full_core.available)
         return self._changed(lambda core: core.with_modes(ranks))
 
-    def with_parameters(self: Model, names: Sequence[str]) -> Model:
+    def with_parameters(self, names: Sequence[str]) -> Self:
         """A new model of fewer parameters; the others stay at their present values.
 
         Parameters
@@ -270,7 +305,91 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         columns = np.array([self._parameter_names.index(name) for name in kept])
         return self._changed(lambda core: core.with_parameters(columns), kept)
 
-    def quiet(self: Model) -> Model:
+    def with_damage_parameters(
+        self, groups: Sequence[str] | None = None, *, severities: tuple[float, float] = (-0.1, 0.6)
+    ) -> Self:
+        """A new model with one more parameter for each damage group: the factor 1 - severity of its stiffness.
+
+        Each row of theta may then have its own severities, and the Jacobian holds exact derivatives by them.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all.
+        severities : (float, float), default=(-0.1, 0.6)
+            Lowest and highest severity that a reduced model covers; a full model has no bounds.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            Its last parameters are named ``1 - GROUP``.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown or named twice, or its parameter's name is taken.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss().with_damage_parameters(["bottom"])
+        >>> truss.parameter_names
+        ('bottom', 'top', 'diagonal', 'vertical', '1 - bottom')
+        >>> truss.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 0.5]])[:, 0].round(3)
+        array([7.485, 6.359])
+        """
+        chosen = check_different(list(self.groups) if groups is None else groups)
+        unknown = [group for group in chosen if group not in self.groups]
+        if unknown:
+            raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(self.groups)}")
+        names = check_different([*self.parameter_names, *(f"1 - {group}" for group in chosen)])
+        scaled = np.zeros((len(self._full_core.stiffness.factors), len(chosen)), dtype=np.int64)
+        for column, group in enumerate(chosen):
+            scaled[list(self.groups[group]), column] = 1
+        bounds = np.tile([1 - severities[1], 1 - severities[0]], (len(chosen), 1))
+        return self._changed(lambda core: core.with_group_factors(scaled), names, bounds)
+
+    def with_added(self, stiffness: MatrixLike | None = None, mass: MatrixLike | None = None) -> Self:
+        """A new model with further stiffness and mass, such as those of a retrofit.
+
+        Parameters
+        ----------
+        stiffness : matrix of shape (n_dof, n_dof), optional
+            Added stiffness in N/m, dense or SciPy sparse, the same at every theta.
+        mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+            Added mass in kg; a vector holds lumped masses.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            Its columns are the modes of this model's nominal state, without what is added.
+
+        Raises
+        ------
+        ValueError
+            If a matrix has the wrong shape, is not symmetric, or holds values that are not finite, or more mass is
+            taken away than there is.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss()
+        >>> heavier = truss.with_added(mass=np.full(truss.n_dof, 100.0))
+        >>> bool(heavier.frequencies([[1, 1, 1, 1]])[0, 0] < truss.frequencies([[1, 1, 1, 1]])[0, 0])
+        True
+        """
+        if mass is not None and np.ndim(mass) == 1 and not scipy.sparse.issparse(mass):
+            if np.shape(mass) != (self.n_dof,):
+                raise ValueError(f"mass has shape {np.shape(mass)}; expected ({self.n_dof},) or a matrix")
+            mass = scipy.sparse.diags_array(np.asarray(mass, dtype=float)).tocsc()
+        added = [
+            None if matrix is None else read_matrix(matrix, f"added {what}", self.n_dof)
+            for matrix, what in ((stiffness, "stiffness"), (mass, "mass"))
+        ]
+        return self._changed(lambda core: core.with_added(*added))
+
+    def quiet(self) -> Self:
         """The same model without warnings.
 
         Returns
@@ -279,9 +398,7 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
             For searches that may pass through theta outside the box or without a solution. It shares the matrices of
             this model.
         """
-        twin = self._twin(self._core)
-        twin._is_quiet = True
-        return twin
+        return self._twin(_is_quiet=True)
 
     def warn_of(self, theta: Array, frequencies: NDArray) -> None:
         """Warn of rows outside the bounds of a reduced model, and of rows without a solution.
@@ -297,24 +414,24 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
         if not self._is_quiet:
             warn_of_failures(theta, frequencies)
 
-    def __sklearn_clone__(self: Model) -> Model:
+    def __sklearn_clone__(self) -> Self:
         return self
 
     @abstractmethod
-    def damaged(self: Model, damage: Mapping[str, float]) -> Model:
+    def damaged(self, damage: Mapping[str, float]) -> Self:
         """A new model with less stiffness (or more) in some groups."""
 
     @abstractmethod
-    def rescaled(self: Model, theta: ArrayLike) -> Model:
+    def rescaled(self, theta: ArrayLike) -> Self:
         """A new model whose nominal state, theta = 1, is this model at a given theta."""
 
     @abstractmethod
     def _changed(
-        self: Model,
+        self,
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
-    ) -> Model:
+    ) -> Self:
         """A model like this one with a changed full core, these parameter names, and bounds of the new ones."""
 
     @property
@@ -322,9 +439,11 @@ class AffineBase(Interventions, ShapeSlopes, ABC):
     def _full_core(self) -> AffineCore:
         """The core at all degrees of freedom."""
 
-    @abstractmethod
-    def _twin(self: Model, core: AffineCore) -> Model:
-        """A model like this one, on another core."""
+    def _twin(self, **changes: Any) -> Self:
+        """A model like this one, with some attributes changed."""
+        twin = copy(self)
+        vars(twin).update(changes)
+        return twin
 
     def _bounds_warning(self, theta: Array) -> str:
         """Hook: ReducedModel warns outside its box."""

@@ -17,7 +17,7 @@ from skthermo.fem.modal import factorise, may_be_missed, pair_modes
 FIRST_SNAPSHOTS = 16
 SNAPSHOTS_PER_ROUND = 12
 CANDIDATES_PER_ROUND = 96
-CHECKS = 20
+CHECK_POINTS = 20
 MAX_ROUNDS = 40
 
 LEAST_ENERGY = 1e-13
@@ -29,7 +29,7 @@ enough."""
 
 
 class Basis(NamedTuple):
-    """Basis vectors (n_dof, n) and the core on them; largest relative error of a frequency at the check points."""
+    """Basis vectors (n_dof, n), the core on them, and its largest relative error of a frequency at the check points."""
 
     vectors: Array
     core: AffineCore
@@ -41,13 +41,7 @@ class Basis(NamedTuple):
 def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
-    """Add modes at the point of largest estimated error until estimate and true error at new points are small.
-
-    Raises
-    ------
-    RuntimeError
-        If no basis reaches ``tol``.
-    """
+    """Add modes at the points of largest estimated error until estimate and true error at new points are small."""
     random = own_stream(random_state)
     nominal = nominal_theta(len(bounds))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
@@ -65,7 +59,7 @@ def grow_basis(
         candidates = draw(bounds, random, CANDIDATES_PER_ROUND)
         errors = estimated_errors(full, core, vectors, candidates, factors)
         if errors.max() < tol / 2:
-            candidates = without(draw(bounds, random, CHECKS), np.vstack(used))
+            candidates = without(draw(bounds, random, CHECK_POINTS), np.vstack(used))
             errors = true_errors(full, core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
@@ -83,7 +77,7 @@ def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
 
 
 def own_stream(seed: RandomState) -> np.random.RandomState:
-    """Random numbers that are not those of a sample drawn with the same seed."""
+    """A random stream that differs from that of a sample drawn with the same seed."""
     return np.random.RandomState(as_random_state(seed).randint(2**32, size=8, dtype=np.uint32))
 
 

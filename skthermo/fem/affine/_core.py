@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix
+from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
-from skthermo.fem.affine._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal import (
     EigenSolver,
     LocalModes,
@@ -19,6 +19,7 @@ from skthermo.fem.modal import (
     may_be_missed,
     pair_modes,
     repeated_modes,
+    shape_derivatives,
 )
 
 GUARD_MODES = 4
@@ -32,21 +33,11 @@ CHUNK_BYTES = 2**25
 
 @dataclass(frozen=True, eq=False)
 class NominalModes:
-    """The healthy nominal modes, which the columns of a tracking model follow.
+    """The healthy nominal modes, which the columns of a tracking model follow."""
 
-    Attributes
-    ----------
-    weighted_shapes : ndarray of shape (n, n_modes)
-        M phi, with the nominal mass M and shapes phi of unit modal mass.
-    mass_coefficients : ndarray of shape (n_mass_terms,)
-        Coefficient of each mass term in M.
-    repeated : ndarray of bool of shape (n_modes, n_modes)
-        Which of the modes share a repeated frequency.
-    """
-
-    weighted_shapes: Array
-    mass_coefficients: Array
-    repeated: NDArray[np.bool_]
+    weighted_shapes: Array  # M phi with the nominal mass M and shapes phi of unit modal mass, (n, n_modes)
+    mass_coefficients: Array  # of each mass term in M
+    repeated: NDArray[np.bool_]  # which modes share a repeated frequency, (n_modes, n_modes)
 
     def __post_init__(self) -> None:
         for array in (self.weighted_shapes, self.mass_coefficients, self.repeated):
@@ -73,10 +64,8 @@ class AffineCore:
     nominal: NominalModes
     ranks: NDArray[np.intp]
     track: bool
-    available: int
-    """How many modes the mass allows and the solver finds."""
-    healthy: "AffineCore | None" = None
-    """The core whose nominal modes define the columns, if it is not this one."""
+    available: int  # how many modes the mass allows and the solver finds
+    healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
 
     @classmethod
     def from_terms(
@@ -188,6 +177,27 @@ class AffineCore:
         """Frequencies in Hz and d f / d theta, (n_samples, n_modes, n_parameters)."""
         frequencies, shapes = self.modes(theta)
         return frequencies, self.frequency_slopes(theta, frequencies, shapes)
+
+    def linearised_modes(
+        self, theta: Array, dofs: NDArray[np.intp], basis: Array | None
+    ) -> tuple[Array, Array, Array, Array]:
+        """Frequencies in Hz, shapes at some degrees of freedom, and the derivatives of both."""
+        if isinstance(self.stiffness, DenseTerms) and isinstance(self.mass, DenseTerms):
+            frequencies, shapes = self.modes(theta)
+            jacobian = self.frequency_slopes(theta, frequencies, shapes)
+            slopes = shape_derivatives(self.stiffness, self.mass, theta, (2 * np.pi * frequencies) ** 2, shapes)
+            if basis is None:
+                return frequencies, jacobian, shapes[:, dofs], slopes[:, dofs]
+            slopes = np.einsum("di,simp->sdmp", basis[dofs], slopes, optimize=True)
+            return frequencies, jacobian, basis[dofs] @ shapes, slopes
+        parts = []
+        for row in theta[:, np.newaxis]:
+            modes = self.local_modes(row, follow=self.track, basis=basis)
+            columns = modes.ranks if self.track else self.ranks
+            d_frequencies, d_shapes = modes.derivatives(columns, dofs)
+            parts.append((modes.frequencies[columns], d_frequencies, modes.shapes(dofs)[:, columns], d_shapes))
+        frequencies, jacobian, shapes, slopes = (np.stack(arrays) for arrays in zip(*parts, strict=True))
+        return frequencies, jacobian, shapes, slopes
 
     def frequency_slopes(self, theta: Array, frequencies: Array, shapes: Array) -> Array:
         """d f / d theta of modes of unit modal mass, (n_samples, n_modes, n_parameters)."""

@@ -14,7 +14,7 @@ Key = tuple[str, ...]
 DENSE_DOFS = 200
 """Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
 
-STRONGEST = -10.0
+LOWEST_SEVERITY = -10.0
 """Lowest severity accepted; a lower number is probably a percentage given instead of a fraction."""
 
 DENSE_SHARE = 0.3
@@ -51,13 +51,7 @@ def _read_key(key, what: str) -> Key:
 
 
 def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
-    """A copy of a matrix, (n_dof, n_dof), dense or sparse as given, which is exactly symmetric.
-
-    Raises
-    ------
-    ValueError
-        If it is not square, of another size, complex, not finite, or not symmetric within 1e-8 of its largest entry.
-    """
+    """An exactly symmetric copy of a matrix that is symmetric to 1e-8 of its largest entry, dense or sparse."""
     array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else real_array(matrix, what)
     if np.iscomplexobj(array):
         raise ValueError(f"{what} is complex; expected real numbers")
@@ -139,10 +133,10 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (isinstance(severity, Real) and STRONGEST <= float(severity) < 1):
+        if not (isinstance(severity, Real) and LOWEST_SEVERITY <= float(severity) < 1):
             raise ValueError(
                 f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
-                f"{STRONGEST:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
+                f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
             )
     return damage
 

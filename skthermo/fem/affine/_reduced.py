@@ -1,6 +1,9 @@
 """FE models on a small basis of their own mode shapes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,7 +104,7 @@ class ReducedModel(AffineBase):
         """Number of basis vectors."""
         return self._core.stiffness.n_dof
 
-    def damaged(self, damage: Mapping[str, float]) -> "ReducedModel":
+    def damaged(self, damage: Mapping[str, float]) -> Self:
         """A new model with less stiffness (or more) in some groups, with a basis checked for the damage.
 
         Parameters
@@ -116,7 +119,7 @@ class ReducedModel(AffineBase):
         """
         return self._regrown(self._full.damaged(damage), self._bounds)
 
-    def rescaled(self, theta: ArrayLike) -> "ReducedModel":
+    def rescaled(self, theta: ArrayLike) -> Self:
         """A new model on the same basis whose nominal state, theta = 1, is this model at a given theta.
 
         Parameters
@@ -130,13 +133,16 @@ class ReducedModel(AffineBase):
             For the same box; its bounds are now relative to theta.
         """
         row = check_theta(theta, self.parameter_names, one_row=True)
-        twin = self._twin(self._core)
-        twin._full, twin._bounds = self._full.rescaled(row), self._bounds / row.T
-        twin._core = projected_core(twin._full._core, self._basis, self._tol)
-        twin.check_points_, twin.snapshot_points_ = self.check_points_ / row, self.snapshot_points_ / row
-        return twin
+        full = self._full.rescaled(row)
+        return self._twin(
+            _full=full,
+            _bounds=self._bounds / row.T,
+            _core=projected_core(full._core, self._basis, self._tol),
+            check_points_=self.check_points_ / row,
+            snapshot_points_=self.snapshot_points_ / row,
+        )
 
-    def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> "ReducedModel":
+    def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
         """The full model, reduced for another box.
 
         Parameters
@@ -162,30 +168,21 @@ class ReducedModel(AffineBase):
     def _full_core(self) -> AffineCore:
         return self._full._core
 
-    def _twin(self, core: AffineCore) -> "ReducedModel":
-        twin = ReducedModel.__new__(ReducedModel)
-        twin._parameter_names, twin._groups, twin._core = self._parameter_names, self._groups, core
-        twin._full, twin._bounds, twin._tol, twin._basis = self._full, self._bounds, self._tol, self._basis
-        twin.error_, twin.check_points_, twin.snapshot_points_ = self.error_, self.check_points_, self.snapshot_points_
-        twin._is_quiet = self._is_quiet
-        return twin
-
     def _changed(
         self,
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
-    ) -> "ReducedModel":
+    ) -> Self:
         full = self._full._changed(change, names)
         known = dict(zip(self._parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
         return self._regrown(full, np.array([known[name] for name in full.parameter_names]))
 
-    def _regrown(self, full: AffineBase, bounds: Array) -> "ReducedModel":
+    def _regrown(self, full: AffineBase, bounds: Array) -> Self:
         """A reduced model of another full model; its basis starts from the present one."""
-        twin = self._twin(self._core)
-        twin._full, twin._bounds, twin._parameter_names = full, bounds, full.parameter_names
+        twin = self._twin(_full=full, _bounds=bounds, _parameter_names=full.parameter_names)
         twin._use(grow_basis(full._core, bounds, self._tol, 0, start=self._basis))
         return twin
 

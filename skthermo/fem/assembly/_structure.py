@@ -1,5 +1,7 @@
 """Structures of nodes and members."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from typing import Any
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.elements._element import TRANSLATIONS, ByProperties, Dof, PhysicalElement
+from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,6 @@ class Bar(PhysicalElement):
     def nodes(self) -> tuple[Hashable, Hashable]:
         """Its two nodes."""
         return self.start, self.end
-
-    def dofs(self, dimension: int) -> list[Dof]:
-        """Translations of both nodes."""
-        return [(node, direction) for node in self.nodes for direction in TRANSLATIONS[:dimension]]
 
     def stiffness(self, coordinates: Array) -> ByProperties:
         """E A / L along the axis."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.fem.elements._element import ROTATIONS, TRANSLATIONS, ByProperties, Dof, PhysicalElement
 
-LOCAL = (*TRANSLATIONS, *ROTATIONS)
+DIRECTIONS = (*TRANSLATIONS, *ROTATIONS)
 
 
 class Action(NamedTuple):
@@ -154,9 +154,9 @@ class Beam(PhysicalElement):
         if self.I_p is None:
             object.__setattr__(self, "I_p", self.I_yy + self.I_zz)
         for name in ("release_start", "release_end"):
-            unknown = [direction for direction in getattr(self, name) if direction not in LOCAL]
+            unknown = [direction for direction in getattr(self, name) if direction not in DIRECTIONS]
             if unknown:
-                raise ValueError(f"{name} names {unknown}; expected a collection of local directions {LOCAL}")
+                raise ValueError(f"{name} names {unknown}; expected a collection of local directions {DIRECTIONS}")
 
     @property
     def nodes(self) -> tuple[Hashable, Hashable]:
@@ -165,7 +165,7 @@ class Beam(PhysicalElement):
 
     def dofs(self, dimension: int) -> list[Dof]:
         """Translations and rotations of both nodes."""
-        return [(node, direction) for node in self.nodes for direction in LOCAL]
+        return [(node, direction) for node in self.nodes for direction in DIRECTIONS]
 
     def ends(self, coordinates: Array) -> Array:
         """Coordinates of both ends of the beam, offsets included."""
@@ -195,7 +195,9 @@ class Beam(PhysicalElement):
 
     def _assembled(self, action: Action, matrix: Array, to_nodes: Array) -> Array:
         """A matrix of one action, condensed where ends are released, at the nodes' 12 degrees of freedom."""
-        released = [name in self.release_start for name in LOCAL] + [name in self.release_end for name in LOCAL]
+        released = [name in self.release_start for name in DIRECTIONS] + [
+            name in self.release_end for name in DIRECTIONS
+        ]
         condensed = condensation(action.stiffness, np.array(released)[action.dofs])
         path = condensed @ to_nodes[action.dofs]
         return path.T @ matrix @ path

@@ -17,10 +17,10 @@ Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]
 
 TRANSLATIONS = ("x", "y", "z")
-MEMBERS = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
 ROTATIONS = ("rx", "ry", "rz")
+INTERFACE = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
 
-SHORTEST = 1e-6
+SHORTEST_MEMBER = 1e-6
 """Length of a member, as a share of the structure's extent, below which its ends count as the same point."""
 
 
@@ -113,29 +113,20 @@ class Element(Protocol):
         """
 
 
-class PhysicalElement:
-    """Base of elements: names and values of their physical properties."""
+class PhysicalElement(Element, Protocol):
+    """Base of the elements: properties by their names, translations of all nodes, ends at the nodes."""
 
     _properties: tuple[str, ...]
     _may_be_zero: tuple[str, ...] = ()
 
     def properties(self) -> Iterator[tuple[str, float, bool]]:
-        """Physical properties, such as E and A.
-
-        Yields
-        ------
-        name : str
-            Symbol.
-        value : float
-            In SI units.
-        may_be_zero : bool
-            Whether the value 0 is allowed.
-        """
         for name in self._properties:
             yield name, getattr(self, name), name in self._may_be_zero
 
+    def dofs(self, dimension: int) -> list[Dof]:
+        return [(node, direction) for node in self.nodes for direction in TRANSLATIONS[:dimension]]
+
     def ends(self, coordinates: Array) -> Array:
-        """Where the element itself has its ends or corners, given its nodes."""
         return coordinates
 
 
@@ -158,9 +149,9 @@ def check_matrices(name: Hashable, element: Element, matrices: Any, n_dofs: int,
 
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
     """Raise an error if an element has unknown nodes, is too short, or has a property that is not positive."""
-    missing = [member for member in MEMBERS if not hasattr(element, member)]
+    missing = [member for member in INTERFACE if not hasattr(element, member)]
     if isinstance(element, type) or missing:
-        lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(MEMBERS) else ""
+        lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(INTERFACE) else ""
         raise ValueError(f"member {name!r} is {element!r}{lacks}; expected an element such as Bar(...)")
     for node in element.nodes:
         if node not in coordinates:
@@ -170,10 +161,10 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         first, last = element.nodes
         raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
     sides = np.linalg.norm(ends - np.roll(ends, 1, axis=0), axis=1)
-    if len(ends) > 1 and sides.min() < SHORTEST * extent:
+    if len(ends) > 1 and sides.min() < SHORTEST_MEMBER * extent:
         raise ValueError(
-            f"member {name!r} has a length of {sides.min():.3g} m; expected at least {SHORTEST * extent:.3g} m, a "
-            f"millionth of the structure's extent of {extent:.6g} m: are two of its nodes the same?"
+            f"member {name!r} has a length of {sides.min():.3g} m; expected at least {SHORTEST_MEMBER * extent:.3g} m, "
+            f"a millionth of the structure's extent of {extent:.6g} m: are two of its nodes the same?"
         )
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"

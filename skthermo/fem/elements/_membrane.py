@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.elements._element import TRANSLATIONS, ByProperties, Dof, PhysicalElement
+from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 GAUSS_POINTS = CORNERS / np.sqrt(3)
@@ -72,10 +72,6 @@ class Membrane(PhysicalElement):
     def nodes(self) -> tuple[Hashable, ...]:
         """Its four nodes."""
         return tuple(self.corners)
-
-    def dofs(self, dimension: int) -> list[Dof]:
-        """Translations of the four nodes."""
-        return [(node, direction) for node in self.nodes for direction in TRANSLATIONS[:dimension]]
 
     def ends(self, coordinates: Array) -> Array:
         """The corners, which must make a flat quadrilateral without a corner pointing inwards."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.elements._element import TRANSLATIONS, ByProperties, Dof, PhysicalElement
+from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,6 @@ class PointMass(PhysicalElement):
     def nodes(self) -> tuple[Hashable]:
         """Its node."""
         return (self.node,)
-
-    def dofs(self, dimension: int) -> list[Dof]:
-        """Translations of the node."""
-        return [(self.node, direction) for direction in TRANSLATIONS[:dimension]]
 
     def stiffness(self, coordinates: Array) -> ByProperties:
         """A point mass has no stiffness."""

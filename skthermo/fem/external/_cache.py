@@ -125,7 +125,7 @@ class SampleCache:
             found = json.loads(content.partition(b"\n")[0])
             got = str({name: found[name] for name in self._describes})
         except (ValueError, KeyError, TypeError):
-            got = "something that is no cache of solved samples"
+            got = "something that is not a cache of solved samples"
         raise ValueError(f"{self.path}: the file holds {got}; expected {self._describes}, or a path of its own")
 
     def _checksums(self, records: NDArray) -> list[int]:

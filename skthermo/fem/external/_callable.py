@@ -1,5 +1,7 @@
 """FE models computed by a user's own program."""
 
+from __future__ import annotations
+
 import copy
 from collections.abc import Callable, Sequence
 from os import PathLike
@@ -193,7 +195,7 @@ class CallableModel:
             for row in np.flatnonzero(wrong.any(axis=1))
         }
 
-    def quiet(self) -> "CallableModel":
+    def quiet(self) -> CallableModel:
         """The same model, but without warnings and errors: it gives NaN where the function fails.
 
         Returns
@@ -218,7 +220,7 @@ class CallableModel:
         if not self._is_quiet:
             warn_of_failures(theta, frequencies)
 
-    def __sklearn_clone__(self) -> "CallableModel":
+    def __sklearn_clone__(self) -> CallableModel:
         return self
 
     def __repr__(self) -> str:

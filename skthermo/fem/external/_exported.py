@@ -1,5 +1,7 @@
 """FE models that other programs have exported as matrices."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import reduce
@@ -199,8 +201,8 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
             )
     has_pattern = mass_matrix.shape[0] > 1
     like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
-    alike = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
-    springs = {name: term for name, term in found.items() if name not in alike}
+    similar = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
+    springs = {name: term for name, term in found.items() if name not in similar}
     if total is None and len(springs) > 2:
         whole = reduce(add, springs.values())
         sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
@@ -215,8 +217,8 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
         whole = reduce(add, springs.values())
         for name, term in springs.items():
             if ratio := _ratio(term, whole - term):
-                alike[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
-    for name, what in alike.items():
+                similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
+    for name, what in similar.items():
         warnings.warn(
             f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
             stacklevel=3,

@@ -1,5 +1,7 @@
 """Affine models recovered from programs that assemble matrices."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import reduce
 from numbers import Integral

@@ -1,5 +1,7 @@
 """Matrices that FE programs write as text, one entry a line."""
 
+from __future__ import annotations
+
 from os import PathLike
 from pathlib import Path
 
@@ -30,7 +32,7 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     FileNotFoundError
         If the path does not exist.
     ValueError
-        Names the file, if a line does not hold three numbers, rows or columns are no positive integers, there are
+        Names the file, if a line does not hold three numbers, rows or columns are not positive integers, there are
         entries on both sides of the diagonal, or the matrix would need more than ten times the memory of the file (and
         more than 256 MB).
 

@@ -22,22 +22,8 @@ def solve_beside_modes(
     shift to the next eigenvalue, the fewer iterations. The last residual is added to x, which is one step of
     x = K^-1 (force + shift M x): it corrects the massless degrees of freedom, which the inner product of M cannot see.
 
-    Parameters
-    ----------
-    solve : callable
-        Solves K x = b for columns b.
-    mass : matrix of shape (n, n)
-    shapes : ndarray of shape (n, n_candidates)
-        The lowest modes, of unit modal mass.
-    forces : ndarray of shape (n, n_columns)
-    shifts : ndarray of shape (n_columns,)
-        Eigenvalues below that of the first mode that is missing in ``shapes``.
-    known : ndarray of shape (n_columns,)
-        Squared length of the derivative's part along ``shapes``, to measure the residual by.
-
-    Returns
-    -------
-    ndarray of shape (n, n_columns)
+    ``solve`` solves K x = b for columns b, ``shifts`` are below the eigenvalue of the first mode that is missing in
+    ``shapes``, and the residual is measured by ``known``, the squared length of the derivative's part along these.
     """
     weighted = mass @ shapes
 

@@ -12,7 +12,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.fem.modal._matrices import ParametrisedMatrix
+from skthermo.fem._terms import DenseTerms
 
 WIDEST_SPECTRUM = 1e6
 """Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9 of its value."""
@@ -40,13 +40,13 @@ class StandardSolver:
     The mass is factored once and every stiffness term transformed once.
     """
 
-    def __init__(self, transformed: ParametrisedMatrix, basis: Array, stiffness: ParametrisedMatrix):
+    def __init__(self, transformed: DenseTerms, basis: Array, stiffness: DenseTerms):
         self._transformed = transformed
         self._basis = basis
         self._stiffness = stiffness
 
     @classmethod
-    def from_mass(cls, stiffness: ParametrisedMatrix, mass: Array) -> "StandardSolver":
+    def from_mass(cls, stiffness: DenseTerms, mass: Array) -> "StandardSolver":
         """The solver for a positive definite mass matrix."""
         lower = np.linalg.cholesky(mass)
         basis = scipy.linalg.solve_triangular(lower, np.eye(len(mass)), lower=True).T
@@ -74,7 +74,7 @@ class FlexibilitySolver:
     eigenvalues span many orders of magnitude.
     """
 
-    def __init__(self, stiffness: ParametrisedMatrix, mass: ParametrisedMatrix):
+    def __init__(self, stiffness: DenseTerms, mass: DenseTerms):
         self._stiffness = stiffness
         self._mass = mass
 
@@ -104,7 +104,7 @@ class FlexibilitySolver:
 
 
 def dense_solver(
-    stiffness: ParametrisedMatrix, mass: ParametrisedMatrix, nominal: Array, widest: float = WIDEST_SPECTRUM
+    stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = WIDEST_SPECTRUM
 ) -> EigenSolver:
     """The standard form, which is the fastest, where it is accurate enough; else the flexibility form."""
     if mass.is_constant:
@@ -123,7 +123,7 @@ def hertz(eigenvalues: Array) -> Array:
     return np.sqrt(eigenvalues) / (2 * np.pi)
 
 
-def cholesky_solver(stiffness: ParametrisedMatrix, theta: Array) -> Callable[[Array], Array]:
+def cholesky_solver(stiffness: DenseTerms, theta: Array) -> Callable[[Array], Array]:
     """A function that solves K x = b at one theta; the matrix is factored when it is first called."""
     factors: list = []
 

@@ -1,5 +1,7 @@
 """Modes at one theta and their derivatives."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
@@ -8,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._arguments import check_dofs, check_theta
 from skthermo._arrays import Array
 from skthermo.fem._protocol import LocalModel
+from skthermo.fem._terms import AffineTerms
 from skthermo.fem.modal._beside_modes import solve_beside_modes
 from skthermo.fem.modal._dense import hertz
-from skthermo.fem.modal._matrices import ParametrisedMatrix
 from skthermo.fem.modal._tracking import REPEATED
 
 
@@ -63,8 +65,8 @@ class LocalModes:
         nominal_mac: Array,
         ranks: NDArray[np.intp],
         *,
-        stiffness: ParametrisedMatrix,
-        mass: ParametrisedMatrix,
+        stiffness: AffineTerms,
+        mass: AffineTerms,
         theta: Array,
         solve: Callable[[Array], Array],
         basis: Array | None = None,

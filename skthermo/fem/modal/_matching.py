@@ -1,5 +1,7 @@
 """Which of a model's modes were measured."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,13 +17,13 @@ from skthermo.fem.modal._mac import mac
 if TYPE_CHECKING:
     import pandas as pd
 
-FAR = 0.15
+OFFSET_LIKE_MAC_0 = 0.15
 """Relative distance of two frequencies that weighs as much as a MAC of 0."""
 
 
 def match_modes(
     model: FEModel, frequencies: ArrayLike, *, shapes: ArrayLike | None = None, dofs: ArrayLike | None = None
-) -> "pd.DataFrame":
+) -> pd.DataFrame:
     """Propose which of the model's modes each measured mode is.
 
     Parameters
@@ -77,7 +79,7 @@ def match_modes(
     candidates = np.asarray(model.frequencies(nominal))[0] if local is None else local.frequencies
     if len(measured) > len(candidates):
         raise ValueError(f"{len(measured)} modes were measured; expected at most {len(candidates)}, as the model has")
-    cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(FAR)) ** 2
+    cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(OFFSET_LIKE_MAC_0)) ** 2
     macs = None
     if shapes is not None and dofs is not None:
         if local is None:

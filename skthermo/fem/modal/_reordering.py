@@ -1,5 +1,7 @@
 """How often modes change their order."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

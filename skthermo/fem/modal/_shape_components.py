@@ -1,5 +1,7 @@
 """Measured or computed mode shapes as rows of real numbers."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

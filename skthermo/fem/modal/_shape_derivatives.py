@@ -3,14 +3,14 @@
 import numpy as np
 
 from skthermo._arrays import Array
-from skthermo.fem.modal._matrices import DenseMatrix
+from skthermo.fem._terms import DenseTerms
 
 NUDGE = 1e-9
 """Share of the stiffness that is added where a repeated eigenvalue makes the equations singular."""
 
 
 def shape_derivatives(
-    stiffness: DenseMatrix, mass: DenseMatrix, theta: Array, eigenvalues: Array, shapes: Array
+    stiffness: DenseTerms, mass: DenseTerms, theta: Array, eigenvalues: Array, shapes: Array
 ) -> Array:
     """Derivatives of mode shapes of unit modal mass, (n_samples, n, n_modes, n_parameters).
 
@@ -19,18 +19,7 @@ def shape_derivatives(
     [K - lambda M, M phi; phi' M, 0] [d phi; -d lambda] = [-(dK - lambda dM) phi; -1/2 phi' dM phi]
 
     for each mode of all rows together. They are regular where the eigenvalue is not repeated, also with massless
-    degrees of freedom.
-
-    Parameters
-    ----------
-    stiffness, mass : parametrised matrix
-        Dense.
-    theta : ndarray of shape (n_samples, n_parameters)
-        Multipliers of the nominal parameters.
-    eigenvalues : ndarray of shape (n_samples, n_modes)
-        NaN in rows without a solution.
-    shapes : ndarray of shape (n_samples, n, n_modes)
-        Of unit modal mass.
+    degrees of freedom. Rows with NaN eigenvalues, which have no solution, stay NaN.
     """
     solved = np.flatnonzero(np.isfinite(eigenvalues).all(axis=1))
     derivatives = np.full((*shapes.shape, theta.shape[1]), np.nan)
@@ -44,8 +33,8 @@ def shape_derivatives(
     for mode in range(shapes.shape[2]):
         phi, shift = shapes[:, :, mode], eigenvalues[:, mode, np.newaxis, np.newaxis]
         right = np.concatenate([forces[:, :, mode], -0.5 * d_masses[:, np.newaxis, mode]], axis=1)
-        found = _solve_bordered(K - shift * M, (M @ phi[:, :, np.newaxis])[:, :, 0], right, K)
-        derivatives[solved, :, mode] = found
+        border = (M @ phi[:, :, np.newaxis])[:, :, 0]
+        derivatives[solved, :, mode] = _solve_bordered(K - shift * M, border, right, K)
     return derivatives
 
 

@@ -7,7 +7,7 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.fem.modal._matrices import ParametrisedMatrix
+from skthermo.fem._terms import SparseTerms
 
 GUARD_VECTORS = 2
 """Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
@@ -23,7 +23,7 @@ class ShiftInvertSolver:
     structure is orthogonal to it.
     """
 
-    def __init__(self, stiffness: ParametrisedMatrix, mass: ParametrisedMatrix):
+    def __init__(self, stiffness: SparseTerms, mass: SparseTerms):
         self._stiffness = stiffness
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)

@@ -19,23 +19,8 @@ SMALL_SHIFT = 1e-10
 
 
 def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> None:
-    """Refuse a stiffness matrix with a motion that nothing resists.
+    """Refuse a stiffness that is not positive definite within rounding, and name where the motion is largest.
 
-    Parameters
-    ----------
-    stiffness : matrix of shape (n_dof, n_dof)
-        Nominal stiffness, dense or sparse.
-    names : sequence of str, optional
-        What each degree of freedom is called in the error.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not positive definite, within rounding; the error names where the motion is largest.
-        If there are too few or too many names.
-
-    Notes
-    -----
     The energy x'Kx of a motion is a sum of entries that cancel where the motion is nearly rigid. Of a mechanism,
     rounding of these entries is all that is left; the softest motion of a fine mesh has more.
     """
@@ -59,21 +44,16 @@ def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> No
 
 
 def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> int:
-    """How many modes of finite frequency a mass matrix allows.
+    """How many modes of finite frequency a mass matrix allows: an error if fewer than ``at_least``.
 
     For a sparse matrix with many masses this is the number of degrees of freedom with mass.
-
-    Raises
-    ------
-    ValueError
-        If these are fewer than ``at_least``, or the mass has a negative eigenvalue.
     """
     diagonal = mass.diagonal()
     if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= FEW_DOFS:
         kept = np.flatnonzero(diagonal) if isinstance(mass, scipy.sparse.csc_array) else slice(None)
         part = mass[kept][:, kept]
         eigenvalues = np.linalg.eigvalsh(as_dense(part))
-        tolerance = 10 * len(eigenvalues) * np.finfo(float).eps * abs(eigenvalues[-1])
+        tolerance = 10 * len(eigenvalues) * EPS * abs(eigenvalues[-1])
         outside = abs(mass).sum() > (1 + 1e-12) * abs(part).sum()  # beside a diagonal of zero
         negative, count = outside or eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
     else:

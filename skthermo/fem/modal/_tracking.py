@@ -9,20 +9,11 @@ REPEATED = 1e-6
 
 
 def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Assign one candidate to each reference mode, so that the sum of MACs is highest.
+    """The candidate of each reference mode, (n_samples, n_modes), so that the sum of MACs is highest.
 
-    Parameters
-    ----------
-    mac : ndarray of shape (n_samples, n_modes, n_candidates)
-        MAC of reference modes and candidates.
-    repeated : ndarray of bool of shape (n_modes, n_modes), optional
-        Which reference modes share a repeated frequency. Their shapes are an arbitrary basis of the space they span, so
-        candidates are compared with that space, and those assigned to it are sorted by frequency.
-
-    Returns
-    -------
-    ndarray of shape (n_samples, n_modes)
-        Candidate of each reference mode; no candidate is assigned twice.
+    ``mac`` is (n_samples, n_modes, n_candidates). Reference modes that share a ``repeated`` frequency, (n_modes,
+    n_modes), have an arbitrary basis of the space they span as their shapes: candidates are compared with that space,
+    and those assigned to it are sorted by frequency.
     """
     spans = np.nan_to_num(mac if repeated is None else repeated @ mac)
     best = spans.argmax(axis=2)

@@ -1,21 +1,16 @@
-"""Frequencies and derivatives of many rows of theta."""
+"""Frequencies and mode shapes of many rows of theta."""
 
-from collections.abc import Callable, Generator
-from contextlib import closing
-from numbers import Integral
-from typing import Any, cast
+from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_theta
+from skthermo._arguments import check_dofs
 from skthermo._arrays import Array
-from skthermo._models import check_model
-from skthermo._threads import map_on_blas_threads, single_blas_thread
-from skthermo.fem._protocol import BatchModel, FEModel
-from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
-from skthermo.fem.sampling._progress import with_progress
+from skthermo.fem._protocol import FEModel, ModalModel
+from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 
 
 def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
@@ -62,56 +57,65 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     array([[ 7.48, 27.5 ],
            [  nan,   nan]])
     """
-    check_model(model)
-    check_n_jobs(n_jobs)
-    rows = check_theta(theta, model.parameter_names, allow_nan=True)
-    frequencies = np.full((len(rows), model.n_modes), np.nan)
-    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
-    if not known.size:
-        return frequencies
-    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
-    places = [known[i : i + size] for i in range(0, len(known), size)]
-    with closing(_solved(model, rows, places, n_jobs)) as parts:
-        for place, part in zip(places, with_progress(parts, len(known), progress), strict=True):
-            frequencies[place] = check_shape(part, (len(place), model.n_modes), "the model's frequencies")
-    getattr(model, "warn_of", warn_of_failures)(rows, frequencies)
-    return frequencies
+    rows = checked_rows(model, theta, n_jobs)
+    return solve_rows(model, _frequencies, rows, {"frequencies": (model.n_modes,)}, n_jobs, progress)[0]
 
 
-def check_n_jobs(n_jobs: int | None) -> None:
-    """Raise an error for a number of jobs that joblib does not take."""
-    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
-        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+def evaluate_modes(
+    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, n_jobs: int | None = None
+) -> tuple[Array, Array]:
+    """Frequencies and mode shapes of many rows of parameters, at some degrees of freedom.
+
+    Parameters
+    ----------
+    model : FE model
+        With a method ``modes``.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    dofs : array-like of int of shape (n_dofs,)
+        Degrees of freedom, such as those of sensors; the first is 0.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+    shapes : ndarray of shape (n_samples, n_dofs, n_modes)
+        As the model scales them; signs are arbitrary. NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If the model has no method ``modes``, theta has the wrong width or a value that is neither NaN nor finite and
+        positive, or ``dofs`` are not different degrees of freedom of the model.
+
+    Warns
+    -----
+    UserWarning
+        Once, if rows have no solution.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import evaluate_modes
+    >>> frequencies, shapes = evaluate_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3])
+    >>> frequencies.shape, shapes.shape
+    ((1, 6), (1, 2, 6))
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    if not hasattr(model, "modes"):
+        raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
+    places = check_dofs(dofs, np.shape(model.modes(np.ones((1, rows.shape[1])))[1])[1])
+    expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
+    frequencies, shapes = solve_rows(model, partial(_modes, dofs=places), rows, expected, n_jobs)
+    return frequencies, shapes
 
 
-def check_shape(result: ArrayLike, expected: tuple[int, ...], what: str) -> Array:
-    """Raise an error if a result has another shape, rather than broadcast it."""
-    array = np.asarray(result)
-    if array.shape != expected:
-        raise ValueError(f"{what} have shape {array.shape}; expected {expected}, the first for the rows of theta")
-    return array
+def _frequencies(model: FEModel, theta: Array) -> tuple[Array]:
+    return (model.frequencies(theta),)
 
 
-def _solved(model: FEModel, rows: Array, places: list[NDArray], n_jobs: int | None) -> Generator[Array, None, None]:
-    """Frequencies of each chunk of rows, in order; closing the generator stops the work."""
-    thread_safe = getattr(model, "thread_safe", False)
-    frequencies = cast(BatchModel, model).quiet().frequencies if thread_safe else model.frequencies
-    if thread_safe and effective_n_jobs(n_jobs) == 1:
-        yield from map_on_blas_threads(lambda place: frequencies(rows[place]), places)
-    else:
-        parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-        yield from parallel(delayed(solve_chunk)(frequencies, rows[place]) for place in places)
-
-
-def _parallel(**options: Any) -> Parallel:
-    """A joblib `Parallel` that yields results as they come, where the active backend can."""
-    try:
-        return Parallel(return_as="generator", **options)
-    except ValueError:  # some backends, such as Ray's, return all results at the end
-        return Parallel(**options)
-
-
-def solve_chunk(solve: Callable[[Array], Any], theta: Array) -> Any:
-    """What a model's method gives for some rows, on one thread."""
-    with single_blas_thread():
-        return solve(theta)
+def _modes(model: ModalModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
+    frequencies, shapes = model.modes(theta)
+    return frequencies, np.asarray(shapes)[:, dofs]

@@ -1,19 +1,19 @@
-"""Frequencies and their derivatives at many rows of theta."""
+"""Frequencies, mode shapes and their derivatives at many rows of theta."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from functools import partial
 from numbers import Real
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_theta
 from skthermo._arrays import Array
-from skthermo._models import check_model
-from skthermo.fem._protocol import FEModel
-from skthermo.fem._theta import ROWS_PER_CHUNK
-from skthermo.fem.sampling._evaluate import check_n_jobs, check_shape, evaluate, solve_chunk
+from skthermo._differences import central_differences
+from skthermo.fem._protocol import FEModel, ModalModel
+from skthermo.fem.sampling._chunks import checked_rows, solve_rows
+from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
 
 
 def linearise(
@@ -58,57 +58,101 @@ def linearise(
     >>> jacobian[:, 0, 0].round(6)
     array([0.5, 0.5])
     """
-    check_model(model)
-    rows = check_theta(theta, model.parameter_names, allow_nan=True)
-    frequencies = np.full((len(rows), model.n_modes), np.nan)
-    jacobian = np.full((len(rows), model.n_modes, rows.shape[1]), np.nan)
-    known = ~np.isnan(rows).any(axis=1)
-    if not known.any():
-        return frequencies, jacobian
-    check_n_jobs(n_jobs)
-    if hasattr(model, "linearised"):
-        solved, slopes = _in_jobs(model, model.linearised, rows[known], n_jobs)
+    rows = checked_rows(model, theta, n_jobs)
+    if hasattr(model, "linearised") or hasattr(model, "jacobian"):
+        expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, rows.shape[1])}
+        frequencies, jacobian = solve_rows(model, _linearised, rows, expected, n_jobs)
     else:
-        solved = evaluate(model, rows[known], n_jobs=n_jobs)
-        exact = getattr(model, "jacobian", None)
-        slopes = exact(rows[known]) if exact else central_differences(model, rows[known], step, n_jobs)
-    frequencies[known] = check_shape(solved, frequencies[known].shape, "the model's frequencies")
-    jacobian[known] = check_shape(slopes, jacobian[known].shape, "the model's derivatives")
+        _check_step(step)
+        frequencies = evaluate(model, rows, n_jobs=n_jobs)
+        jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, step)
     if relative:
-        jacobian *= rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
+        jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
     return frequencies, jacobian
 
 
-def _in_jobs(model: Any, linearised: Callable[[Array], tuple[Array, Array]], rows: Array, n_jobs: int | None) -> Any:
-    """Frequencies and derivatives from chunks of rows, solved in parallel."""
-    if effective_n_jobs(n_jobs) == 1:
-        return linearised(rows)
-    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
-    chunks = (rows[start : start + size] for start in range(0, len(rows), size))
-    parallel = Parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-    parts = parallel(delayed(solve_chunk)(linearised, chunk) for chunk in chunks)
-    return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+def linearise_modes(
+    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, step: float = 0.001, n_jobs: int | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Frequencies and mode shapes of many rows of parameters, and their derivatives.
+
+    Parameters
+    ----------
+    model : FE model
+        Exact derivatives come from its method ``linearised_modes``, if it has one; else those of the shapes are
+        central differences of its method ``modes``, and those of the frequencies as from `linearise`.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    dofs : array-like of int of shape (n_dofs,)
+        Degrees of freedom, such as those of sensors; the first is 0.
+    step : float, default=0.001
+        Relative step of central differences.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN, as are the others.
+    jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+        Derivatives d f / d theta in Hz.
+    shapes : ndarray of shape (n_samples, n_dofs, n_modes)
+        As the model scales them; signs are arbitrary.
+    derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
+        Derivatives d phi / d theta of these shapes.
+
+    Raises
+    ------
+    ValueError
+        If the model has neither method, theta has the wrong width or a value that is neither NaN nor finite and
+        positive, ``dofs`` are not different degrees of freedom of the model, or the step is not between 0 and 1.
+
+    See Also
+    --------
+    shape_jacobian : Shapes and their derivatives at one theta.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import linearise_modes
+    >>> rows = [[1.0, 1.0, 1.0, 1.0], [0.9, 1.0, 1.0, 1.0]]
+    >>> [array.shape for array in linearise_modes(make_truss(), rows, dofs=[0, 3, 8])]
+    [(2, 6), (2, 6, 4), (2, 3, 6), (2, 3, 6, 4)]
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    if hasattr(model, "linearised_modes"):
+        n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], np.size(dofs)
+        expected = {
+            "frequencies": (n_modes,),
+            "derivatives": (n_modes, n_parameters),
+            "shapes": (n_dofs, n_modes),
+            "derivatives of shapes": (n_dofs, n_modes, n_parameters),
+        }
+        solve = partial(_linearised_modes, dofs=dofs)
+        frequencies, jacobian, shapes, slopes = solve_rows(model, solve, rows, expected, n_jobs)
+        return frequencies, jacobian, shapes, slopes
+    _check_step(step)
+    frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
+    shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
+
+    def with_the_same_signs(moved: Array) -> Array:
+        there = evaluate_modes(model, moved, dofs, n_jobs=n_jobs)[1]
+        reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
+        return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
+
+    return frequencies, jacobian, shapes, central_differences(with_the_same_signs, rows, shapes, step)
 
 
-def check_step(step: float) -> None:
-    """Raise an error unless a relative step is between 0 and 1."""
+def _linearised(model: Any, theta: Array) -> tuple[Array, Array]:
+    if hasattr(model, "linearised"):
+        return model.linearised(theta)
+    return model.frequencies(theta), model.jacobian(theta)
+
+
+def _linearised_modes(model: Any, theta: Array, dofs: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    return model.linearised_modes(theta, dofs)
+
+
+def _check_step(step: float) -> None:
     if not isinstance(step, Real) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
-
-
-def central_differences(model: FEModel, theta: Array, step: float, n_jobs: int | None = None) -> Array:
-    """d f / d theta by central differences of a relative step, (n_samples, n_modes, n_parameters).
-
-    One-sided where one side has no frequencies.
-    """
-    check_step(step)
-    n_samples, n_parameters = theta.shape
-    steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
-    moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])
-    solved = evaluate(model, moved.reshape(-1, n_parameters), n_jobs=n_jobs)
-    sides = solved.reshape(2, n_samples, n_parameters, -1)
-    known = ~np.isnan(sides)
-    if not known.all():
-        sides = np.where(known, sides, evaluate(model, theta)[:, np.newaxis])
-    widths = np.where(known.any(axis=0), known.sum(axis=0), np.nan) * (step * theta)[:, :, np.newaxis]
-    return ((sides[0] - sides[1]) / widths).swapaxes(1, 2)

@@ -1,5 +1,7 @@
 """Measurement noise on frequencies."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

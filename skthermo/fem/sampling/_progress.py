@@ -14,8 +14,10 @@ SECONDS_BETWEEN = 0.1
 WIDTH = 30
 
 
-def with_progress(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> Iterator[NDArray]:
-    """Yield the arrays unchanged, and show on stderr how many of their rows are done.
+def with_progress(
+    parts: Iterable[tuple[NDArray, ...]], n_rows: int, shown: bool | None
+) -> Iterator[tuple[NDArray, ...]]:
+    """Yield the results unchanged, and show on stderr how many of their rows are done.
 
     With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides: 1 shows the bar, 0 does not. Unset, the bar
     appears only on a terminal, after a second, and only in the main thread of the main process: bars of several workers
@@ -30,7 +32,7 @@ def with_progress(parts: Iterable[NDArray], n_rows: int, shown: bool | None) -> 
     drawn, next_time, done = False, start + (0.0 if shown else SILENT_SECONDS), 0
     try:
         for part in parts:
-            done += len(part)
+            done += len(part[0])
             now = time.monotonic()
             if now >= next_time or (drawn and done == n_rows):
                 sys.stderr.write("\r" + bar(done, n_rows, now - start))

@@ -1,5 +1,7 @@
 """Monte Carlo sampling of FE models."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
@@ -10,8 +12,7 @@ from skthermo._arguments import check_bounds
 from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
 from skthermo._models import check_model
 from skthermo.fem._protocol import FEModel, ModalModel
-from skthermo.fem.sampling._evaluate import evaluate
-from skthermo.fem.sampling._evaluate_modes import evaluate_modes
+from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
 
 if TYPE_CHECKING:
     from skthermo.fem.sampling._samples import Samples
@@ -27,7 +28,7 @@ def sample(
     n_jobs: int | None = None,
     progress: bool | None = None,
     random_state: RandomState = None,
-) -> "Samples":
+) -> Samples:
     """Frequencies of an FE model at random parameters.
 
     Parameters

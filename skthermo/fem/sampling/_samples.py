@@ -1,4 +1,4 @@
-"""What sampling returns; in a file of its own because scikit-learn imports pandas."""
+"""The result of sampling, in a file of its own because scikit-learn imports pandas."""
 
 from sklearn.utils import Bunch
 
@@ -6,7 +6,7 @@ from skthermo._arrays import Array
 
 
 class Samples(Bunch):
-    """Parameters, and what an FE model makes of them; ``shapes`` are there if they were asked for."""
+    """Parameters and the model's frequencies, with mode shapes where degrees of freedom were given."""
 
     theta: Array
     frequencies: Array

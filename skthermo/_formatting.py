@@ -1,0 +1,77 @@
+"""Numbers, names and times as text that an owner of a bridge reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+SPACE = "\N{NO-BREAK SPACE}"
+UNKNOWN = "not known"
+
+
+def percent(share: float, digits: str = ".4g") -> str:
+    """A share in percent, with digits as in a format specification."""
+    return f"{100 * float(share):{digits}}{SPACE}%" if np.isfinite(share) else UNKNOWN
+
+
+def share_text(share: float) -> str:
+    """A share in percent with two significant digits; shares of nearly 1 do not become 100 %."""
+    value = 100 * float(share)
+    if 99.5 <= value < 100:
+        return percent(share, ".1f") if value < 99.95 else f"over{SPACE}99.9{SPACE}%"
+    return f"{significant(value)}{SPACE}%" if np.isfinite(share) else UNKNOWN
+
+
+def bounds_text(lowest: float, highest: float) -> str:
+    """Bounds of a share in percent, on one line."""
+    return f"{share_text(lowest)}{SPACE}to{SPACE}{share_text(highest)}"
+
+
+def significant(value: float, digits: int = 2) -> str:
+    """A number with so many significant digits; those before the point are all kept."""
+    if value == 0 or not np.isfinite(value):
+        return "0" if value == 0 else UNKNOWN
+    decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
+    return f"{value:.{decimals}f}"
+
+
+def probability_text(value: float) -> str:
+    """A probability as a number."""
+    if not np.isfinite(value):
+        return UNKNOWN
+    return "less than 0.001" if value < 0.001 else f"{value:.2g}"
+
+
+def counted(number: int, one: str, many: str | None = None) -> str:
+    """A number with its noun."""
+    return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
+
+
+def listed(names: Sequence[Any]) -> str:
+    """Names in a sentence."""
+    *first, last = [str(name) for name in names] or [""]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def duration_text(wait: Any) -> str:
+    """Time to an alarm, in records or as a time."""
+    if pd.isna(wait):
+        return "no alarm"
+    if not isinstance(wait, pd.Timedelta):
+        return f"{float(wait):.3g} records" if wait else "first record"
+    hours = wait.total_seconds() / 3600
+    if hours == 0:
+        return "first record"
+    size, unit = (hours / 24, "day") if hours >= 48 else (hours, "hour") if hours >= 1 else (60 * hours, "minute")
+    text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
+    return f"{text} {unit}{'' if text == '1' else 's'}"
+
+
+def period_text(index: pd.Index | None) -> str:
+    """First and last day of records on an index of times; nothing for others."""
+    if not isinstance(index, pd.DatetimeIndex) or not len(index):
+        return ""
+    return f"from {index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}"

@@ -1,0 +1,92 @@
+"""Files that may be damaged: SciPy reads them in a child process, with limits of memory and time.
+
+SciPy's readers follow the lengths that a file states; where these are damaged they can end the interpreter, or take
+all memory.
+"""
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from skthermo._io._child import read
+
+CHILD = Path(__file__).with_name("_child.py")
+LEAST_MEMORY = 256_000_000
+TIMES_THE_FILE = 10
+EXPECTED = "ten times the size of the file or 256 MB (a sound file can be saved without compression)"
+SECONDS, BYTES_A_SECOND = 60, 1_000_000
+
+
+def read_matlab(file: Path) -> dict[str, Any]:
+    """Every variable of a MATLAB v5 file, or of the only one in a zip file.
+
+    Numbers become arrays of floats or complex numbers with all their dimensions, or sparse matrices; texts a list of
+    one text for each row; cell arrays a list of their values, the first dimension running fastest; structs a mapping
+    of their fields, and arrays of structs a list of such mappings. Anything else becomes None.
+
+    Raises
+    ------
+    ValueError
+        Names the file, and the variable if that is damaged.
+    """
+    return read_files([(file, "MATLAB v5")])[0]
+
+
+def read_half(file: Path) -> Any:
+    """A symmetric matrix from lines of row, column and value for each entry of a half."""
+    return read_files([(file, "lines of row, column and value")])[0]
+
+
+def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
+    """What files hold; each comes with its form, one of the child's ``READERS``.
+
+    Raises
+    ------
+    ValueError
+        Names the first file that is damaged or something else, or would need too much memory or time.
+    """
+    size = sum(file.stat().st_size for file, _ in files)
+    most_memory = max(TIMES_THE_FILE * size, LEAST_MEMORY)
+    job = {"files": [(str(file), form) for file, form in files], "most_memory": most_memory}
+    results = []
+    with tempfile.TemporaryFile() as output:
+        end = _run(json.dumps(job), output, SECONDS + size / BYTES_A_SECOND)
+        output.seek(0)
+        for file, form in files:
+            try:
+                result = pickle.load(output)
+            except (EOFError, pickle.UnpicklingError):
+                result = ValueError(f"reading it {end}")
+            if isinstance(result, MemoryError):
+                result = f"it would take more than {most_memory / 1e6:.0f} MB of memory; expected at most {EXPECTED}"
+            if isinstance(result, ValueError | str):
+                raise ValueError(f"{file}: not readable as {form} ({result})")
+            results.append(result)
+    return results
+
+
+def _run(job: str, output: Any, seconds: float) -> str:
+    """Run the child; how it ended."""
+    if not sys.executable or getattr(sys, "frozen", False):  # no interpreter that could run a script
+        for file, form in json.loads(job)["files"]:
+            pickle.dump(read(file, form), output)
+        return "failed"
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+    command = [sys.executable, "-P", str(CHILD)]
+    try:
+        done = subprocess.run(
+            command, input=job, stdout=output, stderr=subprocess.PIPE, text=True, env=environment, timeout=seconds
+        )
+    except subprocess.TimeoutExpired:
+        return f"took more than {seconds:.0f} s"
+    return f"ended the process with exit code {done.returncode} {done.stderr[-300:].strip()}".strip()

@@ -1,0 +1,381 @@
+"""FE model of the railway bridge KW51: structure, parameters, sensors; `make_kw51` explains the assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from skthermo.datasets._sections import Section, box, channel, pipe, rectangle, tee, times
+from skthermo.fem import AffineModel, Beam, Membrane, Structure
+
+Node = tuple[object, ...]
+
+# Stated by Appendix A and Table A.1 of the paper.
+SPAN, WIDTH = 115.0, 12.4
+STEEL_E, BALLAST_E = 210e9, 550e6
+PLATE_T, BALLAST_T = 0.015, 0.6
+ARCH = box(1.3, 0.86, 0.05)
+BRACE = box(0.35, 0.35, 0.016)
+CONNECTION = rectangle(0.31, 0.045)
+T_BEAM = tee(1.235, 0.6, 0.08)
+STIFFENER = channel(0.25, 0.25, 0.008)
+PIPE = pipe(0.75, 0.04)
+
+# Assumed, in the order of the table in make_kw51.
+N_BAYS = 32
+RISE = 18.0
+FEET, REACH = range(2, N_BAYS, 4), 2
+CONNECTION_LENGTH = 1.6
+PIPES = (0.25, 0.385, 0.615, 0.75)
+N_PANELS = 4
+END_STIFFNESS = 1.4
+STIFFENER_SPACING = 0.5
+NU = 0.3
+STEEL_DENSITY, BALLAST_DENSITY = 7850.0, 1500.0
+SUPPORTS = {(0, 0): "xyz", (0, N_PANELS): "yz", (N_BAYS, 0): "xyz", (N_BAYS, N_PANELS): "yz"}
+
+STEEL = {"E": STEEL_E, "G": STEEL_E / (2 + 2 * NU), "density": STEEL_DENSITY, "I_p": 0.0, "lumped": True}
+STATIONS, LINES, SIDES = range(N_BAYS + 1), range(N_PANELS + 1), (0, N_PANELS)
+ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * x for x in PIPES)})
+
+SIDE_LINES = {"A": 0, "C": N_PANELS}
+DECK_SENSORS = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
+ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}
+"""Stations of the arch."""
+
+THERMAL = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
+PARAMETERS = {
+    "E_bot": "bottom",
+    "E_arc": "arch",
+    "E_br": "braces",
+    "E_con": "connections",
+    "E_pip": "pipes",
+    "E_b": "ballast",
+    "A_c": ("A", "connections", "stiffness"),
+    "A_p": ("A", "pipes", "stiffness"),
+    "I_33p": ("I_yy", "pipes"),
+    "I_22p": ("I_zz", "pipes"),
+    "A_d": ("A", "braces", "stiffness"),
+    "I_33a": ("I_yy", "arch"),
+    "I_22a": ("I_zz", "arch"),
+    "A_a": ("A", "arch", "stiffness"),
+    "J_a": ("J", "arch"),
+    "M_a": ("mass", "arch"),
+    "I_33g": ("I_yy", "girders"),
+    "I_22g": ("I_zz", "girders"),
+    "M_g": ("mass", "girders"),
+    "A_tb": ("A", "transverse_beams", "stiffness"),
+    "I_22s": ("I_zz", "stiffeners"),
+}
+UPDATED = {
+    "E_bot": 1.3,
+    "E_arc": 0.9,
+    "E_br": 0.9,
+    "E_con": 0.9,
+    "E_pip": 0.942523,
+    "A_c": 1.5,
+    "I_22p": 0.5,
+    "A_d": 1.031471,
+    "I_22a": 1.128122,
+    "A_a": 1.016123,
+    "M_a": 0.711763,
+}
+"""Multipliers of the updated model: the optimum of the third fit of examples/plot_kw51_updating.py."""
+
+
+def kw51_structure() -> Structure:
+    """Nodes, members, supports and groups of the model `make_kw51`.
+
+    Returns
+    -------
+    Structure
+        Its axes are x along the bridge, y across it from -6.2 to 6.2 m, z upwards. Nodes are ("deck", station, line)
+        and ("arch", station, line), with stations 0 to 32 and lines 0 to 4, of which 0 and 4 carry arches;
+        ("joint", foot, head, line, "deck" or "arch") is where a brace meets a connection.
+
+    See Also
+    --------
+    make_kw51 : The FE model, and what it assumes.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import kw51_structure
+    >>> structure = kw51_structure()
+    >>> len(structure.dofs), len(structure.groups["braces"])
+    (1760, 32)
+    """
+    hangers = [hanger(foot, head, line) for line in SIDES for foot in FEET for head in heads(foot)]
+    parts = {
+        "girders": beams("girder", (along_deck(line) for line in SIDES), T_BEAM),
+        "transverse_beams": transverse_beams(),
+        "stiffeners": stiffeners(),
+        "plate": membranes("plate", E=STEEL_E, t=PLATE_T, density=STEEL_DENSITY),
+        "ballast": membranes("ballast", E=BALLAST_E, t=BALLAST_T, density=BALLAST_DENSITY),
+        "arch": beams("arch", ([on_arch(s, line) for s in ARCH_STATIONS] for line in SIDES), ARCH),
+        "deck_connections": beams("deck connection", (nodes[:2] for nodes in hangers), CONNECTION),
+        "braces": beams("brace", (nodes[1:3] for nodes in hangers), BRACE),
+        "arch_connections": beams("arch connection", (nodes[2:] for nodes in hangers), CONNECTION),
+        "pipes": beams("pipe", ([on_arch(N_BAYS * x, line) for line in SIDES] for x in PIPES), PIPE),
+    }
+    groups = {part: list(members) for part, members in parts.items()}
+    groups["bottom"] = [m for part in ("girders", "transverse_beams", "stiffeners", "plate") for m in groups[part]]
+    groups["connections"] = groups["deck_connections"] + groups["arch_connections"]
+    members = {name: element for part in parts.values() for name, element in part.items()}
+    return Structure(
+        nodes={node: place(node) for element in members.values() for node in element.nodes},
+        members=members,
+        supports={("deck", *corner): fixed for corner, fixed in SUPPORTS.items()},
+        groups=groups,
+    )
+
+
+def place(node: Node) -> np.ndarray:
+    """Coordinates of a node."""
+    if node[0] == "joint":
+        _, foot, head, line, end = node
+        start, other = place(("deck", foot, line)), place(on_arch(head, line))
+        if end == "arch":
+            start, other = other, start
+        return start + CONNECTION_LENGTH * (other - start) / np.linalg.norm(other - start)
+    part, station, line = node
+    x = station / N_BAYS
+    return np.array([SPAN * x, WIDTH * (line / N_PANELS - 0.5), 4 * RISE * x * (1 - x) if part == "arch" else 0.0])
+
+
+def on_arch(station: float, line: int) -> Node:
+    """Node of an arch, which ends at the deck's corners."""
+    return "deck" if station in (0, N_BAYS) else "arch", station, line
+
+
+def along_deck(line: int) -> list[Node]:
+    """Nodes of one line of the deck."""
+    return [("deck", station, line) for station in STATIONS]
+
+
+def heads(foot: int) -> tuple[int, int]:
+    """Stations of the arch that a V-pair of braces reaches, at least one bay away from the supports."""
+    return max(foot - REACH, 1), min(foot + REACH, N_BAYS - 1)
+
+
+def hanger(foot: int, head: int, line: int) -> list[Node]:
+    """Nodes of a connection, a brace and a connection in line, from deck to arch."""
+    joints = [("joint", foot, head, line, end) for end in ("deck", "arch")]
+    return [("deck", foot, line), *joints, on_arch(head, line)]
+
+
+def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffness: float = 1.0) -> dict[Node, Beam]:
+    """Steel beams along chains of nodes; ``stiffness`` multiplies the modulus."""
+    material = STEEL | {modulus: stiffness * STEEL[modulus] for modulus in ("E", "G")}
+    return {
+        (part, start, end): Beam(start, end, **material, **section)
+        for chain in chains
+        for start, end in pairwise(chain)
+    }
+
+
+def transverse_beams() -> dict[Node, Beam]:
+    """Across the deck at every station; those at the ends are stiffer."""
+    lines = [[("deck", station, line) for line in LINES] for station in STATIONS]
+    first, *inner, last = lines
+    ends = beams("transverse beam", [first, last], T_BEAM, END_STIFFNESS)
+    return beams("transverse beam", inner, T_BEAM) | ends
+
+
+def stiffeners() -> dict[Node, Beam]:
+    """All stiffeners, lumped at the lines of the mesh in proportion to the tributary width of each."""
+    gathered = {}
+    for line in LINES:
+        width = WIDTH / N_PANELS / (2 if line in SIDES else 1)
+        gathered |= beams("stiffener", [along_deck(line)], times(width / STIFFENER_SPACING, STIFFENER))
+    return gathered
+
+
+def membranes(part: str, **properties: float) -> dict[Node, Membrane]:
+    """A layer over the deck."""
+    return {
+        (part, s, n): Membrane(
+            (("deck", s, n), ("deck", s + 1, n), ("deck", s + 1, n + 1), ("deck", s, n + 1)),
+            **properties,
+            nu=NU,
+            lumped=True,
+        )
+        for s in STATIONS[:-1]
+        for n in LINES[:-1]
+    }
+
+
+def make_kw51(
+    parameters: str | Collection[str] | None = None, n_modes: int = 6, *, updated: bool = False
+) -> AffineModel:
+    """FE model of the railway bridge KW51 in Leuven before its retrofit, as drawn or updated.
+
+    A steel tied arch of 115 m with an orthotropic deck, as Kamali et al. (2026), Appendix A,
+    describe it: a space frame with 1760 degrees of freedom.
+
+    Parameters
+    ----------
+    parameters : str or collection of str, optional
+        Some of the 21 names of Table A.2, in the order of the columns of theta, or "all". By default the five that
+        vary with temperature, eq. (21): E_bot, E_arc, E_br, E_con, E_pip.
+    n_modes : int, default=6
+        Number of modes.
+    updated : bool, default=False
+        Whether theta = 1 is the model updated to frequencies that were measured before the retrofit (see Notes), all
+        parameters that are not named being frozen at their updated values.
+
+    Returns
+    -------
+    AffineModel
+        With modes followed by shape (``track=True``). Damage groups: ``bottom`` and its parts ``girders``,
+        ``transverse_beams``, ``stiffeners`` and ``plate``; ``arch``; ``braces``; ``connections`` and its parts
+        ``arch_connections`` and ``deck_connections``; ``pipes``; ``ballast``.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is unknown or named twice.
+
+    See Also
+    --------
+    kw51_structure : The structure itself, for parameters and groups of your own.
+    make_kw51_campaign : Synthetic monitoring of the updated bridge.
+
+    Notes
+    -----
+    Moduli E_bot (girders, transverse beams, stiffeners, plate), E_arc, E_br, E_con, E_pip and E_b (ballast) multiply
+    the whole stiffness of their members. Areas A_c (connections), A_p (pipes), A_d (braces), A_a (arch) and A_tb
+    (transverse beams) multiply stiffness, not mass; so do second moments of vertical bending, I_33p, I_33a and I_33g
+    (girders), and of lateral bending, I_22p, I_22a, I_22g and I_22s (stiffeners), and the torsion constant J_a.
+    M_a and M_g multiply the masses of arch and girders.
+
+    Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. Values that they do not give
+    are assumed here, before any updating:
+
+    ===================  ================================  =====================================================
+    quantity             value                             reason
+    ===================  ================================  =====================================================
+    transverse beams     33, in 32 equal bays              the monitoring numbers them so
+    arches               12.4 m apart, upright above the   the width stated
+                         girders; parabolas between the
+                         supports
+    rise of an arch      18 m                              L/6.4 is usual; f3 asks for more, f5 for less
+    braces               16 a side, in V-pairs from        hangers usual in tied arches; steeper ones let a
+                         stations 2, 6, .., 30 to the      vertical mode fall from 2.8 to 1.7 Hz
+                         arch 2 bays to either side (the
+                         outermost: 1 bay)
+    connections          1.6 m at both ends of a brace,    Table A.3: sensitivities to E_con and E_br compare
+                         in line with it, upright          as the flexibilities of connections and braces
+    pipes                x/L = 0.25, 0.385 and mirrored    f1, f2 and f4 together
+    mesh of the deck     4 panels across a bay, all        f3 is within 0.2 % of 8 panels
+                         members at one level
+    end beams            1.4 times as stiff as the other   for the mesh: 8 panels raise f1, f2 and f4 by 3.2,
+                         transverse beams                  1.9 and 1.3 %, this by 2.2, 1.4 and 1.0 %
+    stiffeners           every 0.5 m, gathered along the   their own width of 0.25 m, and as much between
+                         lines of the mesh by width        them
+    steel                nu = 0.3, 7850 kg/m3              handbooks
+    ballast              nu = 0.3, 1500 kg/m3, over the    loose crushed stone; rails and sleepers are not
+                         whole width                       mentioned
+    mass                 lumped, translations only         default of the program that the paper used
+    supports 1 and 3     opposite ends of one side         at one end, or across: another order of modes
+    ===================  ================================  =====================================================
+
+    Rise, braces, connections, pipes and supports were thus chosen with the paper's un-updated results in view, as
+    round numbers; nothing was optimised. Its six un-updated frequencies, 0.4735 to 2.7810 Hz, are met to 2 %.
+    Modes 3 and 5 share more of each other than in Table A.3: supports that hold one side alone couple them.
+    Beams have no shear deformation.
+
+    The updated model has eleven multipliers fitted to six measured frequencies, modes followed by shape, moduli within
+    10 % (E_bot within 30 %) and all else within 50 %, by ``python examples/plot_kw51_updating.py`` ("followed, E_bot
+    30 %"). Six of them lie at their bounds, because six frequencies cannot determine eleven multipliers:
+
+    =======================  ======  ======  ======  ======  ======  ======
+    frequency (Hz)               f1      f2      f3      f4      f5      f6
+    =======================  ======  ======  ======  ======  ======  ======
+    measured                  0.510   1.240   1.890   2.450   2.580   2.920
+    not updated               0.477   1.113   1.694   2.351   2.535   2.824
+    updated                   0.507   1.211   1.888   2.515   2.581   2.920
+    =======================  ======  ======  ======  ======  ======  ======
+
+    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
+    E_bot  E_arc  E_br   E_con  E_pip     A_c    I_22p  A_d       I_22a     A_a       M_a
+    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
+    1.3    0.9    0.9    0.9    0.942523  1.5    0.5    1.031471  1.128122  1.016123  0.711763
+    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
+
+    Maes & Lombaert, Journal of Bridge Engineering 26 (3) (2021) 04721001 [ML21]_.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_kw51
+    >>> model = make_kw51(["E_arc", "M_a"], n_modes=2)
+    >>> model.frequencies([[1.0, 1.0], [1.1, 1.0], [1.0, 1.1]]).round(3)
+    array([[0.477, 1.113],
+           [0.487, 1.146],
+           [0.459, 1.07 ]])
+    """
+    if parameters is None:
+        names = THERMAL
+    elif isinstance(parameters, str):
+        names = tuple(PARAMETERS) if parameters == "all" else (parameters,)
+    else:
+        names = tuple(parameters) if isinstance(parameters, Collection) else ()
+    if not names or len(set(names)) < len(names) or not set(names) <= set(PARAMETERS):
+        raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(PARAMETERS)}")
+    if not updated:
+        return kw51_structure().assemble({name: PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)
+    return updated_model(kw51_structure(), {name: PARAMETERS[name] for name in names}, n_modes)
+
+
+def updated_model(structure: Structure, parameters: Mapping[str, Any], n_modes: int) -> AffineModel:
+    """The model of a structure that has KW51's members, as updated, with parameters bound as `Structure.assemble`."""
+    bound = parameters | {name: PARAMETERS[name] for name in UPDATED}
+    model = structure.assemble(bound, n_modes=n_modes, track=True)
+    theta = [UPDATED.get(name, 1.0) for name in model.parameter_names]
+    return model.rescaled(theta).with_parameters(list(parameters))
+
+
+def kw51_sensors() -> dict[str, int]:
+    """Degrees of freedom of the FE model at the accelerometers of the railway bridge KW51.
+
+    Returns
+    -------
+    dict of str to int
+        Label of each of the 12 sensors, in the order of the monitoring data, and its degree of freedom in
+        `make_kw51`.
+
+    See Also
+    --------
+    kw51_structure : The structure, whose ``dofs`` these are.
+
+    Notes
+    -----
+    The positions are read from the labels, and assumed where these leave them open. On the deck, the number is that of
+    the transverse beam, 1 to 33 (17 is mid-span), so that the station is the number less 1; the letter A or C is the
+    side, and y or z the direction. On the arch, the numbers 9 and 10, 15 and 16, 21 and 22 lie about a middle of 15.5
+    as the deck's numbers 11, 17 and 23 about theirs: the sensors are taken as those above them, at stations 10, 16
+    and 22. Side A is the line 0 of the model (y = -6.2 m), and every sensor counts as positive along the model's axes.
+    Check these assumptions by the MAC of measured and computed shapes (`~skthermo.fem.match_modes`).
+    For `load_kw51`, ``[kw51_sensors()[name] for name in data.sensors]`` are the degrees of freedom of the last axis of
+    ``shapes``.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import kw51_sensors, kw51_structure
+    >>> sensors = kw51_sensors()
+    >>> list(sensors)[:3]
+    ['aBD11Az', 'aBD17Ay', 'aBD17Az']
+    >>> kw51_structure().dofs[sensors["aBD17Az"]]
+    (('deck', 16, 0), 'z')
+    """
+    places = {label: (("deck", int(label[3:5]) - 1, SIDE_LINES[label[5]]), label[6]) for label in DECK_SENSORS}
+    for pair, station in ARCH_SENSORS.items():
+        places |= {f"{pair}{side}y": (("arch", station, line), "y") for side, line in SIDE_LINES.items()}
+    dofs = {dof: i for i, dof in enumerate(kw51_structure().dofs)}
+    return {label: dofs[place] for label, place in places.items()}

@@ -1,0 +1,236 @@
+"""Matrices that are affine in products of the parameters."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, Matrix, as_dense
+from skthermo.fem._theta import ROWS_PER_CHUNK
+
+SPARSE_ROWS_PER_CHUNK = 16
+"""Sparse samples are solved one by one; a few of them are enough work for one task."""
+
+
+class AffineTerms(ABC):
+    """The sum over t of ``factor_t * prod_p(theta_p ** exponent_tp) * matrix_t``.
+
+    Parameters
+    ----------
+    exponents : ndarray of shape (n_terms, n_parameters)
+        How often each parameter multiplies each term; a row of zeros is the constant part.
+    factors : ndarray of shape (n_terms,), optional
+        Fixed multipliers, such as 1 - severity of damage. One by default.
+    """
+
+    n_dof: int
+    max_rows = ROWS_PER_CHUNK
+
+    def __init__(self, exponents: NDArray[np.int64], factors: Array | None = None):
+        self.exponents = exponents
+        self.factors = np.ones(len(exponents)) if factors is None else factors
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether no parameter multiplies any term."""
+        return not self.exponents.any()
+
+    def products(self, theta: Array) -> Array:
+        """The product of each term's parameters, (n_samples, n_terms)."""
+        return np.prod(theta[:, np.newaxis] ** self.exponents, axis=2)
+
+    def coefficients(self, theta: Array) -> Array:
+        """The factor of each matrix, (n_samples, n_terms)."""
+        return self.factors * self.products(theta)
+
+    def coefficient_gradients(self, theta: Array) -> Array:
+        """Derivative of ``coefficients``, (n_samples, n_terms, n_parameters)."""
+        return self.coefficients(theta)[:, :, np.newaxis] * self.exponents / theta[:, np.newaxis]
+
+    def gradients(self, theta: Array, shapes: Array) -> Array:
+        """phi' (dA / d theta_p) phi, (n_samples, n_modes, n_parameters)."""
+        return self.quadratic_forms(shapes) @ self.coefficient_gradients(theta)
+
+    def derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times each vector at one row of theta, (n, n_vectors, n_parameters)."""
+        gradients = self.coefficient_gradients(theta)[0]
+        return np.stack([self.weighted_sum(weights) @ vectors for weights in gradients.T], axis=2)
+
+    @classmethod
+    @abstractmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
+        """Terms with a factor of one."""
+
+    @abstractmethod
+    def assemble(self, theta: Array) -> Array | list[scipy.sparse.csc_array]:
+        """The summed matrix of every row of theta."""
+
+    @abstractmethod
+    def weighted_sum(self, weights: Array) -> Matrix:
+        """The weighted sum of the matrices."""
+
+    def each(self, theta: Array) -> Iterator[Matrix]:
+        """The summed matrices, one by one; a constant matrix is summed once."""
+        for i, row in enumerate(theta[:, np.newaxis]):
+            if i == 0 or not self.is_constant:
+                matrix = self.assemble(row)[0]
+            yield matrix
+
+    def product(self, theta: Array, vectors: Array) -> Array:
+        """The summed matrix of every row times its vectors, (n_samples, n, n_vectors)."""
+        return np.stack([matrix @ columns for matrix, columns in zip(self.each(theta), vectors, strict=True)])
+
+    @property
+    @abstractmethod
+    def n_entries(self) -> int:
+        """Number of stored entries of one summed matrix."""
+
+    @abstractmethod
+    def quadratic_forms(self, shapes: Array) -> Array:
+        """phi' A_t phi of every shape and term, (n_samples, n_modes, n_terms)."""
+
+    @abstractmethod
+    def scaled(self, factors: Array) -> "AffineTerms":
+        """The same matrices with their factors multiplied."""
+
+    @abstractmethod
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "AffineTerms":
+        """The same matrices, multiplied by other parameters."""
+
+    @property
+    @abstractmethod
+    def each_matrix(self) -> list[Matrix]:
+        """The matrices of the terms."""
+
+    def with_constant(self, matrix: Matrix) -> "AffineTerms":
+        """These terms and a further, constant one."""
+        exponents = np.vstack([self.exponents, np.zeros_like(self.exponents[:1])])
+        return type(self).from_matrices([*self.each_matrix, matrix], exponents).scaled(np.append(self.factors, 1.0))
+
+    @abstractmethod
+    def projected(self, basis: Array) -> "DenseTerms":
+        """Terms basis' A_t basis with the same coefficients."""
+
+
+class DenseTerms(AffineTerms):
+    """Terms for batches: ``matrices`` is (n_terms, n, n)."""
+
+    def __init__(self, matrices: Array, exponents: NDArray[np.int64], factors: Array | None = None):
+        super().__init__(exponents, factors)
+        self.matrices = matrices
+        self.n_dof = matrices.shape[1]
+        _freeze(self.matrices, self.exponents, self.factors)
+
+    @classmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
+        return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
+
+    @property
+    def n_entries(self) -> int:
+        return self.n_dof**2
+
+    def assemble(self, theta: Array) -> Array:
+        flat = self.matrices.reshape(len(self.matrices), -1)
+        return (self.coefficients(theta) @ flat).reshape(-1, self.n_dof, self.n_dof)
+
+    def weighted_sum(self, weights: Array) -> Array:
+        return np.tensordot(weights, self.matrices, axes=1)
+
+    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n, n_vectors, n_parameters)."""
+        products = np.stack([matrix @ vectors for matrix in self.matrices], axis=3)
+        return products @ self.coefficient_gradients(theta)[:, np.newaxis]
+
+    def quadratic_forms(self, shapes: Array) -> Array:
+        forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
+        return np.stack(forms, axis=2)
+
+    def scaled(self, factors: Array) -> "DenseTerms":
+        return DenseTerms(self.matrices, self.exponents, self.factors * factors)
+
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "DenseTerms":
+        return DenseTerms(self.matrices, exponents, self.factors)
+
+    @property
+    def each_matrix(self) -> list[Matrix]:
+        return list(self.matrices)
+
+    def projected(self, basis: Array) -> "DenseTerms":
+        return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
+
+
+class SparseTerms(AffineTerms):
+    """Terms on the union of their sparsity patterns: ``entries`` is (n_union, n_terms), one column for each matrix.
+
+    The union is stored as compressed sparse columns, so that a sum of terms is one product
+    with ``entries`` and has the same pattern whatever theta is.
+    """
+
+    max_rows = SPARSE_ROWS_PER_CHUNK
+
+    def __init__(
+        self,
+        entries: scipy.sparse.csc_array,
+        pattern: tuple[NDArray[np.int32], NDArray[np.int32]],
+        exponents: NDArray[np.int64],
+        factors: Array | None = None,
+    ):
+        super().__init__(exponents, factors)
+        self.entries = entries
+        self.rows, self.pointers = pattern
+        self.n_dof = len(self.pointers) - 1
+        self._columns = np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
+        _freeze(entries.data, entries.indices, entries.indptr, *pattern, self.exponents, self.factors)
+
+    @classmethod
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
+        n_dof = matrices[0].shape[0]
+        parts = [scipy.sparse.coo_array(matrix) for matrix in matrices]
+        places = np.concatenate([part.col.astype(np.int64) * n_dof + part.row for part in parts])
+        union, position = np.unique(places, return_inverse=True)
+        term = np.repeat(np.arange(len(parts)), [part.nnz for part in parts])
+        values = np.concatenate([part.data for part in parts])
+        entries = scipy.sparse.csc_array((values, (position, term)), shape=(len(union), len(parts)))
+        pointers = np.searchsorted(union, np.arange(n_dof + 1) * n_dof)
+        return cls(entries, ((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
+
+    @property
+    def n_entries(self) -> int:
+        return len(self.rows)
+
+    def assemble(self, theta: Array) -> list[scipy.sparse.csc_array]:
+        shape = (self.n_dof, self.n_dof)
+        sums = self.entries @ self.coefficients(theta).T
+        return [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in sums.T.copy()]
+
+    def weighted_sum(self, weights: Array) -> scipy.sparse.csc_array:
+        used = self.entries[:, np.flatnonzero(weights)]
+        data = used @ weights[weights != 0]
+        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
+
+    def quadratic_forms(self, shapes: Array) -> Array:
+        forms = [self.entries.T @ (shape[self.rows] * shape[self._columns]) for shape in shapes]
+        return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
+
+    def scaled(self, factors: Array) -> "SparseTerms":
+        return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
+
+    def with_exponents(self, exponents: NDArray[np.int64]) -> "SparseTerms":
+        return SparseTerms(self.entries, (self.rows, self.pointers), exponents, self.factors)
+
+    @property
+    def each_matrix(self) -> list[Matrix]:
+        terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
+        places = ((term.data, (self.rows[term.row], self._columns[term.row])) for term in terms)
+        return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
+
+    def projected(self, basis: Array) -> DenseTerms:
+        matrices = np.stack([basis.T @ (matrix @ basis) for matrix in self.each_matrix])
+        return DenseTerms(matrices, self.exponents, self.factors)
+
+
+def _freeze(*arrays: NDArray) -> None:
+    for array in arrays:
+        array.flags.writeable = False

@@ -1,0 +1,86 @@
+"""Rows of theta in chunks, solved on threads or in joblib's workers."""
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
+from functools import partial
+from numbers import Integral
+from typing import Any, TypeAlias
+
+import numpy as np
+from joblib import Parallel, delayed, effective_n_jobs
+from numpy.typing import ArrayLike
+
+from skthermo._arguments import check_theta
+from skthermo._arrays import Array
+from skthermo._models import check_model
+from skthermo._threads import map_on_blas_threads, single_blas_thread
+from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
+from skthermo.fem.sampling._progress import with_progress
+
+Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
+
+
+def checked_rows(model: Any, theta: ArrayLike, n_jobs: int | None) -> Array:
+    """Rows of theta, in which NaN is allowed, after checks of the model and the number of jobs."""
+    check_model(model)
+    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
+        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+    return check_theta(theta, model.parameter_names, allow_nan=True)
+
+
+def solve_rows(
+    model: Any,
+    solve: Solve,
+    rows: Array,
+    shapes: Mapping[str, tuple[int, ...]],
+    n_jobs: int | None,
+    progress: bool | None = False,
+) -> list[Array]:
+    """What ``solve(model, chunk)`` gives for every row, NaN where theta has NaN; failures are one warning.
+
+    ``shapes`` names the results and gives the shape of each for one row; frequencies are the first.
+    """
+    results = [np.full((len(rows), *shape), np.nan) for shape in shapes.values()]
+    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    if not known.size:
+        return results
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    places = [known[i : i + size] for i in range(0, len(known), size)]
+    with closing(_solved(model, solve, [rows[place] for place in places], n_jobs)) as parts:
+        for place, part in zip(places, with_progress(parts, len(known), progress), strict=True):
+            for result, array, what in zip(results, part, shapes, strict=True):
+                expected = (len(place), *shapes[what])
+                if np.shape(array) != expected:
+                    raise ValueError(
+                        f"the model's {what} have shape {np.shape(array)}; expected {expected}, the first for the rows "
+                        "of theta"
+                    )
+                result[place] = array
+    getattr(model, "warn_of", warn_of_failures)(rows, results[0])
+    return results
+
+
+def _solved(
+    model: Any, solve: Solve, chunks: list[Array], n_jobs: int | None
+) -> Generator[tuple[Array, ...], None, None]:
+    """Results of each chunk, in order; closing the generator stops the work."""
+    thread_safe = getattr(model, "thread_safe", False)
+    task = partial(solve, model.quiet() if thread_safe else model)
+    if thread_safe and effective_n_jobs(n_jobs) == 1:
+        yield from map_on_blas_threads(task, chunks)
+    else:
+        parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        yield from parallel(delayed(_on_one_thread)(task, chunk) for chunk in chunks)
+
+
+def _parallel(**options: Any) -> Parallel:
+    """A joblib `Parallel` that yields results as they come, where the active backend can."""
+    try:
+        return Parallel(return_as="generator", **options)
+    except ValueError:  # some backends, such as Ray's, return all results at the end
+        return Parallel(**options)
+
+
+def _on_one_thread(task: Callable[[Array], Any], chunk: Array) -> Any:
+    with single_blas_thread():
+        return task(chunk)

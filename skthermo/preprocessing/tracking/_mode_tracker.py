@@ -1,0 +1,272 @@
+"""Assigns the poles that operational modal analysis finds in each record to reference modes."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, TransformerMixin
+
+from skthermo._validation import Interval, _fit_context, check_is_fitted
+from skthermo.preprocessing._stamps import as_duration, as_stamps
+from skthermo.preprocessing.tracking._assignment import assign_near, assign_while_following, fitting_pairs
+from skthermo.preprocessing.tracking._poles import read_poles
+from skthermo.preprocessing.tracking._reference import ReferenceModes, read_reference
+from skthermo.preprocessing.tracking._results import TrackedModes, tracked_modes, warn_of_doubts
+
+
+class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
+    """Assign the poles of each record to the modes of a reference, by mode shape and frequency.
+
+    Operational modal analysis finds in each record any number of poles, in the order of their frequencies. Some are
+    spurious, and some modes are missing. The tracker puts every mode into a column of its own, with NaN where no pole
+    fits.
+
+    Parameters
+    ----------
+    reference : tuple or mapping
+        Frequencies in Hz, (n_modes,), and shapes at the sensors, (n_sensors, n_modes), real or complex, of any scale
+        and phase; from an FE model, ``(f[0], phi[0][dofs])`` after ``f, phi = model.modes(theta)``. A mapping has
+        ``frequencies``, ``shapes`` and, optionally, ``sensors``, names by which the sensors of the records are chosen.
+        Shapes may be None: then frequency alone decides. If frequencies are a Series, its index names the modes.
+    max_shift : float, default=0.15
+        Largest relative difference of a pole's frequency from that of its mode.
+    min_mac : float, default=0.8
+        Lowest modal assurance criterion (MAC) of a pole's shape and that of its mode.
+    follow : float, str, timedelta or None, default=None
+        Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
+        of records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step.
+        None keeps the reference. Shapes are always compared with those of the reference.
+    max_drift : float, default=0.3
+        Largest relative difference of a followed frequency from that of the reference.
+    close : float, default=0.02
+        Reference modes closer than this share of their frequency count as close modes, whose shapes may mix:
+        ``min_mac`` then applies to the MAC of a pole with the space that their shapes span.
+
+    Attributes
+    ----------
+    frequencies_ : ndarray of shape (n_modes,)
+        Frequencies of the reference in Hz.
+    shapes_ : ndarray of shape (n_sensors, n_modes) or None
+        Shapes of the reference.
+    sensors_ : list or None
+        Names of the reference's sensors.
+    mode_names_ : list of str
+        Names of the modes.
+
+    See Also
+    --------
+    skthermo.fem.match_modes : Pairs measured modes with those of an FE model.
+
+    Notes
+    -----
+    A pole is a candidate for a mode if both tolerances hold. Candidates are assigned one-to-one in every record, at the
+    lowest sum of ``(1 - MAC) / (1 - min_mac) + |f / f_reference - 1| / max_shift``; a mode without a pole costs 3,
+    more than any candidate, so that no pole which fits stays unused without need. Modes that swap order thus follow
+    their shapes. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is lower
+    is added; with no more sensors than close modes, every shape lies in that space, and they count as distinct.
+    NaN components of a shape, from sensors that failed, are left out of its MAC. Noise of a share e of the root mean
+    square of a shape's components lowers its MAC to about 1 / (1 + e^2), which ``min_mac`` should be well below.
+
+    With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
+    mode that is missing keeps its mean. Means are moved only by poles that have the shape of the reference.
+
+    Records have different numbers of poles, and the result is more than a table. The tracker therefore comes before a
+    pipeline, not into it: its ``frequencies`` are what the other estimators take.
+
+    References
+    ----------
+    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
+
+    Examples
+    --------
+    Two modes at three sensors. They swap order in the second record, and the third has a spurious pole.
+
+    >>> import numpy as np
+    >>> from skthermo.preprocessing import ModeTracker
+    >>> first, second, spurious = [1.0, 2.0, 1.0], [1.0, 0.0, -1.0], [1.0, -1.0, 1.0]
+    >>> records = [
+    ...     {"frequencies": [2.0, 2.2], "shapes": [first, second]},
+    ...     {"frequencies": [2.1, 2.15], "shapes": [second, first]},
+    ...     {"frequencies": [2.01, 2.05], "shapes": [spurious, first]},
+    ... ]
+    >>> tracker = ModeTracker(([2.0, 2.2], np.column_stack([first, second])))
+    >>> modes = tracker.fit_transform(records)
+    >>> modes.frequencies
+         f1   f2
+    0  2.00  2.2
+    1  2.15  2.1
+    2  2.05  NaN
+    >>> modes.left_over.to_list()
+    [0, 0, 1]
+    """
+
+    _parameter_constraints: dict = {
+        "reference": [tuple, list, dict],
+        "max_shift": [Interval(Real, 0, 1, closed="neither")],
+        "min_mac": [Interval(Real, 0, 1, closed="left")],
+        "follow": [Interval(Real, 1, None, closed="left"), str, timedelta, np.timedelta64, None],
+        "max_drift": [Interval(Real, 0, 1, closed="left")],
+        "close": [Interval(Real, 0, 1, closed="left")],
+    }
+
+    def __init__(
+        self,
+        reference: Any,
+        *,
+        max_shift: float = 0.15,
+        min_mac: float = 0.8,
+        follow: float | str | timedelta | None = None,
+        max_drift: float = 0.3,
+        close: float = 0.02,
+    ):
+        self.reference = reference
+        self.max_shift = max_shift
+        self.min_mac = min_mac
+        self.follow = follow
+        self.max_drift = max_drift
+        self.close = close
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: Any = None, y: None = None) -> ModeTracker:
+        """Read the reference.
+
+        Parameters
+        ----------
+        X : object, optional
+            Ignored.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        ModeTracker
+            The fitted tracker.
+
+        Raises
+        ------
+        ValueError
+            If frequencies and shapes of the reference do not fit each other, or have impossible values.
+
+        Warns
+        -----
+        UserWarning
+            If two reference modes are so near to each other, in frequency and shape, that they can be confused.
+        """
+        if isinstance(self.follow, bool):
+            raise ValueError(f"follow is {self.follow}; expected a number of records, a duration or None")
+        modes = read_reference(self.reference)
+        modes.warn_of_similar(self.max_shift, self.min_mac)
+        self.frequencies_, self.shapes_, self.mode_names_, self.sensors_ = modes
+        return self
+
+    def transform(self, X: Any) -> TrackedModes:
+        """Assign poles to modes.
+
+        Parameters
+        ----------
+        X : mapping, sequence of mappings, DataFrame or ndarray
+            The poles. A mapping has, for all records, ``frequencies`` in Hz (n_records, n_poles) with NaN where there
+            is no pole, ``shapes`` (n_records, n_poles, n_sensors), and, optionally, ``damping`` (n_records, n_poles)
+            and ``sensors``; or lists of arrays, one a record, of different numbers of poles: (n_poles,), (n_poles,
+            n_sensors) and (n_poles,). A sequence has such a mapping for each record. A table holds frequencies
+            alone. Other fields are ignored, except ``index``, which gives the index of records that are not pandas
+            objects.
+
+        Returns
+        -------
+        Bunch
+            With these attributes:
+
+            frequencies : DataFrame of shape (n_records, n_modes)
+                In Hz; NaN where no pole fits.
+            damping : DataFrame of shape (n_records, n_modes) or None
+                Damping ratios, in columns ``xi1``, ``xi2``, ...
+            shapes : ndarray of shape (n_records, n_modes, n_sensors) or None
+                In their own scale, rotated to the phase, or sign, of the reference.
+            mac : DataFrame of shape (n_records, n_modes) or None
+                MAC of each pole with the shape of its mode.
+            poles : DataFrame of int of shape (n_records, n_modes)
+                Position of each pole in its record; -1 where no pole fits.
+            left_over : Series of int of shape (n_records,)
+                Number of poles that were not assigned.
+            followed : DataFrame of shape (n_records, n_modes)
+                Frequencies of the reference, or their means with ``follow``, with which each record was compared.
+            summary : DataFrame
+                For each mode, the reference's frequency and the median of those assigned in Hz, the number and
+                share of records that have it, the share of these that are ambiguous because another pole fits the mode
+                or the pole fits another mode, and the median MAC.
+
+        Raises
+        ------
+        ValueError
+            If fields are missing or do not fit each other, sensors differ from those of the reference, or frequencies
+            are not positive or in rad/s.
+
+        Warns
+        -----
+        UserWarning
+            If a mode is found in no record; if many records without a mode have poles of its shape at another
+            frequency, or of other shapes at its frequency; if poles have no shape.
+        """
+        check_is_fitted(self)
+        modes = ReferenceModes(self.frequencies_, self.shapes_, self.mode_names_, self.sensors_)
+        poles = read_poles(X, self.sensors_, None if self.shapes_ is None else len(self.shapes_))
+        pairs = fitting_pairs(poles, modes, self.min_mac, self.close)
+        followed = np.tile(self.frequencies_, (len(poles.index), 1))
+        if self.follow is None:
+            chosen, near = assign_near(pairs, self.frequencies_, self.max_shift)
+        else:
+            order, n_records = self._pace(poles.index)
+            chosen, near, followed = assign_while_following(
+                pairs, self.frequencies_, self.max_shift, order=order, n_records=n_records, max_drift=self.max_drift
+            )
+        result = tracked_modes(poles, pairs.at(chosen), pairs.at(near), followed, modes)
+        if poles.shapes is not None:
+            warn_of_doubts(poles, pairs, chosen, followed, result.frequencies.notna().to_numpy(), modes)
+        return result
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the modes.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Ignored: poles have no names.
+
+        Returns
+        -------
+        ndarray of str
+            Names of the modes.
+        """
+        check_is_fitted(self)
+        return np.array(self.mode_names_, dtype=object)
+
+    def _pace(self, index: pd.Index) -> tuple[NDArray[np.intp], float]:
+        """Rows in the order of time, and the number of records of the time constant."""
+        stamps = as_stamps(index)
+        order = np.arange(len(index)) if stamps is None else np.argsort(stamps.asi8, kind="stable")
+        if isinstance(self.follow, Real):
+            return order, float(self.follow)
+        if stamps is None:
+            raise ValueError(
+                f"follow is {self.follow!r}, but X has no DatetimeIndex; expected one, or a number of records"
+            )
+        if stamps.hasnans or len(stamps) < 2:
+            raise ValueError(f"X has {len(stamps)} stamps, some of them missing or alone; expected two or more")
+        duration = as_duration(self.follow, "follow")
+        step = np.median(np.diff(stamps.as_unit("ns").asi8[order]))
+        n_records = duration.astype(np.int64) / max(step, 1)
+        if n_records < 1:
+            raise ValueError(f"follow is {self.follow!r}, shorter than the records' median step; expected more")
+        return order, n_records
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.two_d_array = False
+        tags.input_tags.allow_nan = True
+        return tags

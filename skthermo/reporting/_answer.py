@@ -1,0 +1,199 @@
+"""Sections of a report on the answer, and on what would be found and what not."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._formatting import bounds_text, counted, duration_text, percent, share_text
+from skthermo._pipelines import last_step
+from skthermo.detection import MahalanobisDetector
+from skthermo.reporting._figures import draw_curve, draw_damage_indices
+from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding
+from skthermo.reporting._html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
+
+MOST_LISTED = 12
+"""Largest number of scenarios that are listed or drawn."""
+
+
+def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -> Html:
+    """The answer in a few sentences, those on identified damage first."""
+    rows = study.results_[study.results_["source"] == SIMULATED]
+    confidence = percent(study.confidence_)
+    words = paragraphs(
+        "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
+        "learned from measurements how temperature moves this structure, simulated it in the same weather without "
+        "damage and with damage. The alarm system judged every simulated record."
+    )
+    meaning = paragraphs(
+        "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
+        "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as found reliably if at "
+        f"least {share_text(LEVEL)} of the records of the damaged structure raise an alarm. Bounds of rates hold with "
+        f"{confidence} confidence; they cover the scatter of the measurements, but neither weather of another kind nor "
+        "errors of the model."
+    )
+    parts = [words]
+    if identified:
+        parts += [element("h3", "The structure as it is now"), bullets(identified)]
+    parts += [element("h3", "False alarms"), _false_alarms(rows)]
+    if findings:
+        columns = ["Where", "Smallest damage found reliably", "Bounds", "From the curve; with 95 % confidence"]
+        cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]
+        parts += [
+            element("h3", "Smallest damage that is found reliably"),
+            bullets(
+                element("span", element("strong", f"{found.family}:"), f" {found.sentence()}") for found in findings
+            ),
+            table("Smallest damage found reliably: among the tested severities, and from a curve.", columns, cells),
+        ]
+    unclear = _unclear_families(rows, findings)
+    if unclear:
+        text = "of damage and strengthening together, or of one severity twice, no smallest damage can be given"
+        parts.append(paragraphs(f"{', '.join(unclear)}: {text}."))
+    elif not findings:
+        text = "No damage group was tested on its own, so that there is no smallest damage to report."
+        parts.append(paragraphs(text))
+    parts += [element("h3", "What would not be found"), _missed(rows), element("h3", "What the words mean"), meaning]
+    return section("answer", "The answer", *parts)
+
+
+def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[str]:
+    """Families with several scenarios that do not say which severity is the smallest that is found."""
+    tested = rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
+    found = {finding.family for finding in findings}
+    return [name for family in tested["family"].unique() if (name := str(family)) not in found]
+
+
+def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
+    """Rates of all scenarios, curves and damage indices."""
+    results = study.results_
+    scenarios = {scenario.name: scenario for scenario in study.scenarios}
+    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds", "Records judged"]
+    columns.append("Mean time to the first alarm")
+    cells = [
+        [
+            row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
+            element("span", described(scenarios.get(row["scenario"])), class_="text"),
+            bar(row["rate"], share_text(row["rate"])),
+            bounds_text(row["lowest"], row["highest"]),
+            f"{row['n_records']:,}",
+            duration_text(row["time_to_detection"]),
+        ]
+        for _, row in results.iterrows()
+    ]
+    introduction = (
+        "Every scenario was simulated in the same weather, "
+        f"{counted(int(results['n_repeats'].max()), 'time')}, each time with other scatter of the measurements. For "
+        "the healthy structure, alarms are false and should be few; for a damaged one, they should be many."
+    )
+    introduction += _beginning(study)
+    if (results["source"] == REFERENCE).any():
+        introduction += " Rows called reference are of records that were given to compare the simulations with."
+    distance = "The index is the Mahalanobis distance, not squared."
+    parts = [
+        paragraphs(introduction),
+        table("Alarms in every scenario.", columns, cells),
+        figure(
+            "Share of records in alarm over the severity of the damage: tested severities with 95 % bounds, and a "
+            "curve through them with its bounds. The label a90 marks the severity at which 90 % of the records raise "
+            "an alarm, a90/95 the one at which this is so with 95 % confidence.",
+            [draw_curve(found, found.curve) for found in findings if found.curve is not None],
+            "How the share of alarms grows with damage",
+        ),
+        figure(
+            "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
+            "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
+            "records of the damaged structure above."
+            + (f" {distance}" if isinstance(last_step(study.detector_), MahalanobisDetector) else ""),
+            _damage_indices(study, findings, scenarios),
+            "What the alarm system sees",
+        ),
+    ]
+    return section("found", "What would be found and what not", *(part for part in parts if part))
+
+
+def _beginning(study: Any) -> str:
+    """A sentence that says when the time to the first alarm begins."""
+    weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)].index
+    first = f", {_place(weather.min())}" if isinstance(weather, pd.DatetimeIndex) else ""
+    return (
+        " The time to the first alarm begins with the damage or, where that is there from the beginning or there is "
+        f"none, with the first record of the simulated weather{first}."
+    )
+
+
+def described(scenario: Any) -> str:
+    """What a scenario changes, in words."""
+    if scenario is None:
+        return ""
+    is_uncertain = hasattr(scenario, "draws")
+    damage = scenario.draws.mean().round(3) if is_uncertain else getattr(scenario, "damage", None) or {}
+    changes = [
+        f"{group}: {percent(abs(severity))} {'less' if severity > 0 else 'more'} stiffness"
+        for group, severity in damage.items()
+        if severity
+    ]
+    changes += [f"{name} times {factor:g}" for name, factor in (getattr(scenario, "parameters", None) or {}).items()]
+    changes += [f"added {what}" for what in ("stiffness", "mass") if getattr(scenario, what, None) is not None]
+    text = ", ".join(changes) or "nothing"
+    if is_uncertain:
+        text += ", known with uncertainty"
+    if scenario.onset is not None:
+        text += f", from {_place(scenario.onset)} on"
+    end = getattr(scenario, "end", None)
+    return text if end is None else f"{text}, growing until {_place(end)}"
+
+
+def _place(onset: Any) -> str:
+    return f"record {onset}" if isinstance(onset, int | np.integer) else f"{pd.Timestamp(onset):%Y-%m-%d %H:%M}"
+
+
+def _false_alarms(rows: pd.DataFrame) -> Html:
+    healthy = rows[rows["measure"] == "PFA"]
+    if not len(healthy):
+        return paragraphs("The healthy structure was not among the scenarios: how often alarms are false is not known.")
+    sentences = []
+    for _, row in healthy.iterrows():
+        name = "the healthy structure" if len(healthy) == 1 else f"the healthy structure in scenario {row['scenario']}"
+        if row["rate"]:
+            often = f"about one record in {round(1 / row['rate']):,}" if row["rate"] < 0.4 else "far too many"
+            text = f"Of the records of {name}, {share_text(row['rate'])} raise an alarm, {often}"
+        else:
+            text = f"No record of {name} raises an alarm"
+        sentences.append(f"{text} (bounds: {bounds_text(row['lowest'], row['highest'])}).")
+    return paragraphs(*sentences)
+
+
+def _missed(rows: pd.DataFrame) -> Html:
+    damaged = rows[rows["measure"] == "POD"]
+    missed = damaged[damaged["rate"] < LEVEL].sort_values("rate", kind="stable")
+    if not len(damaged):
+        return paragraphs("No damage was tested.")
+    if not len(missed):
+        return paragraphs("All damage that was tested is found reliably. Less damage than that was not tested.")
+    items = [f"{row['scenario']}: alarms in {share_text(row['rate'])} of the records" for _, row in missed.iterrows()]
+    intro = (
+        f"Of {counted(len(damaged), 'damaged state')} that were tested, {len(missed):,} would not be found reliably:"
+    )
+    rest = f"and {len(missed) - MOST_LISTED} more, which are in the table further below"
+    return joined([paragraphs(intro), bullets(items if len(items) <= MOST_LISTED else [*items[:MOST_LISTED], rest])])
+
+
+def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str, Any]) -> list[Html]:
+    """One drawing for each family, and for each scenario that belongs to none."""
+    if study.threshold_ is None:
+        return []
+    rows = study.results_[study.results_["source"] == SIMULATED]
+    healthy = rows.loc[rows["measure"] == "PFA", "scenario"].head(1).tolist()
+    shown = []
+    for found in findings:
+        severity = found.smallest if found.is_found else found.severities[-1]
+        shown += rows.loc[(rows["family"] == found.family) & (rows["severity"] == severity), "scenario"].tolist()
+    shown += rows.loc[(rows["measure"] == "POD") & rows["family"].isna(), "scenario"].tolist()
+    drawn = []
+    for name in shown[:MOST_LISTED]:
+        indices = {scenario: study.indices_[scenario, SIMULATED] for scenario in (*healthy, name)}
+        onset = scenarios[name].onset if name in scenarios else None
+        drawn.append(draw_damage_indices(study, indices, onset))
+    return drawn

@@ -1,0 +1,196 @@
+"""Drawings of a report, as SVG within the page."""
+
+import textwrap
+import warnings
+from collections.abc import Callable
+from functools import partial
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arrays import as_floats
+from skthermo._formatting import percent, share_text, significant
+from skthermo._optional import import_optional
+from skthermo.plotting import (
+    DamageIndexDisplay,
+    FrequencyTemperatureDisplay,
+    HistoryDisplay,
+    IdentifiedDamageDisplay,
+    PODCurveDisplay,
+    StructureDisplay,
+)
+from skthermo.reporting._findings import Finding
+from skthermo.reporting._html import Html, image
+from skthermo.studies import PODCurve
+
+WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
+MANY_POINTS = 1000
+"""Number of points of one line from which on it is drawn as pixels."""
+
+SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
+
+
+def draw(
+    make: Callable[[], Any], alt: str, title: str = "", *, height: float | None = HEIGHT, width: float = WIDTH
+) -> Html:
+    """A display as an image of fixed width, in matplotlib's own style and on white.
+
+    Width and height are in inches; without a height, the drawing keeps its proportions.
+    """
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    others = set(plt.get_fignums())
+    try:
+        with plt.style.context("default"), plt.rc_context(SETTINGS):
+            display = make()
+            own_width, own_height = display.figure_.get_size_inches()
+            display.figure_.set_size_inches(width, own_height / own_width * width if height is None else height)
+            if title:
+                display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
+            return image(_svg(display.figure_), alt)
+    finally:
+        for number in set(plt.get_fignums()) - others:
+            plt.close(number)
+
+
+def _fold_legend(figure: Any, place: str, n_columns: int) -> None:
+    """Put the legend of a figure into fewer columns, so that it fits a narrow drawing."""
+    for legend in list(figure.legends):
+        labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
+        legend.remove()
+        style = {"ncols": n_columns, "frameon": False, "fontsize": "medium" if n_columns == 2 else "small"}
+        figure.legend(legend.legend_handles, labels, loc=place, **style)
+
+
+def _svg(figure: Any) -> bytes:
+    """A figure as SVG: letters as shapes or, if the font lacks some, as text in fonts of the reader."""
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    parser = import_optional("matplotlib.mathtext", extra="plot").MathTextParser("path")
+    for text in figure.findobj(lambda artist: hasattr(artist, "set_parse_math")):
+        text.set_parse_math("$" in text.get_text() and _is_formula(text.get_text(), parser))
+    for line in figure.findobj(lambda artist: hasattr(artist, "get_xdata")):
+        line.set_rasterized(len(line.get_xdata()) > MANY_POINTS)
+    drawn = b""
+    for letters in ("path", "none"):
+        buffer = BytesIO()
+        with warnings.catch_warnings(record=True) as caught, plt.rc_context({"svg.fonttype": letters}):
+            warnings.simplefilter("always")
+            figure.savefig(buffer, format="svg", metadata={"Date": None})
+        drawn = buffer.getvalue()
+        if not any("missing from" in str(warning.message) for warning in caught):
+            break
+    return drawn
+
+
+def _is_formula(text: str, parser: Any) -> bool:
+    """Whether matplotlib can read a text with dollar signs."""
+    try:
+        parser.parse(text)
+    except ValueError:
+        return False
+    return True
+
+
+def draw_histories(F: pd.DataFrame) -> list[Html]:
+    """Measured frequencies over time, one drawing for each mode."""
+    drawn = []
+    for mode in range(F.shape[1]):
+        table = F.iloc[:, [mode]]
+        low, high = (significant(value, 4) for value in (table.iloc[:, 0].min(), table.iloc[:, 0].max()))
+        alt = f"Measured frequency {F.columns[mode]} over time: between {low} and {high} Hz."
+        drawn.append(draw(partial(HistoryDisplay.from_predictions, table), alt, height=2.2))
+    return drawn
+
+
+def draw_over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: pd.DataFrame) -> list[Html]:
+    """Measured and predicted frequencies over one temperature, one drawing for each mode."""
+    drawn = []
+    for mode in range(measured.shape[1]):
+        tables = temperature, measured.iloc[:, [mode]], predicted.iloc[:, [mode]]
+        alt = (
+            f"Frequency {measured.columns[mode]} over the temperature {temperature.name}, measured and predicted by "
+            "the model."
+        )
+        drawn.append(draw(partial(FrequencyTemperatureDisplay.from_predictions, *tables), alt))
+    return drawn
+
+
+def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
+    """Probability of detection of one family of scenarios."""
+    is_curve = bool(np.isfinite(fitted.slope))
+    rates = ", ".join(
+        f"{share_text(rate)} at {percent(abs(severity))}"
+        for severity, rate in zip(finding.severities, finding.rates, strict=True)
+    )
+    alt = f"Share of records in alarm over the severity of {finding.family}: {rates}."
+    title = finding.family if is_curve else f"{finding.family}: no curve can be fitted"
+
+    largest = np.abs(finding.severities).max()
+    marks = is_curve and max(abs(fitted.a90), abs(fitted.a90_95)) <= largest  # no extrapolation
+
+    def make() -> PODCurveDisplay:
+        display = PODCurveDisplay.from_predictions(fitted, label="fitted curve", marks=marks)
+        if not is_curve:
+            display.ax_.get_legend().remove()
+        return display
+
+    return draw(make, alt, title, height=3.2)
+
+
+def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
+    """Damage index of some scenarios over time, and the threshold of the alarm."""
+    threshold = study.threshold_
+    above = "; ".join(
+        f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
+        for name, index in shown.items()
+    )
+
+    def make() -> DamageIndexDisplay:
+        display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
+        _fold_legend(display.figure_, "outside upper center", n_columns=2)
+        return display
+
+    return draw(make, f"Damage index over time. {above}.", height=3.4)
+
+
+def draw_groups(structure: Any, families: list[str]) -> Html:
+    """Where the damage groups are."""
+    known = [family for family in families if family in structure.groups]
+    alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
+
+    def make() -> StructureDisplay:
+        display = StructureDisplay.from_structure(structure, groups=known)
+        _fold_legend(
+            display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=3
+        )
+        return display
+
+    return draw(make, alt, height=None, width=6.5)
+
+
+def draw_identified_damage(identified: Any) -> Html:
+    """Severities, shifts and similarity of the groups, one below the other."""
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    n_groups = len(identified.table)
+    heights = [1.2 + 0.45 * n_groups, 2.8, 3.4]
+
+    def make() -> IdentifiedDamageDisplay:
+        axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
+        return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
+
+    severities = ", ".join(
+        f"{group} {share_text(row['severity'])}" for group, row in identified.table.iterrows() if row["severity"] > 0
+    )
+    alt = (
+        f"Identified severities ({severities or 'none'}), measured and explained shifts, and similarity of the groups."
+    )
+    return draw(make, alt, height=sum(heights))
+
+
+def chosen_sensor(T: pd.DataFrame, F: pd.DataFrame) -> pd.Series:
+    """The temperature that goes most closely with the frequencies."""
+    X, y = as_floats(T), as_floats(F)
+    both = pd.DataFrame(np.hstack([X, y])).corr().to_numpy()[: X.shape[1], X.shape[1] :]
+    closeness = np.nan_to_num(np.abs(both)).mean(axis=1)
+    return T.iloc[:, int(closeness.argmax())]

@@ -1,0 +1,208 @@
+"""Sections of a report on what was monitored, and on how good the model is."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arrays import as_floats, spread_evenly
+from skthermo._formatting import counted, period_text, share_text, significant
+from skthermo._frames import column_names
+from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_histories, draw_over_temperature
+from skthermo.reporting._findings import REFERENCE, SIMULATED
+from skthermo.reporting._html import Html, bullets, element, figure, paragraphs, section, table
+
+MOST_PREDICTED = 1000
+"""Number of records that are drawn over temperature."""
+
+LARGE_OFFSET, LARGE_DEVIATION, MANY_OUTSIDE = 15.0, 0.5, 0.05
+"""Offset of a mode in percent, standard deviation of a stiffness, and share of records outside its range, above which
+they are doubtful."""
+
+
+def monitored(study: Any, structure: Any, families: list[str]) -> Html:
+    """Records, period, temperatures and modes, and where the damage groups are."""
+    T, F = training_tables(study.fem)
+    sensors = _sensors(T)
+    has_lags = len(sensors.columns) < len(T.columns)
+    when, step = period_text(F.index), _step(F.index)
+    weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)]
+    then = period_text(weather.index)
+    text = (
+        f"The model learned from {counted(len(F), 'record')}{f' {when}' if when else ''}"
+        f"{f', usually {step} apart' if step else ''}, with {counted(sensors.shape[1], 'temperature')}"
+        f"{', with lags,' if has_lags else ''} and "
+        f"{counted(F.shape[1], 'natural frequency', 'natural frequencies')} each."
+    )
+    simulated = f"The simulated weather has {counted(len(weather), 'record')}{f' {then}' if then else ''}."
+    parts = [
+        paragraphs(text, simulated, "A lag is the temperature of a sensor some time before." if has_lags else ""),
+        table("Temperatures.", ["Sensor", "Lowest", "Mean", "Highest", "Missing"], _ranges(sensors, "°C", 3)),
+        paragraphs(
+            "A mode is one shape in which the structure vibrates; each has its own natural frequency, in vibrations "
+            "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
+        ),
+        table("Natural frequencies.", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, "Hz", 4)),
+        figure("Measured natural frequencies over time.", draw_histories(F)),
+    ]
+    if structure is not None:
+        drawn = draw_groups(structure, families)
+        parts.append(figure("The structure, with the groups of members whose damage was studied in colour.", [drawn]))
+    return section("monitored", "What was monitored", *parts)
+
+
+def quality(study: Any) -> Html:
+    """Errors by mode, doubtful data, predicted and measured frequencies, and agreement with reference records."""
+    report = study.fem.report_
+    T, F = training_tables(study.fem)
+    errors = report.errors[["MAPE", "MAPE of the mean"]].to_numpy()
+    modes = [
+        [name, *(f"{significant(error)} %" for error in pair), f"{offset:+.1f} %"]
+        for (name, offset), pair in zip(report.offsets.items(), errors, strict=True)
+    ]
+    parameters = [
+        [
+            name,
+            share_text(deviation) if np.isfinite(deviation) else "not determined",
+            share_text(report.outside.iloc[i]),
+        ]
+        for i, (name, deviation) in enumerate(report.deviations.items())
+    ]
+    error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
+    measured, predicted, temperature = _over_temperature(study.fem, T, F)
+    sensor = temperature.name
+    parts = [
+        paragraphs(
+            f"The model predicts the frequencies of these records with a mean error of {error} %. Whoever ignored "
+            f"temperature and always expected the mean frequency would err by {mean} %. Errors are of records that the "
+            "model has learned from; those of new records are usually larger.",
+            f"Of {counted(report.n_rows, 'record')}, {report.n_trained:,} were complete enough to learn from.",
+        ),
+        table(
+            "Errors of the predicted frequencies, and how far the measured mean is from the model before it learned.",
+            ["Mode", "Mean error", "Error of the mean frequency", "Measured mean against the model"],
+            modes,
+        ),
+        figure(
+            f"Frequencies over the temperature {sensor}, which goes most closely with them: measured, and predicted by "
+            "the model.",
+            draw_over_temperature(temperature, measured, predicted),
+        ),
+        paragraphs(
+            "Temperature changes the stiffness of parts of the model. The next table says how accurately one record "
+            "determines each of these stiffnesses at best, and how many records gave a stiffness outside the range "
+            "that was thought possible."
+        ),
+        table(
+            "Stiffnesses that the model adjusts to temperature.",
+            ["Parameter", "Smallest possible standard deviation", "Records outside the range"],
+            parameters,
+        ),
+        element("h3", "What is doubtful"),
+        bullets(_doubts(report)) or paragraphs("Nothing is doubtful about the records, the modes or the stiffnesses."),
+        *_agreement(study.results_),
+    ]
+    return section("model", "How good the model is", *parts)
+
+
+def training_tables(fem: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Temperatures and frequencies that the chain learned from, as frames."""
+    T, F = fem.training_records_
+    index = next((table.index for table in (F, T) if isinstance(table, pd.DataFrame)), None)
+    names = column_names(T, "T"), column_names(F, "f")
+    first, second = (pd.DataFrame(as_floats(t), index, [str(n) for n in c]) for t, c in zip((T, F), names, strict=True))
+    return first, second
+
+
+def _doubts(report: Any) -> list[str]:
+    """Records, modes and parameters that are doubtful, in sentences."""
+    doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
+    doubts += [f"{message}." for kind, message in report.warnings() if kind != "worse than the mean"]
+    for mode, error in report.errors.iterrows():
+        if not error["MAPE"] < error["MAPE of the mean"]:
+            doubts.append(f"The model predicts mode {mode} no better than its mean frequency does.")
+    for mode, offset in report.offsets.items():
+        if abs(offset) > LARGE_OFFSET:
+            doubts.append(f"Mode {mode} is {offset:+.0f} % from the model before it learned; it may be another mode.")
+    for name, deviation in report.deviations.items():
+        if not deviation < LARGE_DEVIATION:
+            doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")
+        elif report.outside[name] > MANY_OUTSIDE:
+            share = share_text(report.outside[name])
+            doubts.append(
+                f"The stiffness {name} is outside the range that was thought possible in {share} of the records."
+            )
+    if report.n_unconverged:
+        doubts.append(f"The stiffnesses of {counted(report.n_unconverged, 'record')} could not be found exactly.")
+    return doubts
+
+
+def _sensors(T: pd.DataFrame) -> pd.DataFrame:
+    """One column for each sensor: lags, which `~skthermo.preprocessing.LagFeatures` calls sensor_lag1, are counted."""
+    columns: dict[str, list[tuple[int, str]]] = {}
+    for name in T.columns:
+        lagged = re.fullmatch(r"(.+)_lag(\d+)", name)
+        sensor, lag = (lagged[1], int(lagged[2])) if lagged else (name, -1)
+        columns.setdefault(sensor, []).append((lag, name))
+    shown = [min(found)[1] for found in columns.values()]
+    n_lags = [sum(lag > 0 for lag, _ in found) if len(found) > 1 else 0 for found in columns.values()]
+    whole = zip(columns, shown, n_lags, strict=True)
+    return T[shown].set_axis([f"{name}, with {counted(n, 'lag')}" if n else first for name, first, n in whole], axis=1)
+
+
+def _ranges(values: pd.DataFrame, unit: str, digits: int) -> list[list[str]]:
+    return [
+        [name, *(f"{significant(v, digits)} {unit}" for v in (c.min(), c.mean(), c.max())), share_text(c.isna().mean())]
+        for name, c in values.items()
+    ]
+
+
+def _step(index: pd.Index) -> str:
+    """Usual time between records."""
+    if not isinstance(index, pd.DatetimeIndex) or len(index) < 2:
+        return ""
+    hours = float(np.median(np.abs(np.diff(index.as_unit("ns").asi8)))) / 3.6e12
+    if hours >= 24:
+        return counted(round(hours / 24), "day")
+    return counted(round(hours), "hour") if hours >= 1 else counted(round(60 * hours), "minute")
+
+
+def _over_temperature(fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.Series]:
+    """Measured and predicted frequencies of some rows, evenly spread, and the temperature that they follow."""
+    rows = spread_evenly(np.arange(len(T)), MOST_PREDICTED)
+    theta = as_floats(fem.predict_parameters(fem.training_records_[0]))[rows]
+    frequencies = as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
+    measured = F.iloc[rows]
+    predicted = pd.DataFrame(frequencies, measured.index, measured.columns)
+    return measured, predicted, chosen_sensor(T, F).iloc[rows]
+
+
+def _agreement(results: pd.DataFrame) -> list[Html]:
+    """Rates of simulated and of reference records side by side."""
+    rates = results.pivot(index="scenario", columns="source", values="rate").reindex(results["scenario"].unique())
+    heading = element("h3", "Do the simulations agree with other records?")
+    if REFERENCE not in rates:
+        return [heading, paragraphs("No other records were given to compare the simulations with.")]
+    both = rates.dropna()
+    gaps = 100 * (both[SIMULATED] - both[REFERENCE])
+    cells = [
+        [name, share_text(row[SIMULATED]), share_text(row[REFERENCE]), f"{round(gap, 1) + 0.0:+.1f}"]
+        for (name, row), gap in zip(both.iterrows(), gaps, strict=True)
+    ]
+    mean, largest = significant(gaps.abs().mean()), significant(gaps.abs().max())
+    text = (
+        f"In {counted(len(both), 'scenario')}, the simulations were compared with reference records. Shares of records "
+        f"in alarm differ by {mean} percentage points on average, and by {largest} at most."
+    )
+    single = results[(results["source"] == REFERENCE) & (results["n_repeats"] == 1)].set_index("scenario")["rate"]
+    bands = results[results["source"] == SIMULATED].set_index("scenario").reindex(single.index)
+    if len(single):
+        inside = int(single.between(bands["band_lowest"], bands["band_highest"]).sum())
+        text += f" Of {counted(len(single), 'reference rate')}, {inside:,} lie where single simulated campaigns lie."
+    columns = ["Scenario", "Simulated", "Reference", "Difference in percentage points"]
+    return [
+        heading,
+        paragraphs(text),
+        table("Share of records in alarm: of simulated and of reference records.", columns, cells),
+    ]

@@ -1,0 +1,334 @@
+"""Probability of detection (POD) as a function of severity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import expit, log_expit, logit
+from scipy.stats import norm
+
+from skthermo._arrays import Array, real_array
+from skthermo._warnings import warn_user
+from skthermo.studies.detectability._intervals import clopper_pearson
+
+DOUBT = 0.01
+"""Probability with which rates drawn from the curve itself lie outside the bounds at any severity."""
+
+MISSED = 0.03
+"""Distance in POD beyond these bounds from which the curve is said to miss a severity."""
+
+
+MOST_NEWTON_STEPS = 100
+
+CONVERGED = 1e-10
+"""Newton's decrement, in units of log likelihood, at which the fit ends."""
+
+FLAT = 1e-6
+"""Increase of the logit over the tested severities up to which the curve counts as flat."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PODCurve:
+    """A fitted curve: logit POD = intercept + slope * severity, or its logarithm.
+
+    Parameters
+    ----------
+    severities, n_detected, n_records : ndarray of shape (n_severities,)
+        The data, in ascending order of the magnitude of the severity.
+    intercept, slope : float
+        NaN where the data determine no finite slope.
+    covariance : ndarray of shape (2, 2)
+        Of intercept and slope, from the expected information.
+    log : bool
+        Whether the curve is linear in the logarithm of the severity.
+    confidence : float
+        Of the bounds that `predict` gives.
+    bracket : tuple of float
+        Magnitudes of the highest tested severity with a POD below 0.9 (0 if there is none) and of the next one (NaN if
+        there is none).
+
+    Examples
+    --------
+    >>> from skthermo.studies import pod_curve
+    >>> curve = pod_curve([0.1, 0.2, 0.3], n_detected=[24, 94, 99], n_records=[100, 100, 100])
+    >>> print(f"a90 {curve.a90:.3f}, with 95 % confidence {curve.a90_95:.3f}")
+    a90 0.192, with 95 % confidence 0.209
+    """
+
+    severities: Array
+    n_detected: Array
+    n_records: Array
+    intercept: float
+    slope: float
+    covariance: Array
+    log: bool
+    confidence: float
+    bracket: tuple[float, float]
+
+    @property
+    def a50(self) -> float:
+        """Severity that is detected in half of the records."""
+        return self.severity_at(0.5)
+
+    @property
+    def a90(self) -> float:
+        """Severity that is detected in 90 % of the records."""
+        return self.severity_at(0.9)
+
+    @property
+    def a90_95(self) -> float:
+        """Severity at which the lower 95 % confidence bound of the POD reaches 0.9."""
+        return self.severity_at(0.9, confidence=0.95)
+
+    @property
+    def n_missed(self) -> int:
+        """Number of severities whose POD the curve misses by more than 3 percentage points beyond its bounds.
+
+        The bounds (Clopper-Pearson) hold the POD of all severities together with 99 % confidence.
+        """
+        if np.isnan(self.slope):
+            return 0
+        confidence = 1 - DOUBT / len(self.severities)
+        counts = zip(self.n_detected, self.n_records, strict=True)
+        lowest, highest = np.array([clopper_pearson(k, n, confidence) for k, n in counts]).T
+        pod = self.predict(self.severities)[0]
+        return int(((pod < lowest - MISSED) | (pod > highest + MISSED)).sum())
+
+    def predict(self, severity: ArrayLike) -> tuple[Any, Any, Any]:
+        """POD at some severities, with bounds.
+
+        Parameters
+        ----------
+        severity : float or array-like
+            Of the sign of the tested severities.
+
+        Returns
+        -------
+        pod : float or ndarray
+            Probability of detection.
+        lowest, highest : float or ndarray
+            Wald bounds on the scale of the logit; each holds the POD at one severity with the curve's confidence. NaN
+            where the data determine no finite slope.
+
+        Raises
+        ------
+        ValueError
+            If a severity is not a number of this sign.
+        """
+        places = places_of(self._magnitudes(severity), self.log)
+        centre = self.intercept + self.slope * places
+        deviation = np.sqrt(
+            self.covariance[0, 0] + places * (2 * self.covariance[0, 1] + places * self.covariance[1, 1])
+        )
+        margin = norm.ppf((1 + self.confidence) / 2) * deviation
+        return expit(centre), expit(centre - margin), expit(centre + margin)
+
+    def severity_at(self, pod: float, confidence: float | None = None) -> float:
+        """Severity at which the curve, or a confidence bound of it, reaches a POD.
+
+        Parameters
+        ----------
+        pod : float
+            Probability between 0 and 1.
+        confidence : float, optional
+            Of the one-sided lower Wald bound of the curve, so that 0.95 gives a severity that is sufficient with this
+            confidence, as a90/95 in MIL-HDBK-1823A; 0.05 gives one that is not. By default the curve itself.
+
+        Returns
+        -------
+        float
+            0 or infinite where the bound reaches it at no severity, because the slope is too uncertain; NaN where the
+            data determine no finite slope.
+
+        Raises
+        ------
+        ValueError
+            If a probability is not between 0 and 1.
+        """
+        z = norm.ppf(check_probability(0.5 if confidence is None else confidence, "confidence"))
+        offset = self.intercept - logit(check_probability(pod, "pod"))
+        if np.isnan(self.slope):
+            return float("nan")
+        # The bound reaches the level where (offset + slope x)^2 = z^2 (variance at x): a quadratic equation in x.
+        (v0, v01), (_, v1) = self.covariance * z**2
+        a, b, c = self.slope**2 - v1, self.slope * offset - v01, offset**2 - v0
+        if a <= 0:
+            magnitude = np.inf if z > 0 else 0.0
+        else:
+            place = (-b + np.sign(z) * np.sqrt(max(b**2 - a * c, 0.0))) / a
+            magnitude = np.exp(place) if self.log else max(place, 0.0)
+        return float(np.sign(self.severities[0]) * magnitude)
+
+    def _magnitudes(self, severity: ArrayLike) -> Array:
+        magnitudes = real_array(severity, "severity") * np.sign(self.severities[0])
+        if not (magnitudes >= 0).all():
+            raise ValueError(f"severity is {severity!r:.200}; expected the sign of those tested, {self.severities}")
+        return magnitudes
+
+    def __repr__(self) -> str:
+        return f"PODCurve(a50={self.a50:.3g}, a90={self.a90:.3g}, a90_95={self.a90_95:.3g}, log={self.log})"
+
+
+def pod_curve(
+    severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike, *, log: bool = False, confidence: float = 0.95
+) -> PODCurve:
+    """Fit the probability of detection over severity, by maximum likelihood.
+
+    Parameters
+    ----------
+    severities : array-like of shape (n_severities,)
+        All positive (damage) or all negative (strengthening).
+    n_detected : array-like of shape (n_severities,)
+        Records in alarm. Fractions are allowed, so that serially correlated records can count less.
+    n_records : array-like of shape (n_severities,)
+        Records judged; severities without any are ignored.
+    log : bool, default=False
+        Whether the logit of the POD is linear in the logarithm of the severity rather than in the severity.
+    confidence : float, default=0.95
+        Of the bounds of the curve.
+
+    Returns
+    -------
+    PODCurve
+        The curve, with a50, a90 and a90/95.
+
+    Raises
+    ------
+    ValueError
+        If counts are impossible, fewer than two severities have records, or the POD does not increase with severity.
+
+    Warns
+    -----
+    UserWarning
+        If the data determine no finite slope, because all records below one severity are missed and all above it
+        detected. ``bracket`` then holds the two severities between which a90 lies. If the curve lies clearly outside
+        the bounds of some severities (``n_missed``), so that a90 may be wrong.
+
+    Notes
+    -----
+    Hit/miss analysis of MIL-HDBK-1823A with the logit link. Records at one severity count as independent, and the curve
+    as logistic: confidence bounds hold neither serial correlation nor another shape of the curve.
+
+    References
+    ----------
+    MIL-HDBK-1823A, Nondestructive evaluation system reliability assessment, US Department of Defense, 2009 [MIL09]_.
+
+    Examples
+    --------
+    >>> from skthermo.studies import pod_curve
+    >>> curve = pod_curve([0.1, 0.2, 0.3, 0.4], [3, 12, 19, 20], [20, 20, 20, 20])
+    >>> print(f"{curve.a50:.2f} {curve.a90:.2f} {curve.a90_95:.2f}")
+    0.18 0.27 0.33
+    """
+    s, k, n = checked_counts(severities, n_detected, n_records)
+    check_probability(confidence, "confidence")
+    x, bracket = places_of(np.abs(s), log), bracket_of(s, k / n, 0.9)
+    coefficients, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
+    if not k.any() or not (n - k).any() or x[k < n].max() <= x[k > 0].min():
+        expected = "severities in between, with some misses and hits"
+        if not k.any():
+            expected = "some records in alarm: severities are small, or outliers of the baseline raise the threshold"
+        warn_user(
+            f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
+            f"unknown, and a90 lies {within(bracket)}; expected {expected}",
+            "separated severities",
+        )
+    else:
+        increases = x[k > 0].max() > x[k < n].min()
+        if increases:
+            coefficients, covariance = most_likely(x, k, n)
+        if not increases or coefficients[1] * np.ptp(x) < FLAT:
+            raise ValueError(
+                f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}, which does not increase; expected "
+                "one that increases with the magnitude of the severity"
+            )
+    curve = PODCurve(
+        s, k, n, float(coefficients[0]), float(coefficients[1]), covariance, log, float(confidence), bracket
+    )
+    if curve.n_missed:
+        warn_user(
+            f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
+            f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
+            "severities near a90 and fit those alone",
+            "curve beside its points",
+        )
+    return curve
+
+
+def check_probability(value: Any, what: str) -> float:
+    """A probability strictly between 0 and 1, or an error."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not 0 < float(value) < 1:
+        raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
+    return float(value)
+
+
+def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike) -> tuple[Array, Array, Array]:
+    """Severities with records, in ascending order of their magnitude, and their counts."""
+    names = ("severities", "n_detected", "n_records")
+    s, k, n = (real_array(v, name) for v, name in zip((severities, n_detected, n_records), names, strict=True))
+    if s.ndim != 1 or not s.shape == k.shape == n.shape:
+        raise ValueError(
+            f"severities, n_detected and n_records have shapes {s.shape}, {k.shape}, {n.shape}; expected "
+            "vectors of one length"
+        )
+    if not (np.isfinite(s).all() and ((s > 0).all() or (s < 0).all()) and (s < 1).all()):
+        raise ValueError(
+            f"severities are {s.tolist()}; expected shares of the stiffness, all above 0 and below 1, or all negative"
+        )
+    if not (np.isfinite(n).all() and (k >= 0).all() and (k <= n).all()):
+        raise ValueError(
+            f"n_detected is {k.tolist()} and n_records {n.tolist()}; expected 0 <= n_detected <= n_records"
+        )
+    order = np.argsort(np.abs(s), kind="stable")
+    s, k, n = (values[order][n[order] > 0] for values in (s, k, n))
+    if len(np.unique(s)) < 2:
+        raise ValueError(f"severities {np.unique(s).tolist()} have records; expected at least two severities")
+    return s, k, n
+
+
+def places_of(magnitudes: Array, log: bool) -> Array:
+    """Places on the axis along which the logit is linear: magnitudes of severities, or their logarithms."""
+    return np.log(magnitudes) if log else magnitudes
+
+
+def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, float]:
+    """Magnitudes of the highest severity with a POD below a level, and of the next one."""
+    magnitudes = np.abs(severities)
+    below = np.flatnonzero(pod < level)
+    if not below.size:
+        return 0.0, float(magnitudes[0])
+    above = magnitudes[magnitudes > magnitudes[below[-1]]]
+    return float(magnitudes[below[-1]]), float(above[0]) if above.size else float("nan")
+
+
+def within(bracket: tuple[float, float]) -> str:
+    """Text of a bracket, whose upper end may be unknown (NaN)."""
+    lowest, highest = bracket
+    return f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
+
+
+def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:
+    """Intercept and slope by Newton's method, and their covariance."""
+    centre, width = np.average(x, weights=n), np.ptp(x)
+    design = np.column_stack([np.ones_like(x), (x - centre) / width])
+
+    def log_likelihood(b: Array) -> float:
+        return float((k * log_expit(design @ b) + (n - k) * log_expit(-design @ b)).sum())
+
+    coefficients = np.zeros(2)
+    for _ in range(MOST_NEWTON_STEPS):
+        pod = expit(design @ coefficients)
+        information = (design.T * (n * pod * (1 - pod))) @ design
+        gradient = design.T @ (k - n * pod)
+        step, now = np.linalg.solve(information, gradient), log_likelihood(coefficients)
+        if gradient @ step < CONVERGED:
+            break
+        while log_likelihood(coefficients + step) < now:
+            step = step / 2
+        coefficients = coefficients + step
+    to_severities = np.array([[1.0, -centre / width], [0.0, 1 / width]])
+    return to_severities @ coefficients, to_severities @ np.linalg.inv(information) @ to_severities.T

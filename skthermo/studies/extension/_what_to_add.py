@@ -1,0 +1,294 @@
+"""Which further measurement would make smaller damage detectable."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike
+from scipy.stats import t as student
+from sklearn.base import clone
+
+from skthermo._arguments import check_noise
+from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
+from skthermo._frames import check_same_rows, column_names
+from skthermo._threads import single_blas_thread
+from skthermo._warnings import warn_user
+from skthermo._warnings_once import warnings_once, without_warnings
+from skthermo.fem import linearise
+from skthermo.studies.detectability import Arrangement, DetectabilityStudy
+from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name
+from skthermo.studies.scenarios import Scenario
+
+SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)
+"""Severities at which a family is simulated, in units of its present a90."""
+
+HIGHEST_SEVERITY = 0.95
+N_MODES = 3
+CONFIDENCE = 0.95
+
+DOUBTFUL_RATIO = 2.0
+"""Error of a mode predicted from one record, relative to that of the measured modes, above which its gain is doubtful.
+"""
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Candidates that are compared with the present arrangement in the same simulated campaigns."""
+
+    simulator: CampaignSimulator
+    present: Arrangement
+    candidates: dict[tuple[str, str], Arrangement]
+
+    def repeats(self, seeds: Any, n_jobs: int | None) -> dict[tuple[str, str], list[dict[str, tuple[float, float]]]]:
+        """For each candidate and repeat, the smallest detectable severity of each family now and then."""
+        with single_blas_thread():
+            clean = self.simulator.clean()
+        with without_warnings():
+            found = list(Parallel(n_jobs=n_jobs)(delayed(self._repeat)(clean, int(seed)) for seed in seeds))
+        return {candidate: [repeat[candidate] for repeat in found] for candidate in self.candidates}
+
+    def _repeat(self, clean: Any, seed: int) -> dict[tuple[str, str], dict[str, tuple[float, float]]]:
+        with without_warnings(), single_blas_thread():
+            baseline, tables = self.simulator.draw(clean, seed)
+            now = self.present.smallest(baseline, tables)
+            then = {key: arrangement.smallest(baseline, tables) for key, arrangement in self.candidates.items()}
+        return {candidate: {family: (now[family], mdd[family]) for family in now} for candidate, mdd in then.items()}
+
+
+def what_to_add(
+    study: DetectabilityStudy,
+    T: ArrayLike,
+    *,
+    modes: Sequence[int] | None = None,
+    noise: ArrayLike | None = None,
+    baseline_factors: Sequence[float] = (2.0,),
+    sensors: pd.DataFrame | None = None,
+) -> pd.DataFrame:
+    """Compare further modes, longer baselines and further temperature sensors by the damage that they make detectable.
+
+    Parameters
+    ----------
+    study : DetectabilityStudy
+        That has been run; its chain, detector, families of scenarios, noise and seed are used.
+    T : array-like or DataFrame of shape (n_records, n_sensors)
+        Temperatures in degrees Celsius of the new records.
+    modes : sequence of int, optional
+        Ranks of modes of the model (the lowest is 0) that could be measured, too, one of them at a time. By default
+        the next three above the measured ones, if the model has a method ``with_modes``.
+    noise : float or array-like of shape (n_modes,), optional
+        Relative standard deviation of the frequencies of these modes. By default the median of the measured ones.
+    baseline_factors : sequence of float, default=(2.0,)
+        How many times as many healthy records the detector could learn from.
+    sensors : DataFrame of shape (n_training_records, n_candidates), optional
+        Further temperatures for the records that the chain was fitted on. The chain is fitted again with each.
+
+    Returns
+    -------
+    DataFrame
+        One row for each candidate and family of scenarios, the largest gain first:
+
+        - ``candidate``, such as "mode 7" (counted from 1), "baseline x 2" or the sensor's name; ``kind``: "mode",
+          "baseline" or "sensor"; ``family``;
+        - ``mdd_now``, ``mdd_then``: minimum detectable damage, the magnitude of the severity with a probability of
+          detection of 0.9 on the curve, without and with the candidate: means over the repeats, infinite where
+          damage is not found;
+        - ``gain``: their difference; ``lowest``, ``highest``: bounds that hold, with a probability of 95 %, the gain
+          of one baseline and one new period.
+
+    Raises
+    ------
+    ValueError
+        If the study has not been run or has no family of two severities, a mode is measured already or does not
+        exist, a factor is not above 1, or sensors do not have the rows of the training records or would not be seen.
+
+    Warns
+    -----
+    UserWarning
+        Once for each kind of doubt about the simulations, such as weather outside the training range; if a mode depends
+        on parameters that the measured modes hardly determine, so that the chain does not know how it moves; if damage
+        of a family is not found.
+
+    Notes
+    -----
+    Every repeat simulates a baseline in the weather that the chain was fitted on, and new records in the weather T, at
+    13 severities around the present a90 of each family, as far as a family is the damage of one group. The detector is
+    fitted anew without and with each candidate, to the same noise (common random numbers). The bounds hold the scatter
+    of the noise in the repeats, but no error of the model: a gain in a mode that the model gets wrong is wrong, too. On
+    the truss they hold 85 to 88 % of the gains in true records, without the mode of which a warning says that it is
+    doubtful, and 94 % of the one that is recommended (``noise="fitted"``).
+
+    A sensor is compared in the training weather, in which alone its values are known, and the chain that was fitted
+    with it is taken for the truth. It matters to detectors that see temperatures.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector
+    >>> from skthermo.studies import DetectabilityStudy, sweep, what_to_add
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> scenarios = sweep(fem, (0.1, 0.2, 0.3), groups=["top"])
+    >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
+    >>> results = study.run(weather)
+    >>> table = what_to_add(study, weather, modes=[6, 8])
+    >>> table["candidate"][0]
+    'mode 9'
+    >>> bool(table["lowest"][0] < table["gain"][0] < table["mdd_now"][0])
+    True
+    """
+    changes, fem, present = changes_by_severity(study), study.fem, study.arrangement_
+    factors = [float(real_array(factor, "baseline_factors")) for factor in baseline_factors]
+    if not all(1 < factor < np.inf for factor in factors):
+        raise ValueError(f"baseline_factors are {list(baseline_factors)}; expected numbers above 1, such as 2")
+    ranks = _further_modes(fem.model, modes)
+    scatter = _scatter(study) if noise is None else noise
+    candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
+    candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
+    longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
+    simulator = CampaignSimulator(fem, T, changes, study.noise, longest, ranks, check_noise(scatter, len(ranks)))
+    seeds = as_random_state(study.random_state).randint(
+        LARGEST_SEED, size=positive_integer(study.n_repeats, "n_repeats")
+    )
+    rows: list[dict[str, Any]] = []
+    with warnings_once("in the simulations of this study"):
+        if ranks:
+            _warn_of_unknown_modes(fem, ranks)
+        trials = [Trials(simulator, present, candidates)] if candidates else []
+        trials += _with_sensors(study, present, changes, sensors)
+        for trial in trials:
+            for (kind, name), found in trial.repeats(seeds, study.n_jobs).items():
+                rows += [
+                    _row(name, kind, family, np.array([repeat[family] for repeat in found])) for family in found[0]
+                ]
+    if not rows:
+        raise ValueError("there is no candidate; expected modes, baseline_factors or sensors")
+    unfound = list(dict.fromkeys(row["family"] for row in rows if np.isnan(row["gain"])))
+    if unfound:
+        warn_user(
+            f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
+            "the study; expected a study with larger severities",
+            "families that are not found",
+        )
+    return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
+
+
+def changes_by_severity(study: DetectabilityStudy) -> ChangesBySeverity:
+    """Changes of the structure by family and severity: around the present a90 where a family is damage of one group."""
+    with without_warnings():
+        minimum = study.minimum_detectable_damage(method="curve")
+    changes: dict[tuple[str, float], Any] = {}
+    for family in dict.fromkeys(name for name, _ in minimum.index):
+        members = [s for s in study.scenarios if isinstance(s, Scenario) and s.family == family]
+        tested = np.array([member.severity for member in members], dtype=float)
+        groups = {group for member in members for group in member.damage or {}}
+        if len(groups) == 1 and all(list(member.changes(None)) == ["damage"] for member in members):
+            (group,) = groups
+            centre = minimum.loc[(family, "data-informed")]
+            found = centre["mdd"] if np.isfinite(centre["mdd"]) else np.abs(centre[["lowest", "highest"]]).mean()
+            found = found if np.isfinite(found) else np.abs(tested).max()
+            severities = np.sign(tested[0]) * np.minimum(np.abs(found) * SEVERITY_FACTORS, HIGHEST_SEVERITY)
+            changes |= {(family, float(s)): {"damage": {group: float(s)}} for s in severities}
+        else:
+            changes |= {(family, float(s)): member.changes(None) for s, member in zip(tested, members, strict=True)}
+    return changes
+
+
+def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
+    """Ranks of modes that are not measured yet."""
+    if not hasattr(model, "with_modes"):
+        if modes is None:
+            return []
+        raise ValueError(f"{model!r} has no method 'with_modes'; expected a model with one, such as AffineModel")
+    measured = model.mode_ranks
+    if modes is None:
+        return list(range(max(measured) + 1, min(max(measured) + 1 + N_MODES, model.n_available)))
+    again = [mode for mode in modes if mode in measured]
+    if again:
+        raise ValueError(f"modes {again} are measured already; expected others than {list(measured)}")
+    return [int(mode) for mode in modes]
+
+
+def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
+    """Warn of modes whose frequencies the parameters of the chain predict badly."""
+    theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+    measured, further = (
+        linearise(model, theta, relative=True)[1][0] for model in (fem.model, fem.model.with_modes(ranks))
+    )
+    for rank, slope in zip(ranks, further, strict=True):
+        weights = slope @ np.linalg.pinv(measured)
+        ratio = np.linalg.norm(weights) if np.allclose(weights @ measured, slope, atol=1e-6) else np.inf
+        if ratio > DOUBTFUL_RATIO:
+            warn_user(
+                f"{mode_name(rank)} depends on parameters that the measured modes hardly determine: predicted from one "
+                f"record, its frequency scatters {ratio:.1f} times as much as theirs, and its gain is doubtful",
+                f"unknown {mode_name(rank)}",
+            )
+
+
+def _scatter(study: DetectabilityStudy) -> float:
+    """Median relative scatter of the measured modes."""
+    if isinstance(study.noise, str):
+        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals_.values**2, axis=0))))
+    return float(np.median(check_noise(study.noise, len(study.fem.mode_names_))))
+
+
+def _with_sensors(
+    study: DetectabilityStudy, present: Arrangement, changes: ChangesBySeverity, sensors: pd.DataFrame | None
+) -> list[Trials]:
+    """Trials for each further sensor, simulated by a chain that was fitted with it."""
+    if sensors is None:
+        return []
+    T, F = study.fem.training_records_
+    if not isinstance(sensors, pd.DataFrame) or not sensors.shape[1]:
+        raise ValueError(f"sensors is {sensors!r:.200}; expected a frame with a column for each candidate")
+    if not set(column_names(T, "T")) & set(present.columns):
+        raise ValueError(
+            "the detector sees no temperatures, so that no sensor changes what it detects; expected sensors=None, or a "
+            "detector that sees them, such as a pipeline with TemperatureCompensator"
+        )
+    check_same_rows(T, sensors, ("the temperatures of the training", "sensors"))
+    trials = []
+    for name in sensors.columns:
+        beside = _beside(T, name, as_floats(sensors[name]))
+        fem = clone(study.fem).fit(beside, F)
+        seen = name if isinstance(T, pd.DataFrame) else f"T{T.shape[1] + 1}"
+        simulator = CampaignSimulator(fem, beside, changes, study.noise, present.n_baseline)
+        trials.append(Trials(simulator, present, {("sensor", str(name)): present.with_sensor(seen)}))
+    return trials
+
+
+def _beside(T: Any, name: Hashable, values: Array) -> Any:
+    if isinstance(T, pd.DataFrame):
+        if name in T.columns:
+            raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")
+        beside = T.copy()
+        beside[name] = values
+        return beside
+    return np.column_stack([T, values])
+
+
+def _row(name: str, kind: str, family: str, mdd: Array) -> dict[str, Any]:
+    """Means over the repeats, and bounds for one more of them; mdd has shape (n_repeats, 2), now and then."""
+    finite = mdd[np.isfinite(mdd).all(axis=1)]
+    gains = finite[:, 0] - finite[:, 1] if len(finite) else np.array([np.nan])
+    margin = np.inf
+    if len(gains) > 1:
+        quantile = student.ppf((1 + CONFIDENCE) / 2, len(gains) - 1)
+        margin = quantile * gains.std(ddof=1) * np.sqrt(1 + 1 / len(gains))
+    now, then = finite.mean(axis=0) if len(finite) else mdd.mean(axis=0)
+    return {
+        "candidate": name,
+        "kind": kind,
+        "family": family,
+        "mdd_now": now,
+        "mdd_then": then,
+        "gain": gains.mean(),
+        "lowest": gains.mean() - margin,
+        "highest": gains.mean() + margin,
+    }

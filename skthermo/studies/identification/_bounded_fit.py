@@ -1,0 +1,137 @@
+"""Bounded least squares for severities: fits, their errors, and tests."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+from scipy.optimize import brentq, nnls
+
+from skthermo._arrays import Array
+
+HIGHEST_SEVERITY = 0.95
+"""Upper bound of fitted severities."""
+
+MOST_STEPS = 12
+"""Largest number of Gauss-Newton steps."""
+
+TOLERANCE = 1e-6
+"""Change of the severities in one step below which the fit has converged."""
+
+Effects = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class BoundedFit:
+    """Severities between 0 and 0.95 that fit a shift best, and the sum of squares of the whitened differences.
+
+    ``slopes`` (n_observed, n_groups) are whitened derivatives at the fit, and ``target`` (n_observed,) the whitened
+    shift that they would explain in a linear fit; ``explained`` is the shift by the severities, not whitened.
+    """
+
+    severities: Array
+    misfit: float
+    slopes: Array
+    target: Array
+    explained: Array
+    converged: bool
+
+
+def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: int) -> BoundedFit:
+    """Gauss-Newton steps, each a non-negative least-squares fit."""
+    severities, converged = np.zeros(n_groups), False
+    for _ in range(MOST_STEPS):
+        change, slopes = effects(severities)
+        target = whitening @ (shift - change + slopes @ severities)
+        found = solve(whitening @ slopes, target)
+        converged = bool(np.abs(found - severities).max(initial=0.0) < TOLERANCE)
+        if converged:
+            break
+        severities = found
+    change, slopes = effects(severities)
+    residual = whitening @ (shift - change)
+    whitened = whitening @ slopes
+    return BoundedFit(
+        severities, float(residual @ residual), whitened, residual + whitened @ severities, change, converged
+    )
+
+
+def solve(slopes: Array, target: Array) -> Array:
+    """Non-negative severities of a linear least-squares fit, with a zero-mean, unit-variance prior on each."""
+    n_groups = slopes.shape[1]
+    if n_groups == 0:
+        return np.zeros(0)  # SciPy's nnls crashes without columns
+    found = nnls(np.vstack([slopes, np.eye(n_groups)]), np.concatenate([target, np.zeros(n_groups)]))[0]
+    return np.minimum(found, HIGHEST_SEVERITY)
+
+
+def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.RandomState) -> Array:
+    """Severities fitted to whitened shifts with redrawn errors, (n_draws, n_groups)."""
+    errors = random.standard_normal((n_draws, len(around)))
+    return np.array([solve(slopes, around + error) for error in errors]).reshape(n_draws, slopes.shape[1])
+
+
+def standard_errors(fit: BoundedFit, n_draws: int, random: np.random.RandomState) -> tuple[Array, Array]:
+    """Standard errors of the bounded estimates, and their covariance, from fits to redrawn shifts.
+
+    Where another group's severity could be traded for this one, the scatter of the fits understates the error. A
+    standard error is therefore at least half of the increase at which the refitted misfit exceeds the best by 4.
+    """
+    errors = redrawn(fit.slopes, fit.slopes @ fit.severities, n_draws, random) - fit.severities
+    covariance = errors.T @ errors / n_draws
+    least = _misfit(fit.slopes, fit.target)
+    highest = [likely_range(fit.slopes, fit.target, *found, least)[1] for found in enumerate(fit.severities)]
+    return np.maximum(np.sqrt(np.diag(covariance)), (np.array(highest) - fit.severities) / 2), covariance
+
+
+def error_beside(slopes: Array, severities: Array, column: int) -> float:
+    """Half of the largest change of a severity, up or down, within its `likely_range`."""
+    found = float(severities[column])
+    lowest, highest = likely_range(slopes, slopes @ severities, column, found)
+    return max(found - lowest, highest - found) / 2
+
+
+def likely_range(slopes: Array, target: Array, column: int, found: float, least: float = 0.0) -> tuple[float, float]:
+    """Range of a severity in which the misfit, with the other severities refitted, exceeds ``least`` by at most 4."""
+    others = np.delete(slopes, column, axis=1)
+
+    def excess(severity: float) -> float:
+        return _misfit(others, target - severity * slopes[:, column]) - least - 4.0
+
+    def end(bound: float) -> float:
+        return float(brentq(excess, found, bound, xtol=1e-6)) if excess(bound) > 0 > excess(found) else bound
+
+    return end(0.0), end(HIGHEST_SEVERITY)
+
+
+def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:
+    """Probability that damage explains as much of a healthy structure's shift as of this one."""
+    gained = fit.target @ fit.target - _misfit(fit.slopes, fit.target)
+    scale = np.sqrt(n_periods / random.chisquare(n_periods, size=n_draws))
+    targets = random.standard_normal((n_draws, len(fit.target))) * scale[:, np.newaxis]
+    healthy = np.array([target @ target - _misfit(fit.slopes, target) for target in targets])
+    return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
+
+
+def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int, column: int, nominal: Array) -> float:
+    """One-sided p-value (Student's t) of the misfit that an undamaged group would remove from a fit by chance.
+
+    What the other groups could imitate at the nominal state does not count.
+    """
+    others = np.delete(nominal, column, axis=1)
+    gained = min(without.misfit - fit.misfit, _misfit(others, nominal @ fit.severities))
+    return float(stats.t.sf(np.sqrt(max(gained, 0.0)), n_periods))
+
+
+def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:
+    """p-value of Hotelling's test that only these groups changed; NaN without degrees of freedom."""
+    freedom = len(fit.target) - np.count_nonzero(fit.severities)
+    rest = n_periods - freedom + 1
+    if freedom < 1 or rest < 1:
+        return float("nan")
+    return float(stats.f.sf(fit.misfit * rest / (n_periods * freedom), freedom, rest))
+
+
+def _misfit(slopes: Array, target: Array) -> float:
+    residual = target - slopes @ solve(slopes, target)
+    return float(residual @ residual)

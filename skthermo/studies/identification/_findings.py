@@ -1,0 +1,109 @@
+"""The result of an identification: tables and tests from fits."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from skthermo.studies.identification._bounded_fit import (
+    BoundedFit,
+    error_beside,
+    p_of_damage,
+    p_of_group,
+    p_of_misfit,
+    redrawn,
+    standard_errors,
+)
+from skthermo.studies.identification._comparison import Comparison
+from skthermo.studies.identification._identified import IdentifiedDamage
+from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
+from skthermo.studies.identification._shift import Shift
+
+N_DRAWS = 500
+"""Number of fits to redrawn shifts, for standard errors and p-values."""
+
+
+def findings(
+    comparison: Comparison,
+    nominal: Comparison,
+    shift: Shift,
+    unseen: list[str],
+    significance: float,
+    random: np.random.RandomState,
+) -> IdentifiedDamage:
+    """Fit the groups together and one by one, and test what is found.
+
+    The comparisons are with the effects of the groups in the weather of the records and at the model's nominal state.
+    """
+    fit, names, at_nominal = comparison.fit(), list(comparison.names), nominal.slopes()
+    confused = list(dict.fromkeys(confused_groups(at_nominal) + confused_groups(fit.slopes)))
+    draws = redrawn(fit.slopes, fit.target, N_DRAWS, random)
+    errors, covariance = standard_errors(fit, N_DRAWS, random)
+    for column in {column for group in confused for column in group}:
+        errors[column] = max(errors[column], error_beside(at_nominal, fit.severities, column))
+    p_values = [
+        p_of_group(fit, without, shift.n_periods, column, at_nominal)
+        for column, without in enumerate(_fits_without(comparison, fit))
+    ]
+    table = pd.DataFrame(
+        {
+            "severity": fit.severities,
+            "standard_error": errors,
+            "error_alone": errors_alone(fit.slopes),
+            "p_value": p_values,
+            "significant": np.array(p_values) < significance / len(names),
+        },
+        index=names,
+    )
+    return IdentifiedDamage(
+        table=table,
+        shifts=_shift_table(shift, fit),
+        single=_single_fits(comparison, shift),
+        similarity=pd.DataFrame(cosines(at_nominal), names, names),
+        covariance=pd.DataFrame(covariance, names, names),
+        draws=pd.DataFrame(comparison.members(draws), columns=list(comparison.of_model)),
+        confused=[tuple(names[column] for column in group) for group in confused],
+        unseen=unseen,
+        members=comparison.contents,
+        p_value=p_of_damage(fit, shift.n_periods, N_DRAWS, random),
+        misfit=fit.misfit,
+        misfit_p_value=p_of_misfit(fit, shift.n_periods),
+        significance=significance,
+        converged=fit.converged,
+    )
+
+
+def _shift_table(shift: Shift, fit: BoundedFit) -> pd.DataFrame:
+    known = np.flatnonzero(~np.isnan(shift.mean))
+    explained = np.full(len(shift.mean), np.nan)
+    explained[known] = fit.explained[: len(known)]
+    return pd.DataFrame(
+        {
+            "measured": np.expm1(shift.mean),
+            "explained": np.expm1(explained),
+            "standard_error": np.where(np.isnan(shift.mean), np.nan, np.sqrt(np.diag(shift.covariance))),
+            "n_records": shift.n_records,
+        },
+        index=list(shift.modes),
+    )
+
+
+def _fits_without(comparison: Comparison, fit: BoundedFit) -> Iterator[BoundedFit]:
+    """The best fit without each group, in which the other severities may be quite different."""
+    for column, severity in enumerate(fit.severities):
+        others = [[other] for other in range(len(fit.severities)) if other != column]
+        yield comparison.of(others).fit() if severity > 0 else fit
+
+
+def _single_fits(comparison: Comparison, shift: Shift) -> pd.DataFrame:
+    """Each group's own best fit, the best first."""
+    fits = [comparison.of([[column]]).fit() for column in range(len(comparison.names))]
+    return pd.DataFrame(
+        {
+            "severity": [fit.severities[0] for fit in fits],
+            "standard_error": [errors_alone(fit.slopes)[0] for fit in fits],
+            "misfit": [fit.misfit for fit in fits],
+            "misfit_p_value": [p_of_misfit(fit, shift.n_periods) for fit in fits],
+        },
+        index=list(comparison.names),
+    ).sort_values("misfit", kind="stable")

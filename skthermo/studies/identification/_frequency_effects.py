@@ -1,0 +1,105 @@
+"""Effects of damage on the frequencies, averaged over the weather of some records."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from skthermo._arrays import Array, as_floats, spread_evenly
+
+MOST_ROWS, MOST_SLOW_ROWS = 100, 24
+"""Number of records over which effects are averaged; fewer for models that are slow to solve."""
+
+STEP = 1e-3
+"""Step of differences in severity, for models without damage parameters, and in ln frequency."""
+
+LEVELS = (0.3, 0.6, 1.0)
+"""Highest severities for which reduced models are made, each when it is needed."""
+
+
+@dataclass(frozen=True)
+class FrequencyEffects:
+    """Mean change of the logarithms of the measured frequencies that severities cause.
+
+    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes). Simulators with
+    damage parameters are kept by the highest severity that their reduced model covers.
+    """
+
+    fem: Any
+    theta: Array
+    weights: Array
+    groups: Sequence[str]
+    healthy: Array
+    simulators: dict[float, Any] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, fem: Any, theta: Array, F: Array, groups: Sequence[str]) -> "FrequencyEffects":
+        """Effects at the parameters of some records; a mode's mean is over those records that have it."""
+        is_slow = fem.simulator_.reduced is None and getattr(fem.model, "prefer", "processes") == "processes"
+        present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
+        rows = np.flatnonzero(present.any(axis=1))
+        most = MOST_SLOW_ROWS if is_slow else MOST_ROWS
+        rows = spread_evenly(rows, most)
+        healthy = np.log(healthy_frequencies(fem, theta[rows]))
+        weights = np.where(np.isnan(healthy), 0.0, present[rows])
+        weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
+        return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), groups, healthy)
+
+    def nominal(self) -> "FrequencyEffects":
+        """The same effects at the model's nominal state.
+
+        Parameters that the records do not determine may have drifted, so that a symmetric structure is no longer
+        symmetric and mirrored groups would seem to differ.
+        """
+        theta = np.ones((1, self.theta.shape[1]))
+        healthy = np.log(healthy_frequencies(self.fem, theta))
+        return FrequencyEffects(self.fem, theta, np.ones_like(healthy), self.groups, healthy)
+
+    def __call__(self, severities: Array) -> tuple[Array, Array]:
+        """Change of each mode, (n_modes,), and its derivatives by the severities, (n_modes, n_groups)."""
+        exact = hasattr(self.fem.model, "with_damage_parameters")
+        frequencies, slopes = (self._linearised if exact else self._differenced)(severities)
+        measured, elasticity = self._measured(frequencies)
+        change = self._mean(np.log(measured) - self.healthy)
+        relative = (elasticity / frequencies)[:, :, np.newaxis] * slopes
+        return change, np.stack([self._mean(column) for column in np.moveaxis(relative, 2, 0)], axis=1)
+
+    def _linearised(self, severities: Array) -> tuple[Array, Array]:
+        """Frequencies and their exact derivatives by the severities."""
+        level = next(level for level in LEVELS if severities.max() <= level)
+        if level not in self.simulators:
+            self.simulators[level] = self.fem.simulator_.with_damage_parameters(self.groups, 0.0, level)
+        simulator = self.simulators[level]
+        theta = np.hstack([self.theta, np.tile(1 - severities, (len(self.theta), 1))])
+        frequencies, jacobian = simulator.linearise(theta, self.fem.n_jobs)
+        return frequencies, -jacobian[:, :, -len(self.groups) :]
+
+    def _differenced(self, severities: Array) -> tuple[Array, Array]:
+        return self._damaged(severities), central_differences(self._damaged, severities)
+
+    def _damaged(self, severities: Array) -> Array:
+        damage = dict(zip(self.groups, severities.tolist(), strict=True))
+        return self.fem.simulator_.damaged(damage).frequencies(self.theta, self.fem.n_jobs, warn=False)
+
+    def _measured(self, frequencies: Array) -> tuple[Array, Array]:
+        """Frequencies in the measured domain, and their relative change per relative change of the model's."""
+        lower, middle, higher = (
+            as_floats(self.fem.aligner_.inverse_transform(frequencies * (1 + step))) for step in (-STEP, 0, STEP)
+        )
+        return middle, (higher - lower) / (2 * STEP * middle)
+
+    def _mean(self, values: Array) -> Array:
+        known = np.where(np.isnan(values), 0.0, self.weights)
+        return (known * np.nan_to_num(values)).sum(axis=0) / np.maximum(known.sum(axis=0), np.finfo(float).tiny)
+
+
+def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
+    """Frequencies of the undamaged structure in the measured domain, in Hz, (n_rows, n_modes)."""
+    return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=warn)))
+
+
+def central_differences(function: Callable[[Array], Array], severities: Array) -> Array:
+    """Derivatives of a function by each severity, along a new last axis."""
+    steps = STEP * np.eye(len(severities))
+    return np.stack([(function(severities + h) - function(severities - h)) / (2 * STEP) for h in steps], axis=-1)

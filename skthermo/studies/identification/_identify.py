@@ -1,0 +1,235 @@
+"""Which damage explains a shift of frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, as_floats, as_random_state
+from skthermo._frames import check_same_rows
+from skthermo._validation import check_array
+from skthermo._warnings import warn_each, warn_user
+from skthermo._warnings_once import warnings_once
+from skthermo.studies.identification._comparison import Comparison, Part, remembered
+from skthermo.studies.identification._findings import findings
+from skthermo.studies.identification._frequency_effects import FrequencyEffects
+from skthermo.studies.identification._identified import IdentifiedDamage
+from skthermo.studies.identification._separability import VISIBLE, errors_alone, merge_confused
+from skthermo.studies.identification._shape_effects import ShapeEffects
+from skthermo.studies.identification._shift import measured_shift
+from skthermo.studies.scenarios import check_chain
+
+
+def identify_damage(
+    fem: Any,
+    T: ArrayLike,
+    F: ArrayLike,
+    groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+    *,
+    noise: ArrayLike | Literal["fitted"] = "fitted",
+    merge: bool = False,
+    shapes: tuple[ArrayLike, ArrayLike] | None = None,
+    dofs: ArrayLike | None = None,
+    shape_noise: ArrayLike = 0.01,
+    significance: float = 0.05,
+    random_state: int | np.random.RandomState | None = None,
+) -> IdentifiedDamage:
+    """Severities of damage groups that explain how measured frequencies have shifted.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted to healthy records; its model can be damaged.
+    T : array-like or DataFrame of shape (n_samples, n_sensors)
+        Temperatures of the records to explain, in degrees Celsius.
+    F : array-like or DataFrame of shape (n_samples, n_modes)
+        Their frequencies in Hz; NaN is allowed. Records should be of one state, so that their mean says what changed.
+    groups : sequence of str, or mapping of str to sequence of str, optional
+        Damage groups of the model; a mapping joins several under a new name, with one severity. By default all groups
+        of the model, without those that other groups make up.
+    noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
+        Where the error of the mean shift comes from: contiguous periods of the training records, each judged by the
+        others, so that serial correlation counts; or independent records with a relative standard deviation.
+    merge : bool, default=False
+        Whether groups that cannot be told apart get one severity together.
+    shapes : (array-like, array-like), optional
+        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
+        complex ones are turned to be real, and NaN stands for what was not measured.
+    dofs : array-like of shape (n_dofs,), optional
+        Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
+    shape_noise : float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of a component of a measured shape, relative to the shape's largest component.
+    significance : float, default=0.05
+        Probability with which any group of a healthy structure is called damaged.
+    random_state : int, RandomState or None, default=None
+        Seed of the draws behind standard errors and p-values.
+
+    Returns
+    -------
+    IdentifiedDamage
+        Severities and errors, explained shifts, groups that cannot be told apart, and the draws that
+        ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
+
+    Raises
+    ------
+    ValueError
+        If fem is not a fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group
+        can be seen, or the model cannot be damaged.
+
+    Warns
+    -----
+    UserWarning
+        Once for each kind: if the weather is unlike that of the training records, temperatures have other names than in
+        fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
+        the shifts.
+
+    Notes
+    -----
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
+    similar weather. Its covariance comes from periods of the training records, each of the new records' length if
+    there are enough of them, judged by the other periods, and counts how many training records have weather like
+    that of the new ones. Severities follow from non-negative least squares in standard errors of the shifts,
+    repeated with exact derivatives on the damaged model until they no longer change. Their standard errors are
+    those of the bounded estimate, from fits to redrawn shifts, and not below half of what a severity can grow by
+    until the fit is worse by two standard errors, however the other groups adapt. A group is significant if the
+    best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the groups). What
+    groups have in common is judged at the model's nominal state, too, because a chain may have drifted out of the
+    symmetry of its structure; the standard error of a group in such a set covers what the others could take from
+    it.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.studies import identify_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"diagonal": 0.1}, random_state=1)
+    >>> found = identify_damage(fem, later.temperatures, later.frequencies, ["top", "diagonal"], random_state=0)
+    >>> found.severities.round(2).to_dict()
+    {'top': 0.0, 'diagonal': 0.1}
+    """
+    check_chain(fem)
+    if not 0 < significance < 1:
+        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    if shapes is None and dofs is not None:
+        raise ValueError("dofs came without shapes; expected both or neither")
+    frequencies, members = _read_frequencies(fem, T, F), read_groups(fem.model, groups)
+    labels = list(members)
+    of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
+    T = _named_as_in_fit(fem, T)
+    with warnings_once():
+        theta = as_floats(fem.predict_parameters(T))
+        shift = measured_shift(fem, T, theta, frequencies, noise)
+    if not shift.n_records.any():
+        raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
+    incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
+
+    def compared(effects: FrequencyEffects) -> Comparison:
+        parts = [Part(remembered(effects), shift.mean, shift.covariance)]
+        if shapes is not None:
+            parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
+        return Comparison(parts, incidence, labels, of_model)
+
+    effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
+    every, nominal = compared(effects), compared(effects.nominal())
+    alone = errors_alone(every.slopes())
+    seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
+    if not seen:
+        errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
+        raise ValueError(
+            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
+            f"{errors}. More records or other modes would lower them"
+        )
+    joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
+    unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
+    random = as_random_state(random_state)
+    found = findings(every.of(joined), nominal.of(joined), shift, unseen, significance, random)
+    warn_each(found.warnings())
+    return found
+
+
+def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
+    """The frequencies as an array, after checks."""
+    check_same_rows(T, F, ("temperatures", "frequencies"))
+    names = getattr(F, "columns", None)
+    if names is not None and list(names) != fem.mode_names_:
+        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
+    frequencies = as_floats(check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+    if frequencies.shape[1] != len(fem.mode_names_):
+        raise ValueError(
+            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
+        )
+    if (frequencies <= 0).any():
+        row = np.flatnonzero((frequencies <= 0).any(axis=1))[0]
+        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
+    return frequencies
+
+
+def _of_shapes(
+    fem: Any, theta: Array, groups: Sequence[str], shapes: Any, dofs: ArrayLike | None, noise: ArrayLike
+) -> Part:
+    """Measured changes of mode shapes, and the effects of the groups on them."""
+    if dofs is None:
+        raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
+    effects = ShapeEffects.of(fem, theta, groups, dofs)
+    change, deviations = effects.measured(shapes, noise)
+    return Part(remembered(effects), change, np.diag(deviations**2))
+
+
+def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
+    """Groups of the model by name; several of them where they are joined."""
+    if not hasattr(model, "damaged") or not hasattr(model, "groups"):
+        raise ValueError(f"{model!r} has no damage groups; expected a model that can be damaged, such as AffineModel")
+    known = model.groups
+    if groups is None:
+        members = {name: [name] for name in _not_made_of_others(known)}
+    elif isinstance(groups, Mapping):
+        members = {str(name): [joined] if isinstance(joined, str) else list(joined) for name, joined in groups.items()}
+    else:
+        members = {name: [name] for name in ([groups] if isinstance(groups, str) else groups)}
+    asked = [name for joined in members.values() for name in joined]
+    unknown = [name for name in asked if name not in known]
+    if unknown:
+        raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(known)}")
+    if not asked or not all(members.values()):
+        raise ValueError(f"groups is {groups!r}; expected one or more of {sorted(known)}")
+    return members
+
+
+def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
+    """Groups without those whose terms are all in smaller groups."""
+    terms = {name: set(positions) for name, positions in known.items()}
+    kept = []
+    for name, own in terms.items():
+        smaller = [other for other in terms.values() if other < own]
+        if not smaller or set().union(*smaller) != own:
+            kept.append(name)
+    return kept
+
+
+def _named_as_in_fit(fem: Any, T: Any) -> Any:
+    """Temperatures with column names where the chain was fitted with names, without where it was not.
+
+    One warning says what was assumed, in place of one from every part of the chain.
+    """
+    names, columns = getattr(fem, "feature_names_in_", None), list(getattr(T, "columns", ()))
+    is_named = any(isinstance(name, str) for name in columns)
+    if is_named == (names is not None) or np.shape(T)[1:] != (fem.n_features_in_,):
+        return T
+    if names is None:
+        warn_user(
+            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
+            "columns are taken in the order that they have",
+            "names of temperatures",
+        )
+        return T.set_axis(range(len(columns)), axis=1)
+    warn_user(
+        f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
+        "names of temperatures",
+    )
+    return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)

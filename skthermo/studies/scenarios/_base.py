@@ -1,0 +1,110 @@
+"""The base of all scenarios, and checks of what a study is given."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import real_array
+from skthermo._validation import check_is_fitted
+
+
+class BaseScenario(ABC):
+    """A name, what is changed from the onset on, and the place in a family of scenarios that differ in severity only.
+
+    The severity is NaN where there is no single one, and the onset None where the change is there from the beginning.
+    The repeats of a study take ``n_draws`` different states in turn.
+    """
+
+    name: str
+    family: str | None
+    severity: float | None
+    onset: Any = None
+    n_draws: int = 1
+
+    @property
+    @abstractmethod
+    def groups(self) -> tuple[str, ...]:
+        """Damage groups that are changed."""
+
+    @property
+    def is_healthy(self) -> bool:
+        """Whether nothing is changed, so that alarms are false."""
+        return not self.groups
+
+    def changes(self, T: Any, repeat: int = 0) -> dict[str, Any]:
+        """Arguments of `~skthermo.surrogate.DataInformedFEM.simulate` that change the structure as in this scenario.
+
+        Parameters
+        ----------
+        T : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures of the records to be simulated.
+        repeat : int, default=0
+            Number of the repeat of a study.
+
+        Returns
+        -------
+        dict
+            Severities may be arrays with one value for each row of T.
+
+        Raises
+        ------
+        ValueError
+            If damage begins at no record of T.
+        """
+        return self._changes(T, repeat)
+
+    @abstractmethod
+    def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
+        """Hook: the arguments that differ from those of the healthy structure."""
+
+
+def check_chain(fem: Any) -> None:
+    """Raise an error for what is not a fitted chain."""
+    if not hasattr(fem, "simulate"):
+        raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
+    check_is_fitted(fem)
+
+
+def check_groups(groups: Sequence[str], known: Any) -> None:
+    """Raise an error for damage groups that the model does not have."""
+    unknown = [group for group in groups if group not in known]
+    if unknown:
+        raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
+
+
+def check_name(name: Any) -> None:
+    """Raise an error if a scenario's name is not a text."""
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
+
+
+def severities_of(damage: Any, name: str) -> dict[str, float]:
+    """Severity by group as floats."""
+    if not isinstance(damage, Mapping):
+        raise ValueError(f"damage of scenario {name!r} is {damage!r:.200}; expected {{group: severity}}")
+    for group, severity in damage.items():
+        if np.ndim(severity):
+            raise ValueError(
+                f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}; expected one number, or "
+                "ProgressiveDamage for damage that grows"
+            )
+        check_severities(severity, group, name)
+    return {group: float(severity) for group, severity in damage.items()}
+
+
+def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
+    """Raise an error for severities that no structure can have."""
+    values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
+    if not (np.isfinite(values) & (values < 1)).all():
+        raise ValueError(
+            f"scenario {name!r} has severities of {group!r} up to {np.max(values):g}; expected finite shares of the "
+            "stiffness below 1, not percent"
+        )
+
+
+def only_group(damage: Mapping[str, float]) -> tuple[str | None, float]:
+    """The damage group and its severity if there is only one, else None and NaN."""
+    return next(iter(damage.items())) if len(damage) == 1 else (None, np.nan)

@@ -1,0 +1,755 @@
+"""The whole chain: temperatures and frequencies in, a thermal FE model out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any, Literal, TypeAlias, overload
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+
+from skthermo._arguments import check_noise
+from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
+from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._regressors import weights_for
+from skthermo._saved_frames import SavesFrames
+from skthermo._times import row_times
+from skthermo._validation import (
+    HasMethods,
+    Interval,
+    StrOptions,
+    _fit_context,
+    check_array,
+    check_is_fitted,
+    clone_sharing_models,
+    validate_data,
+)
+from skthermo._warnings import warn_each, warn_user
+from skthermo._weather import TrainingRange
+from skthermo.fem import FEModel
+from skthermo.metrics import complete_r2
+from skthermo.surrogate._box import Box
+from skthermo.surrogate._simulator import Simulator, tolerance
+from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
+from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
+from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, read_records, surrogates_in
+from skthermo.surrogate.chain._residuals import WeatherResiduals
+from skthermo.surrogate.chain._training_records import TrainingRecords
+
+LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
+POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
+Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
+
+
+class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
+    """FE model whose parameters depend on temperature as learned from monitoring data.
+
+    The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
+    temperatures to those parameters (eq. (6)), and the FE model, healthy or damaged, turns the parameters back into
+    frequencies (eqs. (7)-(8)).
+
+    Parameters
+    ----------
+    model : FE model
+        Its modes are the columns of the frequencies.
+    inverse : transformer, optional
+        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets
+        this one.
+    mapper : regressor, optional
+        M2. By default ``TemperatureMapper()``; with thermal inertia, for example
+        ``make_pipeline(LagFeatures(), TemperatureMapper())``.
+    aligner : transformer or "passthrough", default="passthrough"
+        Maps measured frequencies onto the model's and back, such as ``BiasAligner(model)``.
+    imputer : transformer or "passthrough", default="passthrough"
+        Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only.
+        Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
+        there; without refining, they do not train M2.
+    reduce : bool or float, default=False
+        Whether predictions and simulations use the reduced model ``model.reduced``, which makes large models much
+        faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
+        either side. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Rows
+        outside the box are solved by the model itself, with a warning that counts them.
+    n_jobs : int, optional
+        Number of parallel jobs when the model is solved for many rows.
+    random_state : int, RandomState or None, default=None
+        Seed of every part that has no seed of its own.
+
+    Attributes
+    ----------
+    inverse_, mapper_, aligner_ : estimators
+        Fitted clones.
+    imputer_ : estimator or None
+        Fitted clone.
+    parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
+        Multipliers that M1 found in the training data, eq. (5).
+    records_ : TrainingRecords
+        The training records, what M2 learned from them, and its residuals.
+    report_ : FitReport
+        Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
+    training_range_ : TrainingRange
+        Lowest and highest value of each input of M2, lags included.
+    box_ : Box or None
+        Bounds of the inverse.
+    simulator_ : Simulator
+        The model and, with ``reduce``, its reduced model.
+    parameter_names_, mode_names_ : list of str
+        Columns of the parameters and of the frequencies.
+    n_features_in_ : int
+        Number of temperature columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    Notes
+    -----
+    ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T)))``
+    and nothing else: no correction is learned on top of the FE model. Where the inverse refines, a `TemperatureMapper`
+    learns parameters in coordinates in which their errors count as those of frequencies do, free of the shrinkage that
+    the inverse's prior causes, and rows with missing modes count less: by their posterior precision, if ``fit`` of the
+    mapper takes ``sample_weight``. If temperatures are a frame, results are frames.
+    A row that cannot be computed is NaN; no row is dropped.
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.metrics import mape
+    >>> from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+    >>> year = make_truss_campaign(random_state=0)
+    >>> model = make_truss()
+    >>> fem = DataInformedFEM(model, inverse=InverseSurrogate(noise=0.01), random_state=0)
+    >>> fem = fem.fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"bottom": 0.5}, random_state=1)
+    >>> damaged = fem.simulate(later.temperatures, damage={"bottom": 0.5})
+    >>> bool(mape(later.clean_frequencies, damaged).max() < 1.5)
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"])],
+        "inverse": [HasMethods(["fit", "transform"]), None],
+        "mapper": [HasMethods(["fit", "predict"]), None],
+        "aligner": [HasMethods(["fit", "transform", "inverse_transform"]), StrOptions({"passthrough"})],
+        "imputer": [HasMethods(["fit_transform"]), StrOptions({"passthrough"})],
+        "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
+        "n_jobs": [Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        model: FEModel,
+        *,
+        inverse: BaseEstimator | None = None,
+        mapper: BaseEstimator | None = None,
+        aligner: BaseEstimator | str = "passthrough",
+        imputer: BaseEstimator | str = "passthrough",
+        reduce: bool | float = False,
+        n_jobs: int | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.model = model
+        self.inverse = inverse
+        self.mapper = mapper
+        self.aligner = aligner
+        self.imputer = imputer
+        self.reduce = reduce
+        self.n_jobs = n_jobs
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None) -> DataInformedFEM:
+        """Learn how temperature moves the parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius; NaN is allowed.
+        y : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies of the healthy structure in Hz; NaN is allowed.
+        shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
+            Measured mode shapes, real or complex, of any scale, sign and phase, NaN where a mode is missing; for an
+            inverse with ``dofs``, whose order the sensors have.
+
+        Returns
+        -------
+        DataInformedFEM
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If lengths or indices differ, the number of modes is not the model's, a temperature
+            is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
+            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``.
+
+        Warns
+        -----
+        UserWarning
+            One warning, with counts, for each kind of doubtful data in ``report_``: few rows, rows left out, modes that
+            are far from the model's or look swapped, parameters far outside the bounds of the inverse.
+        """
+        T, F = read_records(self, X, y)
+        tolerance(self.model, self.reduce)
+        self.mode_names_ = column_names(F, "f")
+        self.parameter_names_ = list(self.model.parameter_names)
+        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
+        inverse = next(surrogates_in(self.inverse_), None)
+        self.box_ = None if inverse is None else Box.of(inverse.bounds, self.parameter_names_)
+        if shapes is None and shape_inputs_of(self.inverse_) is not None:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes)")
+        warn_each(mode_warnings(self.model, F))
+        estimates = self._fit_inverse(T, F, shapes)
+        self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
+        targets = estimates.targets(self.inverse_, self.mapper_)
+        weights = weights_for(self.mapper_, estimates.weights)
+        self.mapper_.fit(T, frame_like(T, targets, self.parameter_names_), **weights)
+        inputs = inputs_of_last_step(self.mapper_, T)
+        self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, estimates.weights)
+        self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
+        learned = possible(self.mapper_.predict(T))[0]
+        self.simulator_ = Simulator.around(self.model, learned, self.reduce)
+        self.report_ = report_of(self, estimates, learned)
+        warn_each(self.report_.warnings())
+        return self
+
+    @overload
+    def estimate_parameters(self, F: pd.DataFrame, shapes: ArrayLike | None = None) -> pd.DataFrame: ...
+    @overload
+    def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> NDArray[np.float64]: ...
+    def estimate_parameters(self, F: ArrayLike, shapes: ArrayLike | None = None) -> Table:
+        """Parameters behind measured frequencies, equation (5).
+
+        Parameters
+        ----------
+        F : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz; NaN is allowed.
+        shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
+            Measured mode shapes, as in `fit`. Without them, an inverse with ``dofs`` that refines estimates parameters
+            from frequencies alone.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters; NaN in rows without any mode and, without refining, where one is
+            missing.
+
+        Raises
+        ------
+        ValueError
+            If the number or the names of the modes differ from `fit`, or a frequency is not positive.
+        """
+        check_is_fitted(self)
+        measured = frame_like(F, check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+        inputs = with_shapes(self.inverse_, self.aligner_.transform(measured), shapes)
+        theta = as_floats(self.inverse_.transform(inputs))
+        return frame_like(F, theta, self.parameter_names_)
+
+    @overload
+    def predict_parameters(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def predict_parameters(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def predict_parameters(self, X: ArrayLike) -> Table:
+        """Parameters at given temperatures, equation (7).
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters; NaN where an input of M2 is missing, and, with a warning, where M2
+            gives a physically impossible multiplier (less than 1e-6 or more than 1e6).
+        """
+        return frame_like(X, self._predict_theta(X), self.parameter_names_)
+
+    @overload
+    def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
+    @overload
+    def predict(self, X: pd.DataFrame, return_std: Literal[True]) -> tuple[pd.DataFrame, pd.DataFrame]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> NDArray[np.float64]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    @overload
+    def predict(self, X: ArrayLike, return_std: bool) -> Any: ...
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Table | tuple[Table, Table]:
+        """Frequencies of the healthy structure at given temperatures.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        return_std : bool, default=False
+            Whether to return standard deviations too.
+
+        Returns
+        -------
+        frequencies : ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain.
+        std : ndarray or DataFrame of shape (n_samples, n_modes)
+            Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
+            weather, out of fold, in Hz. They contain the scatter of the measurement.
+        """
+        frequencies = self._simulate(X)
+        predicted = frame_like(X, frequencies, self.mode_names_)
+        if not return_std:
+            return predicted
+        spread = self.residuals_.spread(self._weather(X))
+        return predicted, frame_like(X, frequencies * spread, self.mode_names_)
+
+    @overload
+    def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
+    @overload
+    def predict_interval(self, X: ArrayLike, confidence: float = 0.9) -> tuple[Array, Array]: ...
+    def predict_interval(self, X: ArrayLike, confidence: float = 0.9) -> tuple[Any, Any]:
+        """Intervals that hold the measured frequencies with a given probability, mode by mode.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        confidence : float, default=0.9
+            Probability, between 0 and 1.
+
+        Returns
+        -------
+        lowest : ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain; 0 if there are too few training records for the confidence.
+        highest : ndarray or DataFrame of shape (n_samples, n_modes)
+            Likewise; infinite if there are too few.
+
+        Raises
+        ------
+        ValueError
+            If the confidence is not between 0 and 1.
+
+        Notes
+        -----
+        Split-conformal intervals: the training records are divided into five periods of time, and each is predicted by
+        a mapper fitted on the others. The width is a multiple of the spread of these residuals in similar weather, so
+        that it grows, for example, in frost; the multiple is the order statistic that the periods themselves needed.
+        If new records are exchangeable with the training records, the interval holds a mode with about the probability
+        asked. Records of one structure are not: they are serially correlated, so that the share of a short period that
+        is held varies much more than that of independent records, and weather beyond the training range has no
+        residuals to learn from: there the interval is widened by the distance (see `applicability`).
+
+        References
+        ----------
+        Lei, G'Sell, Rinaldo, Tibshirani & Wasserman, Distribution-free predictive inference for regression, Journal of
+        the American Statistical Association 113 (2018) 1094-1111 [LGR18]_.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> lowest, highest = fem.predict_interval(later.temperatures)
+        >>> held = (later.frequencies > lowest) & (later.frequencies < highest)
+        >>> bool(0.85 < held.to_numpy().mean() < 0.95)
+        True
+        """
+        check_is_fitted(self)
+        if not isinstance(confidence, Real) or isinstance(confidence, bool) or not 0 < confidence < 1:
+            raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
+        frequencies = self._simulate(X)
+        margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
+        bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
+        lowest, highest = (frame_like(X, bound, self.mode_names_) for bound in bounds)
+        return lowest, highest
+
+    @overload
+    def simulate(
+        self,
+        X: pd.DataFrame,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> pd.DataFrame: ...
+    @overload
+    def simulate(
+        self,
+        X: ArrayLike,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Array: ...
+    def simulate(
+        self,
+        X: ArrayLike,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+        noise: ArrayLike | Literal["fitted"] = 0.0,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Array | pd.DataFrame:
+        """Frequencies of the structure, healthy or damaged, as monitoring would record them, equation (8).
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        damage : mapping of str to float or array-like of shape (n_samples,), optional
+            Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %. A vector gives each row
+            its own severity, for damage that grows.
+        parameters : mapping of str to float, optional
+            Factor by parameter of the model, which multiplies the values that belong to the temperatures.
+        stiffness : matrix of shape (n_dof, n_dof), optional
+            Stiffness added to the model's in N/m, as by a retrofit.
+        mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+            Mass added to the model's in kg; a vector holds lumped masses.
+        noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
+            Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
+            residuals of a whole training record of similar weather: their scatter out of fold, around the mean that
+            the fit leaves in such weather. So modes scatter together, scatter more in frost, and are missing as in the
+            training records. Runs of consecutive records are drawn if residuals are serially correlated; rows of X
+            should then be in order of time.
+        random_state : int, RandomState or None, default=None
+            Seed of the noise.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz, in the measured domain.
+
+        Raises
+        ------
+        ValueError
+            If a damage group or a parameter is unknown, a severity is 1 or more, a factor is not positive, or the
+            model cannot be changed in this way.
+
+        Warns
+        -----
+        UserWarning
+            If a factor is above 10, which may be meant in percent.
+
+        References
+        ----------
+        Politis & Romano, The stationary bootstrap, Journal of the American Statistical Association 89 (1994) 1303-1313
+        [PR94]_, for runs of consecutive residuals.
+        """
+        check_is_fitted(self)
+        frequencies = self._simulate(X, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
+        frequencies *= 1 + self.draw_noise(X, noise, random_state=random_state)
+        return frame_like(X, frequencies, self.mode_names_)
+
+    def draw_noise(
+        self,
+        X: ArrayLike,
+        noise: ArrayLike | Literal["fitted"] = "fitted",
+        *,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Array:
+        """Relative noise, as `simulate` puts it on the frequencies.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
+            As in `simulate`.
+        random_state : int, RandomState or None, default=None
+            Seed of the noise.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes)
+            What is added to 1 and multiplied with the frequencies; NaN where a drawn record lacks a mode.
+
+        Raises
+        ------
+        ValueError
+            If the noise is neither "fitted" nor relative standard deviations.
+        """
+        check_is_fitted(self)
+        random = as_random_state(random_state)
+        if isinstance(noise, str):
+            if noise != "fitted":
+                raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
+            weather, order = self._weather(X), np.argsort(row_times(X), kind="stable")
+            return self.residuals_.draw(weather[order], random)[np.argsort(order)]
+        shape = (np.shape(X)[0], len(self.mode_names_))
+        return check_noise(noise, shape[1]) * random.standard_normal(shape)
+
+    def simulate_modes(
+        self,
+        X: ArrayLike,
+        modes: Sequence[int],
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of other modes than the measured ones, without noise and as the model gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        modes : sequence of int
+            Ranks of modes of the healthy nominal model, the lowest being 0.
+        damage : mapping of str to float or array-like of shape (n_samples,), optional
+            As in `simulate`.
+        parameters : mapping of str to float, optional
+            As in `simulate`.
+        stiffness : matrix of shape (n_dof, n_dof), optional
+            As in `simulate`.
+        mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+            As in `simulate`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_chosen)
+            In Hz, in the numerical domain: no aligner knows how these modes differ from measured ones.
+
+        Raises
+        ------
+        ValueError
+            As in `simulate`; if the model has no such modes.
+        """
+        check_is_fitted(self)
+        changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        return self._simulate(X, modes, **changes)
+
+    @overload
+    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[False] = False) -> pd.DataFrame: ...
+    @overload
+    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[True]) -> tuple[pd.DataFrame, Array]: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[False] = False) -> Array: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[True]) -> tuple[Array, Array]: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: bool) -> Any: ...
+    def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
+        """Mean relative residual of the training records in weather like that of each row.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        return_number : bool, default=False
+            Whether to return how many training records the mean over all rows stands on.
+
+        Returns
+        -------
+        expected : ndarray or DataFrame of shape (n_samples, n_modes)
+            Measured frequency over the prediction, minus 1: what the chain leaves unexplained in such weather. NaN
+            where an input of M2 is missing.
+        number : ndarray of shape (n_modes,)
+            Only with ``return_number``: effective sample size of the mean of ``expected`` over the rows, lower than the
+            number of training records if the rows have little variety of weather.
+        """
+        weather = self._weather(X)
+        expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
+        return (expected, self.residuals_.n_expected(weather)) if return_number else expected
+
+    @property
+    def training_records_(self) -> tuple[Any, Any]:
+        """Temperatures and frequencies that `fit` was given."""
+        check_is_fitted(self)
+        return self.records_.temperatures, self.records_.frequencies
+
+    @property
+    def residuals_(self) -> WeatherResiduals:
+        """Out-of-fold residuals of the training records by weather, computed on first use."""
+        check_is_fitted(self)
+        if self.records_.residuals is None:
+            self.records_.residuals = self.records_.out_of_fold(self.mapper_, self._frequencies)
+        return self.records_.residuals
+
+    def applicability(self, X: ArrayLike) -> pd.DataFrame:
+        """How far inputs and parameters are outside the training range, row by row.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        DataFrame
+            With X's index. One column for each input of M2, lags included: its distance outside the range of the
+            training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
+            parameter is outside the bounds of the inverse.
+        """
+        T = self._temperatures(X)
+        inputs = inputs_of_last_step(self.mapper_, T)
+        excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
+        excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
+        theta = as_columns(self.mapper_.predict(T))
+        outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
+        return excess.assign(outside_bounds=outside)
+
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over modes.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        y : array-like or DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
+            `~skthermo.metrics.frequency_scorer` always reports their share.
+        """
+        check_is_fitted(self)
+        check_same_rows(X, y, ("temperatures", "frequencies"))
+        if np.ndim(y) != 2 or np.shape(y)[1] != len(self.mode_names_):
+            raise ValueError(
+                f"frequencies have shape {np.shape(y)}; expected a column for each of {self.mode_names_}, as in fit"
+            )
+        predicted = self.predict(X)
+        scored = int((~np.isnan(as_floats(y) + as_floats(predicted)).any(axis=1)).sum())
+        if 2 * scored < len(predicted):
+            warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
+        return complete_r2(y, predicted)
+
+    def __sklearn_clone__(self) -> DataInformedFEM:
+        return clone_sharing_models(self)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        tags.target_tags.multi_output = True
+        tags.target_tags.single_output = False
+        return tags
+
+    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Estimates:
+        """Fill gaps, fit aligner and M1; what they find for the training records."""
+        if self.imputer_ is not None:
+            values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
+            F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
+        aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
+        self.inverse_.fit(aligned)
+        if shapes is not None:
+            warn_each(shape_warnings(self.inverse_, aligned))
+        return Estimates.of(self.inverse_, aligned, self.parameter_names_)
+
+    def _temperatures(self, X: ArrayLike) -> Any:
+        """Temperatures, checked; a frame stays a frame."""
+        check_is_fitted(self)
+        return frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+
+    def _weather(self, X: ArrayLike) -> Array:
+        """Inputs of M2."""
+        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)))
+
+    def _predict_theta(self, X: ArrayLike) -> Array:
+        """Parameters at given temperatures, with warnings about weather and parameters that are unlike the training."""
+        T = self._temperatures(X)
+        message = self.training_range_.warning(inputs_of_last_step(self.mapper_, T))
+        if message:
+            warn_user(message, "weather outside the training range")
+        theta, impossible = possible(self.mapper_.predict(T))
+        if impossible.any():
+            row = np.flatnonzero(impossible)[0]
+            warn_user(
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                "impossible parameters",
+            )
+        return theta
+
+    def _frequencies(self, theta: Array) -> Array:
+        """Frequencies of the healthy structure in the measured domain, without warnings."""
+        frequencies = self.simulator_.frequencies(possible(theta)[0], self.n_jobs, warn=False)
+        return as_floats(self.aligner_.inverse_transform(frequencies))
+
+    def _simulate(
+        self,
+        X: ArrayLike,
+        modes: Sequence[int] | None = None,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        check_is_fitted(self)
+        simulator = self.simulator_ if modes is None else self.simulator_.changed("with_modes", modes)
+        if stiffness is not None or mass is not None:
+            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
+        theta = self._predict_theta(X) * factors_of(parameters, self.parameter_names_)
+        fixed, growing = split_damage(damage, X)
+        simulator = simulator.damaged(fixed)
+        if growing:
+            severities = np.column_stack(list(growing.values()))
+            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+            theta = np.hstack([theta, 1 - severities])
+        frequencies = simulator.frequencies(theta, self.n_jobs)
+        return frequencies if modes is not None else as_floats(self.aligner_.inverse_transform(frequencies))
+
+
+def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
+    theta = as_columns(theta).copy()
+    impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+    theta[impossible] = np.nan
+    return theta, impossible
+
+
+def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
+    """The factor of every parameter, 1 where none is given."""
+    factors = dict.fromkeys(names, 1.0)
+    for name, factor in (parameters or {}).items():
+        if name not in factors:
+            raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
+        if not isinstance(factor, Real) or not 0 < factor < np.inf:
+            raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
+        if factor > LARGE_FACTOR:
+            warn_user(
+                f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
+                "and not percent",
+                "large factor",
+            )
+        factors[name] = float(factor)
+    return np.array(list(factors.values()))
+
+
+def split_damage(
+    damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
+) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    """Severities that are the same in all rows, and those with a value for each row."""
+    if damage is not None and not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    fixed: dict[str, Any] = {}
+    growing: dict[str, NDArray[np.float64]] = {}
+    n_rows = np.shape(X)[0]
+    for group, severity in (damage or {}).items():
+        if np.ndim(severity) == 0:
+            fixed[group] = severity
+            continue
+        values = real_array(severity, f"damage of group {group!r}")
+        if values.shape != (n_rows,) or not (values < 1).all() or not np.isfinite(values).all():
+            raise ValueError(
+                f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
+                f"expected one severity or {n_rows}, one for each row, finite and below 1"
+            )
+        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
+        growing[group] = values
+    return fixed, growing

@@ -1,0 +1,183 @@
+"""Parameters behind the training records, and what M2 learns of them."""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.multioutput import MultiOutputRegressor
+
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import column_names, frame_like
+from skthermo._pipelines import last_step
+from skthermo._warnings import warn_user
+from skthermo.fem import linearise, shape_components
+from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._standardiser import FrequencyCoordinates
+from skthermo.surrogate.chain._parts import inputs_of_last_step, surrogates_in
+from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.surrogate.refinement import ShapeInputs, unconverged
+
+ROWS_PER_EFFECTIVE_ROW = 10  # training rows per effective row of a prediction: mappers have tens of degrees of freedom
+LARGEST_STEP = 5.0  # largest step of ln theta that takes the prior's shrinkage out
+NOT_NOISE = 0.1  # relative residual of a frequency from which it is that of a wrong model or a wrong record
+SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
+FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
+UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What M1 finds for each training record: parameters and, where it refines, how well they are known.
+
+    ``residuals``, (n_samples, n_modes), are ln f measured minus ln f of the model; ``weights`` the posterior precision
+    as a share of that of a record with all modes.
+    """
+
+    theta: Array
+    residuals: Array | None = None
+    weights: Array | None = None
+    n_unconverged: int | None = None
+
+    @classmethod
+    def of(cls, inverse: Any, aligned: Any, parameter_names: list[str]) -> "Estimates":
+        """What a fitted inverse finds for aligned records, with warnings where they tell little."""
+        last = refining_step(inverse)
+        if last is None:
+            theta = as_floats(inverse.transform(aligned))
+            if theta.shape[1] != len(parameter_names):
+                raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {parameter_names}")
+            return cls(theta)
+        found = last.invert(inputs_of_last_step(inverse, aligned))
+        last.warn_of(found)
+        weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
+        if weight < SCARCE:
+            warn_user(
+                f"because of their gaps, records tell on average {weight:.0%} of what complete ones would tell "
+                "about the parameters, and predictions are drawn towards the model's nominal state; expected more "
+                "modes a record, imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
+                "scarce modes",
+            )
+        return cls(as_floats(found.theta), found.residuals, found.weight, int(unconverged(found).sum()))
+
+    def targets(self, inverse: Any, mapper: Any) -> Array:
+        """What M2 learns: theta or, in coordinates of frequencies, theta without the shrinkage of the inverse's prior.
+
+        One more Gauss-Newton step, hardly damped, with the derivatives that define these coordinates takes the
+        shrinkage out. Parameters that hardly move the frequencies may then scatter widely, but not their effects, which
+        are all that the mapper sees. Combinations of parameters that do not move them at all stay where they are.
+        """
+        last = refining_step(inverse)
+        if last is None or self.residuals is None:
+            return self.theta
+        n_rows = np.count_nonzero(~np.isnan(self.theta).any(axis=1))
+        coordinates = learn_in_frequencies(mapper, last, n_rows)
+        if coordinates is None:
+            return self.theta
+        noise = np.where(np.abs(self.residuals) < NOT_NOISE, self.residuals, 0.0)
+        if last.shape_inputs_ is None:
+            undamped = replace(coordinates, damping=coordinates.damping / ROWS_PER_EFFECTIVE_ROW)
+            steps = noise / last.scatter_ @ undamped.inverse.T
+        else:
+            steps = last.refinement_.steps_without_prior(self.theta, last.scatter_, n_rows)
+            steps = np.where(noise.any(axis=1)[:, np.newaxis], steps, 0.0)
+        return self.theta * np.exp(np.clip(steps, -LARGEST_STEP, LARGEST_STEP))
+
+
+def refining_step(inverse: Any) -> InverseSurrogate | None:
+    """The fitted `InverseSurrogate` that an inverse is or ends with, if it refines its estimates."""
+    last = last_step(inverse)
+    return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+
+
+def learn_in_frequencies(mapper: Any, inverse: InverseSurrogate, n_rows: int) -> FrequencyCoordinates | None:
+    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies, and return these.
+
+    The coordinates are d ln f / d ln theta at the nominal state, in standard deviations of the frequencies, and the
+    prior of the parameters does the damping. None if there is no such mapper, if it is fitted to one parameter at a
+    time, if it has coordinates already, or if the nominal state has no solution.
+    """
+    mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
+    is_free = all(part.coordinates is None for part in mappers)
+    if not mappers or not is_free or isinstance(last_step(mapper), MultiOutputRegressor):
+        return None
+    jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))), relative=True)[1][0]
+    sensitivities = jacobian / inverse.scatter_[:, np.newaxis]
+    if not np.isfinite(sensitivities).all():
+        return None
+    damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_EFFECTIVE_ROW / n_rows
+    coordinates = FrequencyCoordinates(sensitivities, damping)
+    for part in mappers:
+        part.set_params(coordinates=coordinates)
+    return coordinates
+
+
+def shape_inputs_of(inverse: Any) -> ShapeInputs | None:
+    """How an inverse reads shapes; None for one without ``dofs``."""
+    part = next((part for part in surrogates_in(inverse) if part.dofs is not None), None)
+    return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
+
+
+def with_shapes(inverse: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    """Frequencies with the columns of shapes that an inverse expects; NaN there without shapes.
+
+    Raises
+    ------
+    ValueError
+        If shapes are given to an inverse without ``dofs``, or have another size.
+    """
+    inputs = shape_inputs_of(inverse)
+    if inputs is None:
+        if shapes is not None:
+            raise ValueError("shapes are given, but the inverse has no dofs; expected InverseSurrogate(dofs=...)")
+        return F
+    components = np.full((len(F), inputs.n_columns - inputs.n_modes), np.nan)
+    if shapes is not None:
+        components = shape_components(shapes, inputs.reference)
+        if len(components) != len(F):
+            raise ValueError(f"shapes have {len(components)} rows and frequencies {len(F)}; expected the same number")
+    modes = [str(name) for name in column_names(F, "f")]
+    if hasattr(F, "columns"):
+        F = F.set_axis(modes, axis=1)
+    names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
+    return frame_like(F, np.hstack([as_floats(F), components]), names)
+
+
+def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
+    """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+    inverse = refining_step(inverse)
+    if inverse is None:
+        return
+    inputs, values = inverse.shape_inputs_, as_floats(aligned)
+    n_modes, n_sensors = inputs.n_modes, inputs.n_sensors
+    components = values[:, n_modes:].reshape(len(values), n_modes, n_sensors)
+    found = ~np.isnan(values[:, :n_modes])
+    n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
+    names = column_names(aligned, "f")[:n_modes]
+    if n_shapes < FEW_SHAPES * found.sum():
+        yield (
+            "few shapes",
+            f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the {n_sensors} "
+            "sensors; the other shapes are not used: expected dofs without sensors that failed",
+        )
+    if not n_shapes or "shapes" not in inverse.samples_:
+        return
+    possible = shape_components(inverse.samples_.shapes.swapaxes(1, 2), inputs.reference).reshape(
+        -1, n_modes, n_sensors
+    )
+    lowest, highest = possible.min(axis=0), possible.max(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a mode without any shape
+        median = np.nanmedian(components, axis=0)
+    excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
+    mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
+    if excess[mode, sensor] > UNLIKE:
+        yield (
+            "shapes unlike the model's",
+            f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
+            f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} to "
+            f"{highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, with the "
+            "signs and gains of the model's axes, or a shape_noise that covers the model's error",
+        )

@@ -1,0 +1,262 @@
+"""What the fit of a chain has found about its records: numbers and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arguments import seem_rad_per_s
+from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._frames import column_names
+from skthermo._pipelines import last_step
+from skthermo._saved_frames import SavesFrames
+from skthermo.fem import FEModel, linearise, match_modes
+from skthermo.metrics import mape
+from skthermo.surrogate.chain._estimates import Estimates
+from skthermo.surrogate.chain._training_records import TrainingRecords
+from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.updating import cramer_rao
+
+LEAST_SCATTER = 1e-12
+
+MOST_SCORED = 365  # largest number of rows that errors are computed for
+ROWS_PER_PARAMETER = 10
+
+WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
+UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
+LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
+SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
+ABSURD = 2.0  # times the median of its mode, or its inverse, from which a frequency counts as absurd
+CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
+
+
+@dataclass(frozen=True, repr=False)
+class FitReport(SavesFrames):
+    """Findings of `DataInformedFEM.fit` about the records.
+
+    Parameters
+    ----------
+    n_rows, n_trained : int
+        Rows given, and rows that trained the temperature mapper.
+    left_out : Series
+        Rows that did not train the mapper, by reason; a row may have several reasons.
+    offsets : Series
+        Mean measured frequency against the model's nominal one, by mode, in percent.
+    n_outside : int or None
+        Rows with parameters outside the bounds of the inverse; None where it has no bounds.
+    outside : Series
+        Share of rows outside, by parameter.
+    deviations : Series
+        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
+        from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
+        determine a parameter.
+    errors : DataFrame
+        MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
+    n_scored : int
+        Number of rows used for ``errors``, spread evenly over the training rows.
+    n_unconverged : int or None
+        Rows whose parameters have not converged in refining; None without refining.
+    round_trip : Series or None
+        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
+        where the inverse does not give it.
+    scatter : Series or None
+        Standard deviation of measured over predicted frequencies, by mode, in percent.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.iloc[10:15, 0] = float("nan")
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
+    (360, {"temperature 'T1' is missing": 5})
+    """
+
+    n_rows: int
+    n_trained: int
+    left_out: pd.Series
+    offsets: pd.Series
+    n_outside: int | None
+    outside: pd.Series
+    deviations: pd.Series
+    errors: pd.DataFrame
+    n_scored: int
+    n_unconverged: int | None = None
+    round_trip: pd.Series | None = None
+    scatter: pd.Series | None = None
+
+    def __repr__(self) -> str:
+        tables = self._modes().to_string(), self._parameters().to_string()
+        return "\n".join([*self._sentences(), "", *tables])
+
+    def _repr_html_(self) -> str:
+        text = "".join(f"<p>{escape(line)}</p>" for line in self._sentences())
+        return text + self._modes().to_html() + self._parameters().to_html()
+
+    def _sentences(self) -> list[str]:
+        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
+        lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        if self.n_outside is not None:
+            lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
+        if self.n_unconverged:
+            lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
+        return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
+
+    def _modes(self) -> pd.DataFrame:
+        table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
+        table = table.join(self.errors.round(3).add_suffix(" (%)"))
+        return table if self.round_trip is None else table.assign(**{"round trip (%)": self.round_trip.round(3)})
+
+    def _parameters(self) -> pd.DataFrame:
+        percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
+        if self.n_outside is not None:
+            percent["rows outside (%)"] = (100 * self.outside).round(1)
+        return percent
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Warnings about the rows.
+
+        Yields
+        ------
+        kind, text : str
+            What the warning is about, and what it says.
+        """
+        n_parameters = len(self.deviations)
+        if 2 * self.n_trained < self.n_rows:
+            reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
+            yield (
+                "half of the rows",
+                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); fill gaps "
+                "first: temperatures by KNNGapImputer().fit_transform(T), frequencies by "
+                "DataInformedFEM(..., imputer=KNNGapImputer())",
+            )
+        if self.n_trained < ROWS_PER_PARAMETER * n_parameters:
+            yield (
+                "few rows",
+                f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
+                f"{ROWS_PER_PARAMETER} rows for each",
+            )
+        chain, mean = self.errors.mean()
+        if chain > WORSE_THAN_MEAN * mean:
+            worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
+            yield (
+                "worse than the mean",
+                f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
+                f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these "
+                "modes: see report_.offsets, update the model, or use aligner=BiasAligner(model)",
+            )
+
+        round_trip = pd.Series(dtype=float) if self.round_trip is None else self.round_trip.abs()
+        if (round_trip > self.scatter.clip(lower=UNSEEN)).any():
+            worst = (round_trip / self.scatter.clip(lower=UNSEEN)).idxmax()
+            yield (
+                "round trip",
+                f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
+                f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
+                f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
+                "refines its estimates, narrow_bounds=True, or more samples",
+            )
+
+
+def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
+    """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
+    records, box, theta = chain.records_, chain.box_, estimates.theta
+    names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
+    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
+    measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
+    predicted = as_floats(chain.aligner_.inverse_transform(predicted))
+    means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
+    errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
+    outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
+    known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
+    last = last_step(chain.inverse_)
+    round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
+    return FitReport(
+        n_rows=len(theta),
+        n_trained=int(records.trained.sum()),
+        left_out=left_out(records, theta),
+        offsets=mode_offsets(chain.model, records.frequencies),
+        n_outside=None if box is None else int(outside.any(axis=1).sum()),
+        outside=pd.Series(outside[known].mean(axis=0), index=names),
+        deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
+        errors=pd.DataFrame(errors, index=modes),
+        n_scored=len(rows),
+        n_unconverged=estimates.n_unconverged,
+        round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
+        scatter=pd.Series(100 * scatter, index=modes),
+    )
+
+
+def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
+    """Cramer-Rao deviations of ln theta from one record at the median parameters, given the scatter of each mode."""
+    sensitivity = linearise(model, np.median(theta, axis=0), relative=True)[1][0]
+    return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
+
+
+def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
+    """Rows that do not train the mapper, by reason."""
+    T, F, inputs, trained = records.temperatures, records.frequencies, records.inputs, records.trained
+    reasons = {}
+    without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
+    for what, table, default, rows in (("temperature", T, "T", ~trained), ("frequency", F, "f", without_theta)):
+        missing = np.isnan(as_floats(table)[rows]).sum(axis=0)
+        for name, count in zip(column_names(table, default), missing, strict=True):
+            reasons[f"{what} {name!r} is missing"] = int(count)
+    complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
+    reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
+    reasons["no parameters were found"] = int((complete_F & without_theta).sum())
+    counts = pd.Series(reasons, dtype=int)
+    return counts[counts > 0]
+
+
+def mode_offsets(model: FEModel, F: Any) -> pd.Series:
+    """Mean measured frequency against the model's nominal one, by mode, in percent."""
+    nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
+    return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
+
+
+def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
+    """Warnings about the order and the units of the modes: kind and text of each."""
+    offsets = mode_offsets(model, F)
+    values = as_floats(F)
+    with np.errstate(invalid="ignore"):
+        absurd = np.abs(np.log(values / np.nanmedian(values, axis=0))) > np.log(ABSURD)
+    if absurd.any():
+        row, column = np.argwhere(absurd)[0]
+        yield (
+            "absurd frequencies",
+            f"{absurd.sum()} frequencies are more than {ABSURD:g} times the median of their mode, or less than "
+            f"1/{ABSURD:g} of it, first {offsets.index[column]!r} in row {row}: {values[row, column]:g} Hz; expected "
+            "NaN where a mode was not identified",
+        )
+    ratios = 1 + offsets.to_numpy() / 100
+    far = offsets[offsets.abs() > LARGE_OFFSET]
+    if (ratios > 0).all() and len(ratios) > 1:
+        table = match_modes(model, as_floats(F))
+        unchanged = np.arange(len(offsets))
+        near = offsets.abs().to_numpy() < SMALL_OFFSET
+        order = np.where(near, unchanged, table["mode"])
+        best = np.where(near, offsets, table["offset"])
+        moved = order != unchanged
+        is_better = (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET
+        if moved.any() and is_better and len(np.unique(order)) == len(order):
+            yield (
+                "order of modes",
+                f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
+                f"order of its modes, or model.with_modes({order.tolist()})",
+            )
+            return
+    if len(far):
+        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
+        listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
+        yield (
+            "offset of modes",
+            f"measured modes differ from the model's nominal frequencies: {listed}{units}; expected Hz, the modes of "
+            "the model in their order, and a model updated to the structure",
+        )

@@ -1,0 +1,76 @@
+"""Records that `DataInformedFEM` is fitted to, checked, and its parts: clones, the inverse inside, inputs of M2."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from sklearn.base import clone
+from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import FunctionTransformer
+
+from skthermo._arrays import as_floats
+from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
+from skthermo._models import check_model
+from skthermo._validation import check_array, seed_parts, seeded, validate_data
+from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate.inverse import InverseSurrogate
+
+
+def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
+    """Temperatures and frequencies, checked; frames stay frames."""
+    model = chain.model
+    check_model(model)
+    if y is None:
+        raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+    temperatures = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
+    T, F = frame_like(X, temperatures), frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"))
+    check_same_rows(X, y, ("temperatures", "frequencies"))
+    if F.shape[1] != model.n_modes:
+        raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
+    values = as_floats(F)
+    wrong = ~np.isnan(values) & ~(values > 0)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"frequency {column_names(F, 'f')[column]!r} in row {row} is {values[row, column]:g}; expected positive "
+            "numbers in Hz, and NaN where a mode is missing"
+        )
+    check_temperatures(T)
+    check_columns(T, "temperature", varying=True)
+    check_columns(F, "frequency")
+    return T, F
+
+
+def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
+    """Clones of inverse, mapper, aligner and imputer, with the chain's model, and seeds where they have none."""
+    default_inverse = InverseSurrogate(reduce=chain.reduce, n_jobs=chain.n_jobs)
+    unchanged = FunctionTransformer().set_output(transform="default")
+    inverse = default_inverse if chain.inverse is None else clone(chain.inverse)
+    mapper = TemperatureMapper() if chain.mapper is None else clone(chain.mapper)
+    aligner = unchanged if chain.aligner == "passthrough" else clone(chain.aligner)
+    imputer = None if chain.imputer == "passthrough" else clone(chain.imputer)
+    names = list(chain.model.parameter_names)
+    for part in surrogates_in(inverse):
+        if part.model is None:
+            part.set_params(model=chain.model)
+        if list(part.model.parameter_names) != names:
+            raise ValueError(
+                f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                f"{chain.model!r} has"
+            )
+    random_state = seeded(chain.random_state)
+    for part in (inverse, mapper, aligner, imputer):
+        if part is not None:
+            seed_parts(part, random_state)
+    return inverse, mapper, aligner, imputer
+
+
+def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:
+    """Every `InverseSurrogate` that an inverse is or holds."""
+    return (part for part in (inverse, *inverse.get_params().values()) if isinstance(part, InverseSurrogate))
+
+
+def inputs_of_last_step(estimator: Any, X: Any) -> Any:
+    """What the last step of a fitted pipeline, or of a search over pipelines, is given, such as lagged temperatures."""
+    estimator = getattr(estimator, "best_estimator_", estimator)
+    return estimator[:-1].transform(X) if isinstance(estimator, Pipeline) and len(estimator) > 1 else X

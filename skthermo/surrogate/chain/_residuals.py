@@ -1,0 +1,185 @@
+"""Out-of-fold residuals of a chain, by weather: their spread, intervals, and realistic noise."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.pipeline import Pipeline
+
+from skthermo._arrays import Array
+from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
+
+DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
+SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
+COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
+OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
+SIMILAR = 0.1
+"""Share of the records whose weather counts as similar: a residual is compared with their mean, and a drawn run of
+records goes on while it lasts."""
+
+
+@dataclass(frozen=True)
+class WeatherResiduals:
+    """Relative residuals of records in order of time, and the weather of each.
+
+    ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
+    n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
+    mapper that learned from all records. ``folds`` are the periods of time.
+    """
+
+    weather: Array
+    values: Array
+    own: Array
+    folds: NDArray[np.intp]
+
+    @cached_property
+    def coordinates(self) -> Pipeline:
+        """Principal components of the standardised weather."""
+        return weather_coordinates(self.weather)
+
+    @cached_property
+    def places(self) -> Array:
+        """The records in these coordinates."""
+        return self.coordinates.transform(self.weather)
+
+    def spread(self, weather: Array) -> Array:
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
+        return self._where_known(weather, lambda known: self._spread(known, np.ones(len(self.values), dtype=bool)))
+
+    def expected(self, weather: Array) -> Array:
+        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
+        everywhere = np.ones(len(self.own), dtype=bool)
+        return self._where_known(weather, lambda known: self._similar_mean(self.own, known, everywhere))
+
+    def n_expected(self, weather: Array) -> Array:
+        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,)."""
+        known = weather[~np.isnan(weather).any(axis=1)]
+        return self._n_similar(known, np.ones(len(self.own), dtype=bool)) if len(known) else np.zeros(self.n_modes)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes."""
+        return self.values.shape[1]
+
+    def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
+        """Residuals of each of some periods less those that the other periods have in similar weather.
+
+        With the effective sample size, (n_modes,), of the mean of what is subtracted. One mapper gives both, as for new
+        records, so that its own error in such weather cancels; but where a mapper follows its own records more closely
+        than others, the residuals are those out of fold.
+        """
+        residuals = self.values if self._is_overfitted else self.own
+        parts = []
+        for period in np.array_split(np.arange(len(self.values)), n_periods):
+            others = np.ones(len(self.values), dtype=bool)
+            others[period] = False
+            weather = self.weather[period]
+            similar = self._similar_mean(residuals, weather, others)
+            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
+        return parts
+
+    @property
+    def _is_overfitted(self) -> bool:
+        """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
+        own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
+        return bool((own < OVERFITTED * out_of_fold).any())
+
+    def quantiles(self, confidence: float) -> Array:
+        """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
+        return np.array([order_statistic(column[~np.isnan(column)], confidence) for column in self._scores.T])
+
+    def draw(self, weather: Array, random_state: np.random.RandomState) -> Array:
+        """Residuals of whole records for rows of weather in order of time, (n_samples, n_modes).
+
+        A stationary bootstrap: each row takes the record after the one before it took or, where such a run ends, one
+        of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
+        Rows of unknown weather are NaN.
+        """
+        return self._where_known(weather, lambda known: self.noise[self._drawn(known, random_state)])
+
+    def _drawn(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+        """Positions of the records drawn for each row."""
+        places, n_records = self.coordinates.transform(weather), len(self.places)
+        near = nearest(self.places, places, DRAWN_FROM)[1]
+        farthest = nearest(self.places, places, max(DRAWN_FROM, int(SIMILAR * n_records)))[0][:, -1]
+        ends = random_state.uniform(size=len(places)) < 1 / self._mean_block_length
+        fresh = near[np.arange(len(places)), random_state.randint(near.shape[1], size=len(places))]
+        taken = np.empty(len(places), dtype=int)
+        record = n_records
+        for row in range(len(places)):
+            record += 1
+            is_over = ends[row] or record >= n_records
+            if is_over or np.linalg.norm(self.places[record] - places[row]) > farthest[row]:
+                record = fresh[row]
+            taken[row] = record
+        return taken
+
+    @cached_property
+    def noise(self) -> Array:
+        """Scatter of the records around what similar weather shows out of fold, and what the mapper leaves there.
+
+        A fold that must extrapolate has an error that the mapper of all records has not.
+        """
+        similar = self._similar_mean(self.values, self.weather, np.ones(len(self.values), dtype=bool))
+        return self.values - similar + self.expected(self.weather)
+
+    def _where_known(self, weather: Array, of_known: Callable[[Array], Array]) -> Array:
+        """Results for the rows of weather that are complete, NaN for others."""
+        known = ~np.isnan(weather).any(axis=1)
+        result = np.full((len(weather), self.n_modes), np.nan)
+        if known.any():
+            result[known] = of_known(weather[known])
+        return result
+
+    def _similar_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """Mean of some records' values in weather most like that of each row, mode by mode."""
+        means = np.full((len(weather), values.shape[1]), np.nan)
+        for mode, near in enumerate(self._similar(values, weather, rows)):
+            if near.size:
+                means[:, mode] = values[near, mode].mean(axis=1)
+        return means
+
+    def _n_similar(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """The reciprocal of the sum of squared weights that records have in the mean over all rows; 0 without any."""
+        shares = [np.bincount(near.ravel()) / max(near.size, 1) for near in self._similar(self.values, weather, rows)]
+        return np.array([1 / (share**2).sum() if share.size else 0.0 for share in shares])
+
+    def _similar(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
+        """For each mode, positions of the records with weather most like that of each row, (n_samples, n_similar)."""
+        wanted, number = self.coordinates.transform(weather), max(COMPARED_WITH, int(SIMILAR * len(values)))
+        found: dict[bytes, NDArray[np.intp]] = {}  # modes that are there in the same records have the same neighbours
+        for column in values.T:
+            known = np.flatnonzero(rows & ~np.isnan(column))
+            if known.tobytes() not in found:
+                near = known[nearest(self.places[known], wanted, number)[1]] if known.size else known
+                found[known.tobytes()] = near
+            yield found[known.tobytes()]
+
+    def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
+        """The spread that some of the records give, the wider the farther weather is beyond their range."""
+        wanted, spread = self.coordinates.transform(weather), np.empty((len(weather), self.values.shape[1]))
+        for mode, values in enumerate(self.values.T):
+            known = np.flatnonzero(rows & ~np.isnan(values))
+            near = known[nearest(self.places[known], wanted, SPREAD_OF)[1]] if known.size else known
+            spread[:, mode] = np.sqrt((values[near] ** 2).mean(axis=1)) if known.size else np.inf
+        excess = TrainingRange.of(self.weather, rows).excess(weather).mean(axis=1)
+        return spread * (1 + excess)[:, np.newaxis]
+
+    @cached_property
+    def _scores(self) -> Array:
+        """Absolute residuals over the spread that the records of the other periods give for their weather."""
+        scores = np.empty_like(self.values)
+        for fold in np.unique(self.folds):
+            test = self.folds == fold
+            scores[test] = np.abs(self.values[test]) / self._spread(self.weather[test], ~test)
+        return scores
+
+    @cached_property
+    def _mean_block_length(self) -> float:
+        """Mean length of the runs: twice the correlation time of what similar weather does not explain, minus one."""
+        near = nearest(self.places, self.places, SPREAD_OF)[1]
+        filled = np.where(np.isnan(self.values), 0.0, self.values)
+        means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)
+        return max(1.0, 2 * max(correlation_time(column) for column in (self.values - means).T) - 1)

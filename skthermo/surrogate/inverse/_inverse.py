@@ -1,0 +1,518 @@
+"""The inverse surrogate M1: frequencies to parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Integral, Real
+from typing import overload
+
+import numpy as np
+import pandas as pd
+from joblib import Memory
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils import Bunch, check_random_state
+
+from skthermo._arguments import check_theta
+from skthermo._arrays import Array, Bounds, as_floats
+from skthermo._frames import frame_like
+from skthermo._models import check_model
+from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context, check_is_fitted
+from skthermo._warnings import warn_user
+from skthermo.fem import FEModel, evaluate
+from skthermo.surrogate._networks import default_network
+from skthermo.surrogate._regression import MultiplierRegressor
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
+from skthermo.surrogate.inverse._training import SimulatedTraining
+from skthermo.surrogate.refinement import Refinement, unconverged
+
+DEFAULT_STEPS = 100
+MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given
+
+
+class InverseSurrogate(TransformerMixin, MultiplierRegressor):
+    """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
+
+    Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
+
+    Parameters
+    ----------
+    model : FE model, optional
+        Needed unless `fit` gets frequencies and parameters.
+    regressor : regressor, optional
+        Any regressor. It learns the standardised logarithms of the parameters from those of the frequencies, a nearly
+        linear relation. A regressor of a single output is fitted once for each parameter. By default a small
+        ``MLPRegressor``; see `paper_network` for the paper's.
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+        Box of multipliers: a half-width, lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to its half-width or to (lowest, highest).
+    n_samples : int, default=1000
+        Number of simulations.
+    narrow_bounds : bool, default=False
+        Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
+        records that `fit` sees have their parameters, as far as the first regressor can tell. An inverse that is not
+        refined becomes more accurate there.
+    noise : float or array-like of shape (n_modes,), default=0.0
+        Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
+        measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
+        refining finds the posterior mode. With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode
+        is missing).
+    dofs : array-like of int of shape (n_sensors,), optional
+        Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
+        frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
+        Components are real, of any scale and sign; `~skthermo.fem.shape_components` makes them of complex shapes.
+    shape_noise : float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of the measured components of a shape as a share of their root mean square.
+    refine : int, optional
+        Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row,
+        until the model has the measured frequencies (or, with ``noise`` or ``dofs``, until the posterior is largest).
+        Rows with some modes missing are estimated from the others. By default 100 for a model that gives exact
+        derivatives (``linearised`` or ``jacobian``; with ``dofs``, ``linearised_modes``), else 0. With a number above
+        0, other models are differentiated by central differences: 2 n_parameters + 1 solutions a step and row.
+    prior : float, array-like of shape (n_parameters,) or mapping, optional
+        Standard deviations of a Gaussian prior of ln theta about the middle of the bounds, for refining. By default
+        that of values spread evenly over the box.
+    reduce : bool or float, default=False
+        Whether to simulate with the reduced model ``model.reduced(bounds)``, much faster for large models. True allows
+        a relative error of 1e-5 in the frequencies; a number sets the error allowed. `inverse_transform` always uses
+        the full model.
+    memory : str or joblib.Memory, optional
+        Where simulations are stored, so that a search over other settings does not repeat them. If several processes
+        need the same simulations, one makes them and the others wait. With ``random_state=None``, stored simulations
+        are always the same. Clear the memory when the program behind a model of your own changes.
+    n_jobs : int, optional
+        Number of parallel jobs for the simulations.
+    random_state : int, RandomState or None, default=None
+        Seed of the samples, of the noise, and of the regressor unless it has its own seed.
+
+    Attributes
+    ----------
+    regressor_ : regressor
+        Fitted to standardised log frequencies (inputs) and standardised log parameters (outputs).
+    inputs_, targets_ : Standardiser
+        Means and scales of the log frequencies and of the log parameters.
+    samples_ : Bunch
+        ``theta``, ``frequencies`` and, with ``dofs``, ``shapes`` of the training samples, before noise.
+    columns_ : InverseColumns
+        How columns are read, named and computed.
+    shape_inputs_ : ShapeInputs or None
+        With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
+    scores_ : ShapeScores
+        With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
+    simulator_ : Simulator
+        If there is a model: it and, with ``reduce``, its reduced model.
+    refinement_ : Refinement
+        If estimates are refined: the model, the box and the prior of the steps.
+    box_ : Box or None
+        The bounds of the samples, if they were simulated; else None.
+    n_steps_ : int
+        Largest number of steps that refine an estimate; 0 if estimates are not refined.
+    scatter_ : ndarray of shape (n_modes,)
+        Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
+        ``noise`` or, where it is 0, what the model leaves of the records that `fit` saw; 0.001 where they cannot tell.
+    n_parameters_ : int
+        Number of parameters.
+    parameter_names_ : list of str or None
+        Their names: the model's, or those of the frame that `fit` saw.
+    y_is_vector_ : bool
+        Whether `fit` saw one parameter as a vector.
+    n_features_in_ : int
+        Number of columns of X.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    Notes
+    -----
+    Frequencies cannot determine more parameters than there are modes, and an estimate is an effective stiffness, not a
+    material property.
+
+    Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
+    refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
+    a Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``).
+
+    With ``dofs``, the regressor sees linear estimates of the parameters (ridge regression on noisy simulations) in
+    place of the many components of shapes. Refined on frequencies and shapes, errors of the truss's verticals are 39 %
+    lower with four sensors than from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of
+    30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
+
+    References
+    ----------
+    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+
+    Kamali, Mariani, Hadianfard & Marzani, Inverse surrogate model for deterministic structural model updating based on
+    random forest regression, Mechanical Systems and Signal Processing 215 (2024) 111416 [KMH24]_.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.surrogate import InverseSurrogate
+    >>> model = make_truss()
+    >>> inverse = InverseSurrogate(model, bounds=0.2, random_state=0).fit()
+    >>> theta = np.array([[0.95, 1.05, 0.9, 1.0]])
+    >>> bool(np.abs(inverse.transform(model.frequencies(theta)) / theta - 1).max() < 0.05)
+    True
+    """
+
+    _default_regressor = staticmethod(default_network)
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"]), None],
+        "regressor": [HasMethods(["fit", "predict"]), None],
+        "bounds": [Real, "array-like", dict],
+        "n_samples": [Interval(Integral, 2, None, closed="left")],
+        "narrow_bounds": ["boolean"],
+        "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "dofs": ["array-like", None],
+        "shape_noise": [Interval(Real, 0, 1, closed="neither"), "array-like"],
+        "refine": [Interval(Integral, 0, None, closed="left"), None],
+        "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
+        "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
+        "memory": [str, HasMethods(["cache"]), None],
+        "n_jobs": [Integral, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        model: FEModel | None = None,
+        regressor: BaseEstimator | None = None,
+        *,
+        bounds: Bounds = 0.3,
+        n_samples: int = 1000,
+        narrow_bounds: bool = False,
+        noise: ArrayLike = 0.0,
+        dofs: ArrayLike | None = None,
+        shape_noise: ArrayLike = 0.01,
+        refine: int | None = None,
+        prior: ArrayLike | Mapping[str, float] | None = None,
+        reduce: bool | float = False,
+        memory: str | Memory | None = None,
+        n_jobs: int | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.model = model
+        self.regressor = regressor
+        self.bounds = bounds
+        self.n_samples = n_samples
+        self.narrow_bounds = narrow_bounds
+        self.noise = noise
+        self.dofs = dofs
+        self.shape_noise = shape_noise
+        self.refine = refine
+        self.prior = prior
+        self.reduce = reduce
+        self.memory = memory
+        self.n_jobs = n_jobs
+        self.random_state = random_state
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: ArrayLike | None = None, y: ArrayLike | None = None) -> InverseSurrogate:
+        """Learn the inverse.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features), optional
+            Frequencies in Hz and, with ``dofs``, components of shapes. Without y they give the columns, ``scatter_``
+            and, with ``narrow_bounds``, the bounds.
+        y : array-like or DataFrame of shape (n_samples, n_parameters), optional
+            Multipliers of each row of X. Without y, frequencies and multipliers are simulated.
+
+        Returns
+        -------
+        InverseSurrogate
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If there is neither y nor a model, the numbers of modes or parameters are not the
+            model's, the bounds are infeasible, multipliers of a model are not positive, or a model
+            that is to be reduced has no method for it.
+
+        Warns
+        -----
+        UserWarning
+            If there are more parameters than modes, or modes change their order in more than a tenth of the
+            simulations and the model does not track them.
+        """
+        random = check_random_state(self.random_state)
+        seed = None if self.random_state is None else random
+        self.n_steps_ = self._n_steps()
+        self.columns_ = InverseColumns.of(self)
+        self.shape_inputs_ = self.columns_.shapes
+        if self.model is None or y is not None:
+            self._learn_pairs(X, y, seed)
+        else:
+            self._learn_simulations(X, random, seed)
+        if self.n_steps_:
+            self.refinement_ = Refinement.of(self)
+            measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
+            self.scatter_ = self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+        return self
+
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: ArrayLike | None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]: ...
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
+        """Fit, and return the parameters of the same records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes.
+        y : array-like of shape (n_samples, ...), optional
+            Without a model, the multipliers of each row of X. With a model y is ignored, because the inverse learns
+            from simulations; in a pipeline, y is the target of a later step.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            As from `transform`.
+        """
+        return self.fit(X, y if self.model is None else None).transform(X)
+
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Multipliers of the nominal parameters, as `predict` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            NaN in rows without any mode and, without refining, where one is missing. A frame gives a frame on its own
+            index.
+
+        Warns
+        -----
+        UserWarning
+            If more than 5 % of the rows give parameters that are farther outside the bounds than half the width of
+            the box.
+        """
+        theta = self._predict_arrays(X)[0]
+        if not self.n_steps_ and self.box_ is not None:
+            self._warn_of_box(theta, self.box_.far_outside(theta))
+        return frame_like(X, theta, self.get_feature_names_out())
+
+    def invert(self, X: ArrayLike) -> Bunch:
+        """Parameters of measured frequencies, and how sure they are.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
+
+        Returns
+        -------
+        Bunch
+            - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode, and in rows with a
+              missing mode that have stalled;
+            - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation, given
+              ``scatter_`` and the prior; those of the prior in rows that have stalled;
+            - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
+              missing and in rows that have stalled;
+            - ``weight`` (n_samples,): mean precision of the parameters as a share of what all modes would give, 1 in
+              complete rows and 0 in rows without any mode;
+            - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
+              they have reached; rows that have stalled keep the regressor's estimate;
+            - ``outside`` (n_samples, n_parameters): whether a parameter contradicts the prior: farther from the middle
+              of the bounds than their whole width, and by more than its uncertainty explains.
+
+        Raises
+        ------
+        ValueError
+            If the estimator does not refine.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> from skthermo.surrogate import InverseSurrogate
+        >>> model = make_truss()
+        >>> inverse = InverseSurrogate(model, bounds=0.2, noise=0.001, random_state=0).fit()
+        >>> found = inverse.invert(model.frequencies([[0.95, 1.05, 0.9, 1.0]]))
+        >>> found.theta.round(3), found.std.round(3)
+        (array([[0.95 , 1.05 , 0.9  , 1.001]]), array([[0.006, 0.008, 0.002, 0.095]]))
+        """
+        check_is_fitted(self)
+        if not self.n_steps_:
+            raise ValueError(
+                f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
+            )
+        inputs = self.columns_.read(self, X)
+        found = self.refinement_.refined(inputs, self._estimate(inputs)[0], self.scatter_)
+        names = self.get_feature_names_out()
+        found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
+        return found
+
+    def warn_of(self, found: Bunch) -> None:
+        """Warn if many rows have not converged or are far outside the bounds.
+
+        Parameters
+        ----------
+        found : Bunch
+            What `invert` has given.
+        """
+        theta = as_floats(found.theta)
+        rows = np.flatnonzero(unconverged(found))
+        if rows.size > MANY_UNCONVERGED * len(theta):
+            warn_user(
+                f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
+                "they keep what they reached, or the regressor's estimate",
+                "not converged",
+            )
+        self._warn_of_box(theta, found.outside)
+
+    @overload
+    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Frequencies and, with ``dofs``, shapes of given parameters, computed by the FE model.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz, followed by components of shapes with a root mean square of 1; NaN in rows with NaN. A
+            frame, whose columns must be the model's parameters, gives a frame on its own index.
+
+        Raises
+        ------
+        ValueError
+            If the estimator has no model, or the parameters are not the model's.
+        """
+        check_is_fitted(self)
+        self._check_has_model()
+        names = getattr(self, "feature_names_in_", self.columns_.names())
+        return frame_like(X, self.columns_.of_parameters(X), names)
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the parameters.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Ignored.
+
+        Returns
+        -------
+        ndarray of str
+            The model's parameter names, else y's columns, else theta1, theta2, ...
+        """
+        check_is_fitted(self)
+        numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
+        return np.array(self.parameter_names_ or numbered, dtype=object)
+
+    def round_trip(self) -> Array:
+        """Relative errors of the model's nominal frequencies after inversion and another solution.
+
+        Such an error goes into everything that is simulated with the parameters found.
+
+        Returns
+        -------
+        ndarray of shape (n_modes,)
+            At the nominal state or, where that is outside the box of the samples, at the nearest one inside.
+
+        Raises
+        ------
+        ValueError
+            If the estimator has no model.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skthermo.datasets import make_truss
+        >>> from skthermo.surrogate import InverseSurrogate
+        >>> inverse = InverseSurrogate(make_truss(), refine=0, random_state=0).fit()
+        >>> bool(1e-4 < np.abs(inverse.round_trip()).max() < 1e-2)
+        True
+        """
+        check_is_fitted(self)
+        self._check_has_model()
+        state = np.ones((1, self.n_parameters_))
+        nominal = self.columns_.of_parameters(state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
+        theta = self._estimate(nominal)[0]
+        if self.n_steps_:
+            theta = self.refinement_.refined(nominal, theta, self.scatter_).theta
+        return (evaluate(self.model, theta) / nominal[:, : self.model.n_modes] - 1)[0]
+
+    def _check_has_model(self) -> None:
+        if self.model is None:
+            raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
+
+    def _n_steps(self) -> int:
+        """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
+        if self.model is None:
+            if self.refine:
+                raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
+            return 0
+        is_differentiable = hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")
+        if self.dofs is not None:
+            is_differentiable = hasattr(self.model, "linearised_modes")
+        return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
+
+    def _learn_pairs(self, X: ArrayLike | None, y: ArrayLike | None, seed: np.random.RandomState | None) -> None:
+        """Learn from given frequencies and parameters."""
+        inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
+        if self.model is not None:
+            check_theta(theta, self.model.parameter_names, allow_nan=True)
+            self.parameter_names_ = list(self.model.parameter_names)
+            self.simulator_ = Simulator(self.model)
+            if self.shape_inputs_ is not None:
+                self.columns_.check(self, X)
+        self.box_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
+        self._learn_inverse(inputs, theta, seed)
+
+    def _learn_simulations(
+        self, X: ArrayLike | None, random: np.random.RandomState, seed: np.random.RandomState | None
+    ) -> None:
+        """Learn from simulations, and once more from a narrower box if that is asked for."""
+        check_model(self.model)
+        self.columns_.check(self, X)
+        self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
+        training = SimulatedTraining.of(self, random)
+        self._learn_inverse(self.columns_.noisy(training.samples, self.noise, random), training.samples.theta, seed)
+        if self.narrow_bounds:
+            estimates = np.empty((0, 1)) if X is None else self._estimate(self.columns_.read(self, X))[0]
+            training = training.narrower(self, random, estimates)
+            self._learn_inverse(self.columns_.noisy(training.samples, self.noise, random), training.samples.theta, seed)
+        self.box_, self.samples_, self.simulator_ = training.box, training.samples, training.simulator
+
+    def _learn_inverse(self, inputs: Array, theta: Array, seed: np.random.RandomState | None) -> None:
+        """Fit the regressor, which sees scores in place of the components of shapes."""
+        if self.shape_inputs_ is not None:
+            inputs = self.shape_inputs_.normalised(inputs)
+            self.scores_ = ShapeScores(self.shape_inputs_.n_modes, inputs, theta)
+            inputs = self.scores_.transform(inputs)
+        self._learn(inputs, theta, seed, log_inputs=True)
+
+    def _estimate(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
+        """What the regressor gives for columns that have been read."""
+        return self._regress(inputs if self.shape_inputs_ is None else self.scores_.transform(inputs), return_std)
+
+    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
+        check_is_fitted(self)
+        if not self.n_steps_:
+            return self._estimate(self.columns_.read(self, X), return_std)
+        found = self.invert(X)
+        self.warn_of(found)
+        return as_floats(found.theta), as_floats(found.std)
+
+    def _warn_of_box(self, theta: Array, far: NDArray[np.bool_]) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta, far)
+        if message and self.prior is not None:
+            message += "; or a wider prior, which these rows contradict"
+        if message:
+            warn_user(message, "outside the bounds")

@@ -1,0 +1,150 @@
+"""Estimates of the inverse surrogate, refined on the FE model."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.utils import Bunch
+
+from skthermo._arguments import check_bounds, check_noise, check_prior
+from skthermo._arrays import Array, spread_evenly
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.refinement._posterior import Objective, Prior
+from skthermo.surrogate.refinement._refine import refine
+from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
+
+EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
+"""Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
+others, and this noise lets steps move along the curve of these parameters."""
+
+FAR_OUTSIDE = 2 * np.sqrt(3)
+"""Standard deviations of a box's prior that are two half-widths of the box; parameters beyond are far outside it."""
+
+TINY_SHARE = 1e-12
+
+LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model rather than noise
+ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
+ROWS_FOR_SCATTER = 365
+
+
+def unconverged(found: Bunch) -> NDArray[np.bool_]:
+    """Rows with frequencies whose refinement has not converged."""
+    return ~found.converged & (found.weight > 0)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
+
+    ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
+    """
+
+    simulator: Simulator
+    noise: Array
+    prior: Prior
+    n_steps: int
+    n_jobs: int | None
+    shapes: ShapeInputs | None = None
+
+    @classmethod
+    def of(cls, inverse: Any) -> "Refinement":
+        """The refinement that the parameters of an `InverseSurrogate` ask for."""
+        names = inverse.model.parameter_names
+        width = None if inverse.prior is None else check_prior(inverse.prior, names)
+        prior = Prior.of_box(check_bounds(inverse.bounds, names), width)
+        noise = check_noise(inverse.noise, inverse.model.n_modes)
+        return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_)
+
+    def refined(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:
+        """What `InverseSurrogate.invert` gives, for rows of inputs and the regressor's guess."""
+        frequencies = inputs[:, : len(self.noise)]
+        some, gaps = ~np.isnan(inputs).all(axis=1), np.isnan(frequencies).any(axis=1)
+        result = Bunch(
+            theta=np.full_like(guess, np.nan),
+            std=np.full_like(guess, np.nan),
+            residuals=np.full_like(frequencies, np.nan),
+            weight=np.zeros(len(guess)),
+            converged=np.zeros(len(guess), dtype=bool),
+            outside=np.zeros(guess.shape, dtype=bool),
+        )
+        if not some.any():
+            return result
+        prior, measured, guess = self.prior, np.log(frequencies[some]), guess[some]
+        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
+        start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
+        objective = self._objective(inputs[some], measured, noise)
+        sorts = not getattr(self.simulator.model, "track", False)
+        found, converged, stalled = refine(objective, start, self.n_steps, sorts=sorts)
+        lost, complete = stalled[:, np.newaxis], self._with_shapes(np.maximum(noise, scatter))
+        deviations, at_best = (
+            prior.deviations(np.nan_to_num(found.sensitivity), spread)
+            for spread in (np.where(objective.missing, np.inf, complete), complete)
+        )
+        result.theta[some] = np.where(lost, guess, np.exp(found.x))
+        result.std[some] = np.where(lost, prior.width, deviations) * result.theta[some]
+        residuals = found.residual[:, : len(self.noise)]
+        result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, residuals)
+        result.weight[some] = ((at_best / deviations) ** 2).mean(axis=1)
+        result.converged[some] = converged
+        result.outside[some] = self._contradicts(found.x, deviations)
+        return result
+
+    def _objective(self, inputs: Array, log_measured: Array, noise: Array) -> Objective:
+        linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs)
+        if self.shapes is None:
+            return Objective(linearise, log_measured, noise, self.prior)
+        measured = MeasuredShapes(self.shapes.unit_shapes(inputs))
+        linearise = partial(linearise, dofs=self.shapes.dofs)
+        return Objective(linearise, log_measured, self._with_shapes(noise), self.prior, measured)
+
+    def _with_shapes(self, noise: Array) -> Array:
+        """Standard deviations of all observations, (n_samples, n_observations), given those of ln f."""
+        if self.shapes is None:
+            return noise
+        return np.hstack([noise, np.tile(self.shapes.deviations, (len(noise), 1))])
+
+    def _contradicts(self, x: Array, deviations: Array) -> NDArray[np.bool_]:
+        """Whether ln theta is farther from the prior's mean than data from the prior can bring it.
+
+        The share of the prior's variance that a row explains is 1 - (deviation / width)^2. The variance of posterior
+        modes is that share of the prior's; the variance of exact inversions is the prior's over that share.
+        """
+        explained = np.maximum(1 - (deviations / self.prior.width) ** 2, TINY_SHARE)
+        expected = self.prior.width * (np.sqrt(explained) if self.noise.all() else 1 / np.sqrt(explained))
+        return np.abs(x - self.prior.mean) > FAR_OUTSIDE * expected
+
+    def estimated_scatter(self, inputs: Array, guess: Array) -> Array:
+        """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
+
+        Records can tell only if there are more modes than parameters, and are not exact themselves.
+        """
+        n_modes, n_parameters = len(self.noise), guess.shape[1]
+        if self.noise.all():
+            return self.noise
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).any(axis=1)), ROWS_FOR_SCATTER)
+        scatter = ASSUMED_SCATTER
+        if n_modes > n_parameters and rows.size:
+            residuals = self.refined(inputs[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
+            residuals = residuals[~np.isnan(residuals).any(axis=1)]
+            if len(residuals) > n_parameters:
+                estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))
+                scatter = min(max(estimate, EXACT), LARGEST_SCATTER)
+        return np.where(self.noise > 0, self.noise, scatter)
+
+    def steps_without_prior(self, theta: Array, scatter: Array, n_rows: int) -> Array:
+        """Steps of ln theta that take the prior's shrinkage out of posterior modes of frequencies and shapes.
+
+        At a posterior mode the derivatives of the observations times their residuals equal the pull of the prior. The
+        step is a Gauss-Newton step with the information of all observations at the nominal state, and with a prior as
+        weak as suits the mean of all records.
+        """
+        model, nominal = Simulator(self.simulator.model), np.ones((1, theta.shape[1]))
+        _, sensitivity, shapes, slopes = model.linearise(nominal, dofs=self.shapes.dofs)
+        units = MeasuredShapes(shapes.swapaxes(1, 2) / np.linalg.norm(shapes, axis=1)[:, :, np.newaxis])
+        rows = np.hstack([sensitivity, units.misfit(shapes, slopes)[1]])
+        weak = replace(self.prior, width=self.prior.width * np.sqrt(n_rows))
+        information = weak.information(rows, np.append(scatter, self.shapes.deviations)[np.newaxis])[0]
+        pull = (np.log(theta) - self.prior.mean) / self.prior.width**2
+        return np.linalg.solve(information, pull.T).T

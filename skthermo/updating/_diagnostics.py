@@ -1,0 +1,142 @@
+"""Tables and warnings about the result of an updating."""
+
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arguments import seem_rad_per_s
+from skthermo._arrays import Array
+from skthermo.fem import FEModel, ModalModel, share_reordered
+from skthermo.updating._comparison import macs, paired_modes
+from skthermo.updating._measured import Measured
+from skthermo.updating._optimise import Outcome
+from skthermo.updating._residuals import Residuals
+
+LOW_MAC = 0.5
+"""MAC below which a measured shape is not that of the mode it is paired with."""
+
+DISTANCE_AT_BOUND = 1e-4
+"""Distance from a bound, as a share of the box, below which a parameter counts as being at the bound."""
+
+LARGE_ERROR = 15.0
+"""Error of a frequency of the updated model, in percent, above which a warning is given."""
+
+LARGE_DEVIATION = 1e4
+"""Multiple of the smallest standard deviation above which a parameter is not determined."""
+
+NOISE_LIMIT = 10.0
+"""Error of a frequency, in standard deviations, that noise does not explain."""
+
+SAME_OPTIMUM = 1e-3
+"""Difference of multipliers below which two starts have ended at the same optimum."""
+
+SMALL_WEIGHT = 100
+"""Weight of shapes below which the objective may be a narrow curved valley, slow to search."""
+
+
+def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
+    """Measured modes and the model's at the nominal parameters and at theta: Hz, errors in percent, MAC."""
+    table = pd.DataFrame({"measured": measured.frequencies}, index=measured.names)
+    thetas = {"before": np.ones_like(theta), "after": theta}
+    states = {name: paired_modes(model, measured, row) for name, row in thetas.items()}
+    for name, modes in states.items():
+        table[name] = modes.frequencies
+    for name, modes in states.items():
+        table[f"error_{name}"] = 100 * (modes.frequencies / measured.frequencies - 1)
+    if measured.dofs.size:
+        for name, modes in states.items():
+            table[f"mac_{name}"] = macs(modes.shapes, measured.shapes)
+    return table
+
+
+def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
+    """One row for each start, with the number of its optimum: 0 is the best, starts that ended together share one."""
+    table = pd.DataFrame(outcomes)
+    optima: list[Array] = []
+    for i in np.argsort(table["objective"], kind="stable"):
+        theta = outcomes[i].theta
+        near = (number for number, known in enumerate(optima) if np.abs(theta - known).max() < SAME_OPTIMUM)
+        table.loc[i, "optimum"] = number = next(near, len(optima))
+        if number == len(optima):
+            optima.append(theta)
+    return table.astype({"optimum": int})
+
+
+def unfinished(outcome: Outcome, residuals: Residuals) -> str:
+    """The warning about a best start that has not converged."""
+    failed = f", {outcome.n_failed} of them without modes" if outcome.n_failed else ""
+    weights = residuals.measured.shape_weights[residuals.weighted]
+    heavier = f", shape weights of {SMALL_WEIGHT} or more" if (weights < SMALL_WEIGHT).any() else ""
+    return (
+        f"the best start has not converged in {outcome.n_evaluations} evaluations{failed}, and theta_ may not be the "
+        f"optimum: expected a higher max_iter{heavier}, or bounds within which the model has modes"
+    )
+
+
+def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
+    """Warnings about measured modes that are not the modes in the updated model's columns of the same number."""
+    names = np.array(measured.names)
+    if not (measured.dofs.size and hasattr(model, "local_modes")):
+        swapped = names[_swapped(model, theta)[measured.columns]]
+        if swapped.size:
+            yield (
+                f"modes {swapped.tolist()} swap places between the nominal model and the optimum, and a sorted column "
+                "fits another mode's frequency: expected a model with track=True, or shapes"
+            )
+        return
+    modes = paired_modes(model, measured, theta)
+    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
+    if unlike.size:
+        yield f"no mode of the optimum has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC})"
+    columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
+    other = names[modes.ranks != columns[measured.columns]]
+    if other.size:
+        yield (
+            f"modes {other.tolist()} are by their shapes other modes of the optimum than the columns of model_ with "
+            "their numbers: expected measured modes in the model's order, or track=True where modes swap"
+        )
+
+
+def doubtful_parameters(names: Sequence[str], theta: Array, bounds: Array, covariance: Array | None) -> Iterator[str]:
+    """Warnings about parameters at their bounds and, without a prior, those that the modes do not determine."""
+    at_bound = np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
+    if at_bound.any():
+        listed = ", ".join(f"{names[i]!r} ({theta[i]:.3g})" for i in np.flatnonzero(at_bound))
+        yield f"the optimum lies at the bounds of {listed}: expected wider bounds, or another model"
+    if covariance is not None:
+        deviations = np.sqrt(np.diagonal(covariance))
+        undetermined = ~(deviations < LARGE_DEVIATION * np.nanmin(deviations))
+        if undetermined.any() and not undetermined.all():
+            listed = [names[i] for i in np.flatnonzero(undetermined)]
+            yield f"{listed} hardly move the measured modes and are not determined: leave them out, or give a prior"
+
+
+def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[str]:
+    """Warnings about frequencies of the updated model that noise cannot explain."""
+    far = table["error_after"].abs() > LARGE_ERROR
+    if far.any():
+        units = " (rad/s instead of Hz?)" if seem_rad_per_s(table["measured"] / table["after"]) else ""
+        yield (
+            f"the updated model misses {table.index[far].tolist()} by more than {LARGE_ERROR:g} %{units}: expected "
+            "frequencies in Hz, in the order of the model's modes"
+        )
+    elif not np.array_equal(measured.deviations, measured.frequencies, equal_nan=True):
+        residuals = np.abs(table["after"].to_numpy() - measured.frequencies) / measured.deviations
+        if (beyond := residuals > NOISE_LIMIT).any():
+            yield (
+                f"the updated model misses {table.index[beyond].tolist()} by up to {np.nanmax(residuals):.0f} standard "
+                "deviations of frequency_std: noise does not explain that, and covariance_ is too small"
+            )
+
+
+def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
+    """Columns that hold another mode at theta than at the nominal parameters."""
+    if getattr(model, "track", True):
+        return np.zeros(model.n_modes, bool)
+    if hasattr(model, "local_modes"):
+        return np.asarray(model.local_modes(theta, follow=True).ranks != np.arange(model.n_modes))
+    has_shapes = hasattr(model, "modes")
+    return np.full(model.n_modes, has_shapes and share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)

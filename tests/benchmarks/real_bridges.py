@@ -1,0 +1,110 @@
+"""The real Z24 bridge and the real tower, beside their targets.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/real_bridges.py [FOLDER]
+
+FOLDER, by default the one that the environment variable SKTHERMO_DATA names, holds ``z24/z24_monitoring.csv`` and
+``tower/tower.csv``; what is not there is left out. Prints each target, what was found, and whether it is met. The exit
+code is 1 if one is missed.
+"""
+
+import argparse
+import contextlib
+import io
+import os
+import runpy
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
+
+import z24_damage_recipes as damage
+import z24_recipes as z24
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+EXPECTED_WARNINGS = (
+    r"\d+ of \d+ rows have temperatures far outside",
+    "groups that these modes cannot tell apart",
+    r"\d+ independent baseline records are too few",  # of windows, in ten days
+)
+
+
+def targets_of_prediction(bridge):
+    """The last fifth of the healthy records, predicted by the chain and by the same regressor without one."""
+    table = z24.hold_out_table(bridge, [(True, 0.3), (True, 0.5)])
+    ratios = table["ratio"].drop(["broken lines, T to F", "boosted trees, T to F"])
+    yield "error of four chains over that of a direct regression, largest", ratios.max(), "< 1.03"
+    yield "error, broken lines, bounds 0.3, %", table["mean"]["broken lines, chain, tracked, bounds 0.3"], "< 0.62"
+
+
+def targets_of_detection(bridge):
+    """Residuals whitened by weather."""
+    records = z24.Records.of(bridge)
+    found = {
+        name: z24.compensate(records, estimator, "local")[0]
+        for name, estimator in (("broken lines", z24.TemperatureMapper()), ("trees", z24.boosting()))
+    }
+    table = z24.alarm_table(found)
+    days = z24.found_by_day({("broken lines", z24.WHITENED): found["broken lines"]}).loc["found"]
+    yield "false alarms, %, larger of two", table["false alarms"].max(), "<= 3"
+    yield "damage found, %, smaller of two", table["damage found"].min(), ">= 80"
+    yield "damage found from the third day, %, smallest", days.iloc[2:].min(), ">= 100"
+
+
+def targets_of_identification(bridge):
+    """The damage that explains the shifts, and the rates that it lets one expect."""
+    fem, found = damage.identify(bridge)
+    unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
+    names = [f"broken lines, {label}" for label in z24.SCALES]
+    table = damage.simulation_table(bridge, z24.Records.of(bridge), fem, found, names, n_repeats=10)
+    rates = table.loc["damage found"]
+    outside = ~rates["measured"].between(rates["lowest"], rates["highest"])
+    yield "unexplained shift, standard errors, largest", unexplained.abs().max(), "< 2"
+    yield "the soil's damage is significant", float(found.table.loc["soil", "significant"]), ">= 1"
+    yield "measured rates outside the simulated band", float(outside.sum()), "<= 0"
+
+
+def targets_of_the_tower(log):
+    """The page for a structure of one's own, without its deliberate mistakes."""
+    import tower_recipes
+
+    tower_recipes.said = lambda *_: []
+    with tempfile.TemporaryDirectory() as figures, contextlib.redirect_stdout(io.StringIO()):
+        sys.argv = ["plot_your_own_structure.py", str(log), "--figures", figures]
+        errors = runpy.run_path(str(EXAMPLES / sys.argv[0]), run_name="__main__")["errors"]
+    over_mean = errors.loc["chain"] / errors.loc["training mean"]
+    yield "tower, error over that of the training mean, largest", over_mean.max(), "< 1"
+    yield "tower, error over that of ridge", errors["mean"]["chain"] / errors["mean"]["ridge, T to F"], "< 1.2"
+
+
+def is_met(found, target):
+    relation, limit = target.split()
+    return {"<": found < float(limit), "<=": found <= float(limit), ">=": found >= float(limit)}[relation]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"))
+    folder = parser.parse_args().folder
+    if folder is None:
+        parser.error("expected the folder of data, or its name in SKTHERMO_DATA")
+    for message in EXPECTED_WARNINGS:
+        warnings.filterwarnings("ignore", message=message)
+    targets, tower = [], Path(folder) / "tower" / "tower.csv"
+    if any((Path(folder) / name).is_file() for name in z24.FILES):
+        bridge = z24.Bridge(z24.find(Path(folder)))
+        targets += [targets_of_prediction(bridge), targets_of_detection(bridge), targets_of_identification(bridge)]
+    if tower.is_file():
+        targets.append(targets_of_the_tower(tower))
+    if not targets:
+        parser.error(f"{folder} has neither z24/z24_monitoring.csv nor tower/tower.csv")
+    missed = 0
+    for what, found, target in (row for rows in targets for row in rows):
+        missed += not is_met(found, target)
+        print(f"{'met' if is_met(found, target) else 'MISSED':7} {what}: {found:.3g}, target {target}", flush=True)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,281 @@
+"""The report for owners: a sound page that says what the study found, whatever names the data have."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+
+from skthermo.datasets import kw51_structure
+from skthermo.preprocessing import LagFeatures
+from skthermo.reporting import owner_report
+from skthermo.reporting._html import STYLE
+from skthermo.reporting._identified import identified_damage, identified_sentences
+from skthermo.studies import (
+    DetectabilityStudy,
+    ProgressiveDamage,
+    Scenario,
+    UncertainDamage,
+    identify_damage,
+    sweep,
+)
+from tests.reporting.pages import HOSTILE, MODES, QUOTED, SENSOR, Page, fitted_chain, run_study
+
+plt = pytest.importorskip("matplotlib.pyplot")
+plt.switch_backend("Agg")
+
+ALWAYS = ["answer", "monitored", "model", "found", "settings"]
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return fitted_chain()
+
+
+@pytest.fixture(scope="module")
+def study(chain):
+    fem, T, _ = chain
+    scenarios = [
+        *sweep(fem, (0.05, 0.1, 0.2)),
+        ProgressiveDamage(f"growing {HOSTILE}", {HOSTILE: 0.2}, onset=40, end=80),
+        UncertainDamage("uncertain", pd.DataFrame({QUOTED: [0.1, 0.2]})),
+        Scenario("retrofit", mass=[1.0, 0.0, 0.0]),
+    ]
+    return run_study(fem, T, scenarios)
+
+
+@pytest.fixture(scope="module")
+def identified(chain):
+    fem, T, _ = chain
+    damaged = fem.simulate(T, damage={HOSTILE: 0.2}, noise="fitted", random_state=3)
+    return identify_damage(fem, T, damaged, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def file(study, identified, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "bridge.html"
+    assert owner_report(study, path, identified=identified, title=HOSTILE, structure=kw51_structure()) == path
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(file):
+    return Page(file.read_text(encoding="utf-8"))
+
+
+def test_it_is_one_sound_page_without_network_or_script(page):
+    assert page.all("html") == [{"lang": "en"}]
+    assert [tag["id"] for tag in page.all("section")] == [*ALWAYS[:4], "identified", "settings"]
+    ids = page.values("id")
+    assert len(set(ids)) == len(ids)
+    assert set(page.values("aria-labelledby")) <= set(ids)
+    assert [link[1:] for link in page.values("href")] == [*ALWAYS[:4], "identified", "settings"]
+    assert all(link.startswith("#") for link in page.values("href"))
+    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "iframe", "object", "form")]
+    assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
+    assert not re.search(r"url\(|@import|https?:", STYLE)
+
+
+def test_it_can_be_read_without_seeing_it(page):
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert max(np.diff(levels)) <= 1
+    assert all(len(image["alt"]) > 20 for image in page.all("img"))
+    tags = [tag for tag, _ in page.tags]
+    assert all(tags[i + 1] == "caption" for i, tag in enumerate(tags) if tag == "table")
+    assert all(head["scope"] in ("col", "row") for head in page.all("th"))
+
+
+def test_names_of_data_are_text_and_nothing_else(page, study, file):
+    for name in (HOSTILE, QUOTED, SENSOR, *MODES, *study.results_["scenario"]):
+        assert name in page.text
+    assert not [tag for tag in page.all("img") if "onerror" in tag or tag["src"] == "x"]
+    assert "<title>&lt;script&gt;" in file.read_text(encoding="utf-8")
+    tags = {element.tag.split("}")[-1] for drawing in page.drawings() for element in drawing.iter()}
+    assert "path" in tags
+    assert "script" not in tags
+
+
+def test_the_page_says_what_the_table_says(page, study):
+    limits = study.minimum_detectable_damage()["mdd"].xs("data-informed", level="source")
+    for family, limit in limits.items():
+        said = f"damage of {100 * limit:g}\xa0% or more is found" if limit > 0 else "no tested damage is found reliably"
+        assert f"{family}: {said}" in page.text
+    false_alarms = study.results_.loc[0, "rate"]
+    said = re.search(r"Of the records of the healthy structure, ([\d.]+)\xa0% raise an alarm", page.text)
+    assert float(said[1]) == pytest.approx(100 * false_alarms, rel=0.05)
+    missed = (study.results_["measure"] == "POD") & (study.results_["rate"] < 0.9)
+    assert f"{missed.sum()} would not be found reliably" in page.text
+    assert "3.3\xa0%" in page.text  # 4 of 120 records lack the second mode
+
+
+def test_identified_damage_is_said_first_and_in_full(page, identified):
+    severity, error = identified.table.loc[HOSTILE, ["severity", "standard_error"]]
+    said = f"{HOSTILE} has lost {100 * severity:.1f}\xa0% of its stiffness (± {200 * error:.1f}\xa0%)."
+    assert page.text.count(said) == 2
+    assert page.text.index(said) < page.text.index("False alarms")
+
+
+def test_what_cannot_be_identified_is_said(identified):
+    changes = {"confused": [(HOSTILE, "deck")], "unseen": ["piers"], "misfit_p_value": 0.01}
+    table = identified.table.reindex([*identified.table.index, "piers"])
+    table["significant"] = False
+    doubtful = replace(identified, table=table, **changes)
+    text = Page(identified_damage(doubtful)).text
+    assert f"{HOSTILE} and deck cannot be told apart" in text
+    assert "Damage in piers cannot be seen" in text
+    assert "something else has changed too" in text
+    assert "No group is clearly damaged." in text
+    doubtful = replace(doubtful, misfit_p_value=np.nan, confused=[], unseen=[])
+    text = Page(identified_damage(doubtful)).text
+    assert "no more modes than groups" in text
+
+
+def test_what_damage_does_not_explain_is_said_where_damage_is_named(study, identified, tmp_path):
+    table, shifts = identified.table.copy(), identified.shifts.copy()
+    table["severity"], table["standard_error"], table["significant"] = [0.149, 0.003], [0.0005, 0.001], True
+    shifts["measured"] = shifts["explained"] + [0, 5, 0] * shifts["standard_error"]
+    misfit = replace(identified, table=table, shifts=shifts, misfit_p_value=3e-5)
+    page = Page(owner_report(study, tmp_path / "a.html", identified=misfit).read_text(encoding="utf-8"))
+    headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
+    assert "Damage of these groups does not explain all shifts" in headline
+    assert f"{HOSTILE} has lost 14.9\xa0% of its stiffness (± 0.1\xa0%), if nothing else has changed." in headline
+    assert f"It is doubtful whether {QUOTED} is damaged: a loss of 0.3\xa0% (± 0.2\xa0%)" in headline
+    assert [cell for cell in page.cells if cell.startswith(("yes", "doubtful"))] == [
+        "yes, if nothing else has changed",
+        "doubtful",
+    ]
+    warned = page.text[page.text.rindex("Warnings") :]
+    assert "Identified damage: damage of these groups does not explain the shifts (probability 3e-05)" in warned
+    explained = identified_sentences(replace(misfit, misfit_p_value=0.5))
+    assert f"{QUOTED} has lost 0.3\xa0% of its stiffness (± 0.2\xa0%)." in explained
+    assert not [sentence for sentence in explained if "doubtful" in sentence or "not explain" in sentence]
+
+
+def test_lags_are_no_sensors(tmp_path):
+    fem, T, F = fitted_chain(n_records=60)
+    lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), T.rename(columns={SENSOR: "deck"})], axis=1)
+    lagged["deck_lag2"], lagged["north_lag3"] = T[SENSOR].shift(2).bfill(), T[SENSOR].shift(3).bfill()
+    study = run_study(clone(fem).fit(lagged, F), lagged, [Scenario("healthy")])
+    page = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
+    assert "with 3\xa0temperatures, with lags, and 3\xa0natural frequencies each" in page.text
+    sensors = page.heads[page.heads.index("Sensor") :]
+    assert [sensor for sensor in sensors if "deck" in sensor or "north" in sensor or SENSOR in sensor] == [
+        f"{SENSOR}, with 1\xa0lag",
+        "deck, with 1\xa0lag",
+        "north_lag3",
+    ]
+
+
+def test_the_time_to_the_first_alarm_says_when_it_begins(page):
+    assert "with the first record of the simulated weather, 2024-01-01 00:00." in page.text
+
+
+def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
+    fem, T, _ = fitted_chain(index=False)
+    scenarios = [Scenario("one", {HOSTILE: 0.2})]
+    truth = fem.simulate(T, damage={HOSTILE: 0.2}, noise=0.005, random_state=5)
+    study = run_study(fem, T, scenarios, reference={"one": truth})
+    study.threshold_ = None  # as of detectors without one
+    page = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
+    assert "how often alarms are false is not known" in page.text
+    assert "Only one severity was tested" in page.text
+    assert "In 1\xa0scenario, the simulations were compared with reference records" in page.text
+    assert "What the alarm system sees" not in page.text
+    assert [tag["id"] for tag in page.all("section")] == ALWAYS
+
+
+def test_a_study_of_the_healthy_structure_alone(chain, tmp_path):
+    study = run_study(*chain[:2], [Scenario("healthy")])
+    text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
+    assert "No damage was tested." in text
+    assert "there is no smallest damage to report" in text
+
+
+@pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
+def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
+    fem, T, _ = chain
+    with pytest.warns(UserWarning, match="far outside") as caught:
+        study = run_study(fem, T + 60, [Scenario("healthy")])
+    assert study.warnings_ == [str(warning.message) for warning in caught]
+    text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
+    assert all(warning in text for warning in study.warnings_)
+    assert "There was no warning" not in text
+
+
+def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(file, study, identified, tmp_path):
+    opened = plt.figure()
+    with plt.style.context("dark_background"):
+        again = owner_report(
+            study, tmp_path / "a.html", identified=identified, title=HOSTILE, structure=kw51_structure()
+        )
+    assert plt.get_fignums() == [opened.number]
+    plt.close(opened)
+    assert Page(again.read_text(encoding="utf-8")).values("src") == Page(file.read_text(encoding="utf-8")).values("src")
+
+
+def test_an_older_report_stays_until_the_new_one_is_complete(chain, tmp_path, monkeypatch):
+    study = run_study(*chain[:2], [Scenario("healthy")])
+    path = tmp_path / "a.html"
+    path.write_text("older")
+
+    def fails(*args):
+        raise OSError("the disk is full")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("os.replace", fails)
+        with pytest.raises(OSError, match="disk is full"):
+            owner_report(study, path)
+    assert path.read_text() == "older"
+    assert list(tmp_path.iterdir()) == [path]
+    owner_report(study, str(path))
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_wrong_paths_and_studies_without_results(chain, study, tmp_path):
+    with pytest.raises(ValueError, match=r"there is no folder .*missing"):
+        owner_report(study, tmp_path / "missing" / "a.html")
+    with pytest.raises(ValueError, match="a folder; expected a file"):
+        owner_report(study, tmp_path)
+    with pytest.raises(NotFittedError, match="expected a call of run"):
+        owner_report(DetectabilityStudy(chain[0], None, []), tmp_path / "a.html")
+
+
+@pytest.mark.parametrize("number", [0, 1], ids=["light", "dark"])
+def test_text_has_enough_contrast(number):
+    """Contrast of at least 4.5, as WCAG 2 asks of text at level AA."""
+    colours = dict(re.findall(r"--(\w+): (#\w{6})", STYLE.split("@media")[number]))
+    for text in ("text", "soft", "accent"):
+        for ground in ("page", "card"):
+            assert contrast(colours[text], colours[ground]) >= 4.5
+    assert contrast(colours["text"], colours["bar"]) >= 4.5
+
+
+def contrast(first, second):
+    darker, lighter = sorted(luminance(colour) for colour in (first, second))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def luminance(colour):
+    channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    return linear @ [0.2126, 0.7152, 0.0722]
+
+
+def test_families_of_damage_and_strengthening_are_named(chain, tmp_path):
+    study = run_study(*chain[:2], [Scenario(f"part {severity}", {HOSTILE: severity}) for severity in (-0.1, 0.2)])
+    text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
+    assert f"{HOSTILE}: of damage and strengthening together" in text
+    assert "No damage group was tested" not in text
+
+
+def test_what_is_no_study_and_no_identified_damage_is_named(study, chain, tmp_path):
+    with pytest.raises(ValueError, match="study is DataInformedFEM"):
+        owner_report(chain[0], tmp_path / "a.html")
+    with pytest.raises(ValueError, match=r"identified is \{'top': 0.1\}; expected what identify_damage gives"):
+        owner_report(study, tmp_path / "a.html", identified={"top": 0.1})

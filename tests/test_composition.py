@@ -1,0 +1,69 @@
+"""Classes are composed, not chained, and files and folders can be read: no mixin with one user, no crowd, no crumbs."""
+
+import importlib
+import inspect
+import pkgutil
+import re
+from collections import Counter
+from pathlib import Path
+
+import skthermo
+
+PACKAGE = Path(skthermo.__file__).parent
+HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"
+FILES = sorted(PACKAGE.rglob("*.py"))
+MOST_SIDE_BY_SIDE = 14  # modules of a package, beside its __init__.py
+SHORT = 40
+SHORT_FILES = {  # private files of fewer lines, and why they stand alone
+    "_io/_locks.py": "readers of files and the memory of an inverse share it",
+    "_models.py": "estimators of several packages share it",
+    "_optional.py": "packages import it wherever something optional is needed",
+    "_pipelines.py": "estimators of several packages share it",
+}
+
+
+def classes():
+    """All classes that skthermo defines."""
+    modules = [importlib.import_module(m.name) for m in pkgutil.walk_packages(skthermo.__path__, "skthermo.")]
+    found = {member for module in modules for _, member in inspect.getmembers(module, inspect.isclass)}
+    return {thing for thing in found if thing.__module__.startswith("skthermo")}
+
+
+def public():
+    """Names that users import."""
+    rooms = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
+    modules = map(importlib.import_module, rooms)
+    return {getattr(module, name) for module in modules for name in module.__all__ if callable(getattr(module, name))}
+
+
+def assert_none(wrong, instead):
+    assert not wrong, f"{instead}\n" + "\n".join(sorted(wrong))
+
+
+def test_no_private_class_has_one_child():
+    ours = classes()
+    children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - public())
+    single = {base for base, number in children.items() if number == 1}
+    chains = [
+        f"{thing.__qualname__}({base.__qualname__})" for thing in ours for base in thing.__bases__ if base in single
+    ]
+    assert_none(chains, "expected one class, or an object that it holds:")
+
+
+def test_a_folder_can_be_overlooked():
+    beside = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES if path.name != "__init__.py")
+    full = [f"{folder} has {number} files" for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE]
+    assert_none(full, f"expected {MOST_SIDE_BY_SIDE} beside __init__.py, or a package within:")
+
+
+def test_short_files_have_a_reason():
+    private = [path for path in FILES if path.name.startswith("_") and path.name != "__init__.py"]
+    short = {path.relative_to(PACKAGE).as_posix() for path in private if len(path.read_text().splitlines()) < SHORT}
+    assert_none(short - set(SHORT_FILES), f"expected {SHORT} lines, a place beside the only user, or a reason above:")
+    assert_none(set(SHORT_FILES) - short, "not short:")
+
+
+def test_the_guide_for_contributors_lists_what_all_packages_share():
+    section = HOUSE.read_text().partition("What every package may use\n")[2].partition("\nDependencies\n")[0]
+    listed = set(re.findall(r"\* - ``(\w+?)(?:\.py)?``", section))
+    assert listed == {path.stem for path in PACKAGE.glob("_*") if path.name not in ("__init__.py", "__pycache__")}

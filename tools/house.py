@@ -1,0 +1,80 @@
+"""How large each package is, and how many files a reader opens who follows a chain and a study.
+
+    python tools/house.py [--files]
+
+For each package: its files and their lines, packages within it included, and how many of its files are entered by
+``DataInformedFEM.fit``, ``DataInformedFEM.simulate`` and ``DetectabilityStudy.run`` on the truss, as Python's profiler
+sees it. Reads the skthermo that is imported (``PYTHONPATH`` chooses another tree).
+"""
+
+import argparse
+import sys
+import threading
+from pathlib import Path
+
+import skthermo
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.studies import DetectabilityStudy, sweep
+from skthermo.surrogate import DataInformedFEM
+
+PACKAGE = Path(skthermo.__file__).parent
+
+
+def entered(call, *arguments, **options):
+    """Files of the package whose functions a call enters, and its result."""
+    files = set()
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code.co_name != "<module>":  # imports are not entered
+            files.add(frame.f_code.co_filename)
+
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        result = call(*arguments, **options)
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    inside = {Path(file) for file in files if file.startswith(str(PACKAGE))}
+    return {file.relative_to(PACKAGE) for file in inside}, result
+
+
+def actions():
+    """Files that each action enters."""
+    year, later = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
+    chain = DataInformedFEM(make_truss(), random_state=0)
+    fit, chain = entered(chain.fit, year.temperatures, year.frequencies)
+    damage = {"bottom": 0.2}
+    simulate, _ = entered(chain.simulate, later.temperatures, damage=damage, noise="fitted", random_state=0)
+    scenarios = sweep(chain, (0.1, 0.2), groups=["bottom"])
+    study = DetectabilityStudy(chain, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0)
+    run, _ = entered(study.run, later.temperatures)
+    return {"fit": fit, "simulate": simulate, "run": run}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--files", action="store_true", help="name the files that are entered")
+    by_name = parser.parse_args().files
+    files = sorted(path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
+    lines = {file: len((PACKAGE / file).read_text().splitlines()) for file in files}
+    by_action = actions()
+    print(f"{'package':24}{'files':>7}{'lines':>8}" + "".join(f"{action:>10}" for action in by_action))
+    packages = sorted({parent for file in files for parent in file.parents if parent != Path()})
+    print_row("directly in skthermo", [file for file in files if file.parent == Path()], lines, by_action)
+    for package in packages:
+        inside = [file for file in files if package in file.parents]
+        print_row("  " * (len(package.parts) - 1) + package.name, inside, lines, by_action)
+    print_row("all", files, lines, by_action)
+    for action, found in by_action.items() if by_name else ():
+        print(f"\n{action} enters", *(file.as_posix() for file in sorted(found)), sep="\n  ")
+
+
+def print_row(name, files, lines, by_action):
+    counts = "".join(f"{len(found & set(files)):10}" for found in by_action.values())
+    print(f"{name:24}{len(files):7}{sum(lines[file] for file in files):8}{counts}")
+
+
+if __name__ == "__main__":
+    main()
