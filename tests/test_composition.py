@@ -19,6 +19,7 @@ SHORT_FILES = {  # private files of fewer lines, and why they stand alone
     "_models.py": "estimators of several packages share it",
     "_optional.py": "packages import it wherever something optional is needed",
     "_pipelines.py": "estimators of several packages share it",
+    "detection/_thresholds.py": "detectors of records and of windows share it",
 }
 
 
