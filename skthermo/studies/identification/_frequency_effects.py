@@ -72,7 +72,7 @@ class FrequencyEffects:
             self.simulators[level] = self.fem.simulator_.with_damage_parameters(self.groups, 0.0, level)
         simulator = self.simulators[level]
         theta = np.hstack([self.theta, np.tile(1 - severities, (len(self.theta), 1))])
-        frequencies, jacobian = simulator.linearise(theta, self.fem.n_jobs)
+        frequencies, jacobian = simulator.linearise(theta, self.fem.n_jobs, relative=True)
         return frequencies, -jacobian[:, :, -len(self.groups) :] / (1 - severities)
 
     def _differenced(self, severities: Array) -> tuple[Array, Array]:
