@@ -175,7 +175,7 @@ def test_somebody_elses_file_is_refused_and_kept(file, content):
     file.parent.mkdir()
     file.write_bytes(content)
     for use in (lambda: CallableModel(three_modes, NAMES, 3, cache=file), lambda: model.frequencies(THETA)):
-        with pytest.raises(ValueError, match="the file holds something that is no cache of solved samples"):
+        with pytest.raises(ValueError, match="the file holds something that is not a cache of solved samples"):
             use()
     assert file.read_bytes() == content
 
