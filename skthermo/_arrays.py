@@ -1,6 +1,6 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
 from typing import Any, TypeAlias
 
@@ -139,3 +139,20 @@ def rows_by_pattern(mask: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], ND
     masks, of_row = patterns(mask)
     order = np.argsort(of_row, kind="stable")
     return list(zip(masks, np.split(order, np.cumsum(np.bincount(of_row))[:-1]), strict=True)) if len(mask) else []
+
+
+def central_differences(function: Callable[[Array], Array], theta: Array, values: Array, step: float) -> Array:
+    """Derivatives of a function at rows of theta by a relative step, (n_samples, ..., n_parameters).
+
+    The function turns rows of theta into values (n_rows, ...); where it is NaN on one side, ``values``, those at theta,
+    take its place.
+    """
+    n_samples, n_parameters = theta.shape
+    steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
+    moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])
+    sides = function(moved.reshape(-1, n_parameters)).reshape(2, n_samples, n_parameters, *values.shape[1:])
+    known = ~np.isnan(sides)
+    above, below = np.where(known, sides, values[:, np.newaxis])
+    n_known = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    widths = n_known * (step * theta).reshape(n_samples, n_parameters, *[1] * (values.ndim - 1))
+    return np.moveaxis((above - below) / widths, 1, -1)

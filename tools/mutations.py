@@ -40,7 +40,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
         ("shape derivative of tracked modes", "model.local_modes(row, follow=True)", "model.local_modes(row)"),
     ],
-    ("_differences.py", "fem/test_linearise.py"): [
+    ("_arrays.py", "fem/test_linearise.py"): [
         ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
     ],
     ("fem/sampling/_linearise.py", "fem/test_linearise.py"): [

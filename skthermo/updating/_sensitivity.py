@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_model, check_theta
-from skthermo._arrays import Array, real_array
-from skthermo._differences import central_differences
+from skthermo._arrays import Array, central_differences, real_array
 from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))

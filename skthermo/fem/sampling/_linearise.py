@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array
-from skthermo._differences import central_differences
+from skthermo._arrays import Array, central_differences
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
