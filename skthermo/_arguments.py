@@ -130,13 +130,7 @@ def is_model(candidate: Any) -> bool:
 
 
 def check_model(candidate: Any) -> None:
-    """Raise an error for an object that is not an FE model.
-
-    Raises
-    ------
-    ValueError
-        Says what was given.
-    """
+    """Raise an error for an object that is not an FE model."""
     if not is_model(candidate):
         raise ValueError(
             f"model is {candidate!r:.200}; expected an FE model, an object with parameter_names, n_modes and "

@@ -26,13 +26,7 @@ def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what
 
 
 def real_array(values: Any, what: str) -> Array:
-    """An array of floats; complex numbers, sparse matrices and values that are not numbers are errors.
-
-    Raises
-    ------
-    ValueError
-        Names what was given.
-    """
+    """An array of floats; complex numbers, sparse matrices and values that are not numbers are errors."""
     if values is None:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
@@ -46,13 +40,7 @@ def real_array(values: Any, what: str) -> Array:
 
 
 def as_floats(values: Any) -> Array:
-    """An array of floats; values that are masked or missing become NaN.
-
-    Raises
-    ------
-    ValueError
-        If values are complex.
-    """
+    """An array of floats; values that are masked or missing become NaN."""
     values = without_mask(values)
     is_pandas = hasattr(values, "iloc")
     array: Any = values if is_pandas else np.asarray(values)
@@ -101,13 +89,7 @@ def positive_integer(value: Any, what: str) -> int:
 
 
 def as_random_state(seed: Any) -> np.random.RandomState:
-    """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas.
-
-    Raises
-    ------
-    ValueError
-        If the seed is of another type, such as a numpy Generator.
-    """
+    """scikit-learn's `check_random_state`, imported on first use because scikit-learn imports pandas."""
     from sklearn.utils import check_random_state
 
     try:

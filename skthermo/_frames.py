@@ -32,13 +32,7 @@ def column_names(X: Any, default: str) -> list[Hashable]:
 
 
 def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal.
-
-    Raises
-    ------
-    ValueError
-        Names the column.
-    """
+    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal."""
     for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
         present = column[~np.isnan(column)]
         if not present.size:
@@ -55,11 +49,6 @@ def check_temperatures(T: ArrayLike) -> None:
 
     Numbers above 100 or below -80 count as missing values if they differ by more than 100 from the rest of their
     column; so does any number below absolute zero.
-
-    Raises
-    ------
-    ValueError
-        Names the column.
     """
     for name, column in zip(column_names(T, PREFIXES["temperature"]), as_floats(T).T, strict=True):
         if np.fmin.reduce(column) >= -80 and np.fmax.reduce(column) <= 100:
@@ -134,13 +123,7 @@ def first_disorder(X: Any) -> int:
 
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
-    """Raise an error if two tables differ in length or, where both are frames, in index.
-
-    Raises
-    ------
-    ValueError
-        Names the first row that differs.
-    """
+    """Raise an error if two tables differ in length or, where both are frames, in index."""
     if _num_samples(X) != _num_samples(y):
         raise ValueError(
             f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"

@@ -46,13 +46,7 @@ def weights_for(estimator: BaseEstimator, sample_weight: Array | None) -> dict[s
 
 
 def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
-    """Means and standard deviations of all outputs.
-
-    Raises
-    ------
-    ValueError
-        If the regressor gives no standard deviations.
-    """
+    """Means and standard deviations of all outputs."""
     if isinstance(regressor, MultiOutputRegressor):
         parts = [predict_with_std(part, X) for part in regressor.estimators_]
         means, deviations = (np.hstack(columns) for columns in zip(*parts, strict=True))

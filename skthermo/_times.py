@@ -19,13 +19,7 @@ def row_times(T: Any) -> Array:
 
 
 def time_of(T: Any, moment: Any, what: str) -> float:
-    """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last.
-
-    Raises
-    ------
-    ValueError
-        If it is neither.
-    """
+    """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last."""
     times, is_timed = row_times(T), _has_stamps(T)
     if isinstance(moment, Integral) and not isinstance(moment, bool) and moment >= 0:
         return float(times[moment]) if moment < len(times) else np.inf

@@ -80,13 +80,7 @@ def check_array(values: Any, **options: Any) -> Any:
 
 
 def refuse_times(table: Any) -> None:
-    """Raise an error for a column of times in a frame of pandas or Polars, which would count as numbers or fail later.
-
-    Raises
-    ------
-    ValueError
-        Names the column.
-    """
+    """Refuse a column of times in a frame of pandas or Polars, which would count as numbers or fail later."""
     if not (hasattr(table, "columns") and hasattr(table, "dtypes")):
         return
     for name, dtype in zip(table.columns, table.dtypes, strict=True):

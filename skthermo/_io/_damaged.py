@@ -29,11 +29,6 @@ def read_matlab(file: Path) -> dict[str, Any]:
     Numbers become arrays of floats or complex numbers with all their dimensions, or sparse matrices; texts a list of
     one text for each row; cell arrays a list of their values, the first dimension running fastest; structs a mapping
     of their fields, and arrays of structs a list of such mappings. Anything else becomes None.
-
-    Raises
-    ------
-    ValueError
-        Names the file, and the variable if that is damaged.
     """
     return read_files([(file, "MATLAB v5")])[0]
 
@@ -44,13 +39,7 @@ def read_half(file: Path) -> Any:
 
 
 def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
-    """What files hold; each comes with its form, one of the child's ``READERS``.
-
-    Raises
-    ------
-    ValueError
-        Names the first file that is damaged or something else, or would need too much memory or time.
-    """
+    """What files hold; each comes with its form, one of the child's ``READERS``."""
     size = sum(file.stat().st_size for file, _ in files)
     most_memory = max(TIMES_THE_FILE * size, LEAST_MEMORY)
     job = {"files": [(str(file), form) for file, form in files], "most_memory": most_memory}

@@ -20,13 +20,6 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str,
     """Matrices by name, in the file's order; None for what is not a matrix of numbers.
 
     Values may be complex or not finite. Of a folder, only files whose stem is used are read, the others are None.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is nothing at the path.
-    ValueError
-        Names the file, and the variable where it is known, that is damaged.
     """
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected {FORMATS}")

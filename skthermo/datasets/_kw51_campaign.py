@@ -79,13 +79,7 @@ def stiffness_factors(
     damage: Mapping[str, float] | None,
     damage_from: Any,
 ) -> pd.DataFrame:
-    """Factor of the stiffness of each changed group in every hour.
-
-    Raises
-    ------
-    ValueError
-        If a group is unknown, a value is not a number, no stiffness is left, or the time of damage is not in the index.
-    """
+    """Factor of the stiffness of each changed group in every hour."""
     years = pd.Series(np.arange(len(index)) / YEAR, index)
     is_damaged = pd.Series(index >= _onset(index, damage_from), index)
     lost = {

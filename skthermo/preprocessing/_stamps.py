@@ -12,14 +12,7 @@ DATE_AS_TEXT = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 
 
 def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
-    """An index of stamps as a DatetimeIndex, periods by their start; None for an index of something else.
-
-    Raises
-    ------
-    ValueError
-        If the index holds durations, stamps as text, stamps on one of several levels, or offsets of several
-        time zones.
-    """
+    """An index of stamps as a DatetimeIndex, periods by their start; None for an index of something else."""
     if isinstance(index, pd.DatetimeIndex):
         return index
     if isinstance(index, pd.PeriodIndex):
@@ -49,13 +42,7 @@ def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
 
 
 def as_duration(value: Any, name: str) -> np.timedelta64:
-    """A positive duration of fixed length; that called "tolerance" may be zero.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """A positive duration of fixed length; that called "tolerance" may be zero."""
     units = re.findall("[A-Za-z]+", value) if isinstance(value, str) else None
     if any(unit.isupper() and unit not in LONE_CAPITALS for unit in units or ()):
         raise ValueError(

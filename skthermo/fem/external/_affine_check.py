@@ -62,13 +62,7 @@ def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
 
 
 def check_affine(program: Program, terms: tuple[Terms, Terms], row: Array) -> None:
-    """Raise an error if the matrices of a program at a row of multipliers are not the sum of its terms.
-
-    Raises
-    ------
-    ValueError
-        Names the parameter, or the two parameters, in which the program is not affine.
-    """
+    """Raise an error if the matrices of a program at a row of multipliers are not the sum of its terms."""
     if _difference(program, terms, row) is None:
         return
     names = program.parameter_names

@@ -42,13 +42,7 @@ class SampleCache:
         self._inode, self._end = 0, 0
 
     def read(self) -> Mapping[bytes, Array]:
-        """Frequencies, keyed by the bytes of their theta. Reads only what was appended since the last call.
-
-        Raises
-        ------
-        ValueError
-            If the file was written for other parameters or modes, or is something else, such as a folder.
-        """
+        """Frequencies, keyed by the bytes of their theta. Reads only what was appended since the last call."""
         if self.path.is_dir():
             raise ValueError(f"{self.path}: the cache is a folder; expected a file, such as {self.path / 'solved'}")
         if not self.path.exists():

@@ -25,13 +25,7 @@ class Poles(NamedTuple):
 
 
 def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
-    """The poles of records as `ModeTracker.transform` takes them; without ``n_sensors`` shapes are not read.
-
-    Raises
-    ------
-    ValueError
-        If a field is missing, the fields do not fit each other or the sensors, or a frequency is not positive.
-    """
+    """The poles of records as `ModeTracker.transform` takes them; without ``n_sensors`` shapes are not read."""
     fields, given_sensors = _fields(X)
     if n_sensors is not None and fields["shapes"] is None:
         raise ValueError("X has no 'shapes'; expected mode shapes, as in the reference, or a reference without shapes")

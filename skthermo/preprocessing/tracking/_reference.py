@@ -51,13 +51,7 @@ class ReferenceModes(NamedTuple):
 
 
 def read_reference(reference: Any) -> ReferenceModes:
-    """The reference modes, checked.
-
-    Raises
-    ------
-    ValueError
-        If frequencies or shapes are missing, not finite, not positive or do not fit each other.
-    """
+    """The reference modes, checked."""
     if isinstance(reference, Mapping):
         missing = [name for name in ("frequencies", "shapes") if name not in reference]
         if missing:

@@ -119,13 +119,7 @@ def shape_inputs_of(inverse: Any) -> ShapeInputs | None:
 
 
 def with_shapes(inverse: Any, F: Any, shapes: ArrayLike | None) -> Any:
-    """Frequencies with the columns of shapes that an inverse expects; NaN there without shapes.
-
-    Raises
-    ------
-    ValueError
-        If shapes are given to an inverse without ``dofs``, or have another size.
-    """
+    """Frequencies with the columns of shapes that an inverse expects; NaN there without shapes."""
     inputs = shape_inputs_of(inverse)
     if inputs is None:
         if shapes is not None:
