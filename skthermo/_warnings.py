@@ -12,8 +12,7 @@ from weakref import WeakKeyDictionary
 
 from joblib import Parallel
 
-PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}
-"""Packages whose lines are not the user's."""
+PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}  # packages whose lines are not the user's
 
 _given: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
 """Kinds of warnings that the jobs of each cross-validation or search, or a worker process, have given."""

@@ -26,7 +26,6 @@ MATRIX, COMPRESSED = 14, 15  # types of its elements
 CELL, STRUCT, CHARACTERS, SPARSE, NUMERIC, OPAQUE = 1, 2, 4, 5, range(6, 16), 17  # classes of its variables
 COMPLEX_FLAG = 0x0800
 BYTES_FOR_EACH_ROW = 100  # that checks of a sparse matrix take, its entries apart
-
 SIZE_LINE = re.compile(rb"(?:[ \t\r]*(?:%.*)?\n)*.*(?:\n|\Z)")
 COMMENTS = re.compile(rb"^[ \t]*%.*$", re.MULTILINE)
 HEADING = re.compile(rb"\A(?:[ \t]*(?![ \t\d]).*(?:\n|\Z))*")

@@ -43,9 +43,7 @@ ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * x for x in PIPES)})
 
 SIDE_LINES = {"A": 0, "C": N_PANELS}
 DECK_SENSORS = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
-ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}
-"""Stations of the arch."""
-
+ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}  # stations of the arch
 THERMAL = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
 PARAMETERS = {
     "E_bot": "bottom",

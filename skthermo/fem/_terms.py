@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array, Matrix, as_dense
 from skthermo.fem._theta import ROWS_PER_CHUNK
 
-SPARSE_ROWS_PER_CHUNK = 16
-"""Sparse samples are solved one by one; a few of them are enough work for one task."""
+SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
 
 
 class AffineTerms(ABC):

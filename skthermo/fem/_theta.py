@@ -8,8 +8,7 @@ import numpy as np
 from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 
-ROWS_PER_CHUNK = 256
-"""Largest number of samples solved together."""
+ROWS_PER_CHUNK = 256  # largest number of samples solved together
 
 
 def nominal_theta(n_parameters: int) -> Array:

@@ -12,8 +12,7 @@ from skthermo.plotting._style import GREY, drawing, label_of, plain, pyplot
 HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""
 
-DARK = 0.55
-"""Share of the limit above which a cell of a map is so dark that its number is white."""
+DARK = 0.55  # share of the limit above which a cell of a map is so dark that its number is white
 
 Axes: TypeAlias = Any
 """Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""

@@ -15,11 +15,8 @@ NEEDED = {
     "similarity": set(),
     "shifts": {"measured", "explained", "standard_error"},
 }
-N_ERRORS = 2
-"""Standard errors on either side of an estimate."""
-
-SHORT_NAME = 8
-"""Number of letters up to which names of modes fit beside each other."""
+N_ERRORS = 2  # standard errors on either side of an estimate
+SHORT_NAME = 8  # number of letters up to which names of modes fit beside each other
 
 
 @dataclass(eq=False, repr=False)

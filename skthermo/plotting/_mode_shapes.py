@@ -27,8 +27,7 @@ from skthermo.plotting._members import (
 )
 from skthermo.plotting._style import LIGHT, ORANGE, pyplot
 
-GAP = 0.015
-"""Space between the panels of a figure, as a share of it."""
+GAP = 0.015  # space between the panels of a figure, as a share of it
 
 
 @dataclass(eq=False, repr=False)

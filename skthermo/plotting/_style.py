@@ -14,9 +14,7 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
 
 MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
-LONGEST_NAME = 30
-"""Number of letters above which a name is shortened."""
-
+LONGEST_NAME = 30  # number of letters above which a name is shortened
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import as_columns, real_array
 from skthermo._frames import check_same_rows
 
-LONG_GAP = 10
-"""Usual steps of time from which on a line breaks between two records."""
+LONG_GAP = 10  # usual steps of time from which on a line breaks between two records
 
 
 def as_table(values: Any, what: str, prefix: str = "f") -> pd.DataFrame:

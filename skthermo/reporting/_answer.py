@@ -13,8 +13,7 @@ from skthermo.reporting._figures import draw_curve, draw_damage_indices
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding
 from skthermo.reporting._html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
 
-MOST_LISTED = 12
-"""Largest number of scenarios that are listed or drawn."""
+MOST_LISTED = 12  # largest number of scenarios that are listed or drawn
 
 
 def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -> Html:

@@ -26,9 +26,7 @@ from skthermo.reporting._html import Html, image
 from skthermo.studies import PODCurve
 
 WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
-MANY_POINTS = 1000
-"""Number of points of one line from which on it is drawn as pixels."""
-
+MANY_POINTS = 1000  # number of points of one line from which on it is drawn as pixels
 SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
 
 

@@ -15,8 +15,7 @@ from skthermo.studies import PODCurve
 SIMULATED, REFERENCE = "data-informed", "reference"
 """Sources of records in the table of a study."""
 
-LEVEL = 0.9
-"""Share of records in alarm from which on damage counts as found reliably."""
+LEVEL = 0.9  # share of records in alarm from which on damage counts as found reliably
 
 
 @dataclass(frozen=True, eq=False)

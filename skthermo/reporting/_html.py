@@ -12,9 +12,7 @@ class Html(str):
     __slots__ = ()
 
 
-VOID = {"img", "meta"}
-"""Elements without content."""
-
+VOID = {"img", "meta"}  # elements without content
 STYLE = """
 :root { color-scheme: light dark; --page: #f6f7f9; --card: #ffffff; --text: #1d2530; --soft: #4c5866; --line: #d5dae1;
   --accent: #00609a; --bar: #cfe3f2; --drawing: #ffffff; }

@@ -13,8 +13,7 @@ from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_histori
 from skthermo.reporting._findings import REFERENCE, SIMULATED
 from skthermo.reporting._html import Html, bullets, element, figure, paragraphs, section, table
 
-MOST_PREDICTED = 1000
-"""Number of records that are drawn over temperature."""
+MOST_PREDICTED = 1000  # number of records that are drawn over temperature
 
 LARGE_OFFSET, LARGE_DEVIATION, MANY_OUTSIDE = 15.0, 0.5, 0.05
 """Offset of a mode in percent, standard deviation of a stiffness, and share of records outside its range, above which

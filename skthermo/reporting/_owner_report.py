@@ -22,9 +22,7 @@ from skthermo.reporting._model import monitored, quality
 from skthermo.studies import IdentifiedDamage
 
 TITLE = "Which damage the monitoring would find"
-LONGEST_VALUE = 400
-"""Number of letters after which the text of a setting is cut."""
-
+LONGEST_VALUE = 400  # number of letters after which the text of a setting is cut
 PACKAGES = ("skthermo", "numpy", "scipy", "pandas", "sklearn", "matplotlib")
 
 

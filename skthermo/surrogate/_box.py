@@ -10,7 +10,6 @@ from skthermo._arguments import check_bounds
 from skthermo._arrays import Array, Bounds
 
 NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
-
 MANY_FAR_ROWS = 0.05  # share of rows far outside the box that gives a warning
 
 

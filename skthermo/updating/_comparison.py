@@ -11,9 +11,7 @@ from skthermo._arrays import Array, as_floats, central_differences
 from skthermo.fem import FEModel, LocalModel
 from skthermo.updating._measured import Measured
 
-DIFFERENCE_STEP = 1e-3
-"""Relative step of central differences for a model without ``jacobian``."""
-
+DIFFERENCE_STEP = 1e-3  # relative step of central differences for a model without ``jacobian``
 NOMINAL_SHARE = 0.25
 """Weight of the MAC with the nominal modes beside the MAC with the measured shapes. It decides where sensors are so few
 that several modes look the same at them."""

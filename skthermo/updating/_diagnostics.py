@@ -15,26 +15,15 @@ from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome
 from skthermo.updating._residuals import Residuals
 
-LOW_MAC = 0.5
-"""MAC below which a measured shape is not that of the mode it is paired with."""
-
+LOW_MAC = 0.5  # MAC below which a measured shape is not that of the mode it is paired with
 DISTANCE_AT_BOUND = 1e-4
 """Distance from a bound, as a share of the box, below which a parameter counts as being at the bound."""
 
-LARGE_ERROR = 15.0
-"""Error of a frequency of the updated model, in percent, above which a warning is given."""
-
-LARGE_DEVIATION = 1e4
-"""Multiple of the smallest standard deviation above which a parameter is not determined."""
-
-NOISE_LIMIT = 10.0
-"""Error of a frequency, in standard deviations, that noise does not explain."""
-
-SAME_OPTIMUM = 1e-3
-"""Difference of multipliers below which two starts have ended at the same optimum."""
-
-SMALL_WEIGHT = 100
-"""Weight of shapes below which the objective may be a narrow curved valley, slow to search."""
+LARGE_ERROR = 15.0  # error of a frequency of the updated model, in percent, above which a warning is given
+LARGE_DEVIATION = 1e4  # multiple of the smallest standard deviation above which a parameter is not determined
+NOISE_LIMIT = 10.0  # error of a frequency, in standard deviations, that noise does not explain
+SAME_OPTIMUM = 1e-3  # difference of multipliers below which two starts have ended at the same optimum
+SMALL_WEIGHT = 100  # weight of shapes below which the objective may be a narrow curved valley, slow to search
 
 
 def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:

@@ -18,11 +18,8 @@ from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
 
-COLLINEAR_COSINE = 0.99
-"""Cosine between two parameters' effects at and above which they cannot be told apart."""
-
-ACCURATE = 0.1
-"""Largest relative standard deviation of the estimates of a recommended subset."""
+COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be told apart
+ACCURATE = 0.1  # largest relative standard deviation of the estimates of a recommended subset
 
 
 NO_INFORMATION = 1e-12

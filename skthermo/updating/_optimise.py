@@ -9,8 +9,7 @@ from skthermo._arrays import Array
 from skthermo._threads import single_blas_thread
 from skthermo.updating._residuals import Point, Residuals
 
-TOLERANCE = 1e-9
-"""Relative change of the objective and of theta below which a start has converged."""
+TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
 
 
 class Outcome(NamedTuple):

@@ -20,9 +20,7 @@ CANDIDATES_PER_ROUND = 96
 CHECK_POINTS = 20
 MAX_ROUNDS = 40
 
-LEAST_ENERGY = 1e-13
-"""Share of strain energy below which a direction is rounding error."""
-
+LEAST_ENERGY = 1e-13  # share of strain energy below which a direction is rounding error
 WIDEST_SPECTRUM = 1e13
 """Largest ratio of highest to lowest eigenvalue, divided by ``tol``, for which the standard form is accurate
 enough."""

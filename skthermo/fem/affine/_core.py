@@ -25,9 +25,7 @@ from skthermo.fem.modal import (
 GUARD_MODES = 4
 """Number of modes above the tracked ones that are examined first: modes that swap move up by a few ranks only."""
 
-MAX_CANDIDATES_PER_MODE = 8
-"""How many times as many candidates as modes are examined before a mode counts as dissolved."""
-
+MAX_CANDIDATES_PER_MODE = 8  # how many times as many candidates as modes are examined before a mode counts as dissolved
 CHUNK_BYTES = 2**25
 
 

@@ -11,14 +11,9 @@ from skthermo._arrays import Matrix, positive_integer, real_array
 
 Key = tuple[str, ...]
 
-DENSE_DOFS = 200
-"""Degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)."""
-
-LOWEST_SEVERITY = -10.0
-"""Lowest severity accepted; a lower number is probably a percentage given instead of a fraction."""
-
-DENSE_SHARE = 0.3
-"""Share of nonzero entries above which a matrix counts as dense."""
+DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)
+LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably a percentage given instead of a fraction
+DENSE_SHARE = 0.3  # share of nonzero entries above which a matrix counts as dense
 
 
 def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:

@@ -7,11 +7,8 @@ import scipy.sparse
 
 from skthermo.fem.elements import ByProperties, Dof
 
-STIFFNESS = "stiffness"
-"""The whole stiffness of a group, whatever properties its members have."""
-
-MASS = "mass"
-"""The whole mass of a group."""
+STIFFNESS = "stiffness"  # the whole stiffness of a group, whatever properties its members have
+MASS = "mass"  # the whole mass of a group
 
 Key = tuple[str, ...]
 

@@ -14,8 +14,7 @@ from skthermo.fem.modal._tracking import pair_modes
 SAME_MODE = 0.5
 """MAC above which no other mode can have a higher one with the same reference: its MACs with all modes add up to 1."""
 
-ROWS_AT_ONCE = 64
-"""Samples whose shapes, at all degrees of freedom, are held at once."""
+ROWS_AT_ONCE = 64  # samples whose shapes, at all degrees of freedom, are held at once
 
 
 def share_reordered(model: ModalModel, theta: ArrayLike) -> float:

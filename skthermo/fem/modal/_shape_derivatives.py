@@ -5,8 +5,7 @@ import numpy as np
 from skthermo._arrays import Array
 from skthermo.fem._terms import DenseTerms
 
-NUDGE = 1e-9
-"""Share of the stiffness that is added where a repeated eigenvalue makes the equations singular."""
+NUDGE = 1e-9  # share of the stiffness that is added where a repeated eigenvalue makes the equations singular
 
 
 def shape_derivatives(

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.fem._terms import SparseTerms
 
-GUARD_VECTORS = 2
-"""Eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together."""
-
+GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
 FEW_MASSES = 20
 """Fewest degrees of freedom with mass, beyond three for each eigenpair, for a Lanczos iteration to converge."""
 

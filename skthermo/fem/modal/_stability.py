@@ -11,11 +11,8 @@ from skthermo.fem.modal._shift_invert import factorise, seeded_start
 
 EPS = np.finfo(float).eps
 
-FEW_DOFS = 500
-"""Degrees of freedom up to which a mass matrix is examined as a dense one."""
-
-SMALL_SHIFT = 1e-10
-"""Multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite."""
+FEW_DOFS = 500  # degrees of freedom up to which a mass matrix is examined as a dense one
+SMALL_SHIFT = 1e-10  # multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite
 
 
 def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> None:

@@ -9,14 +9,9 @@ from scipy.stats import beta, t
 from skthermo._arrays import Array
 from skthermo._weather import correlation_time
 
-BLOCK = 10
-"""Length of a block, in correlation times."""
-
-LEAST_FREEDOM = 10
-"""Fewest degrees of freedom of the variance; blocks are shortened to reach them."""
-
-FEW_ALARMS = 10
-"""Minimum number of alarms, and of records without one, to estimate their variance."""
+BLOCK = 10  # length of a block, in correlation times
+LEAST_FREEDOM = 10  # fewest degrees of freedom of the variance; blocks are shortened to reach them
+FEW_ALARMS = 10  # minimum number of alarms, and of records without one, to estimate their variance
 
 
 @dataclass(frozen=True)

@@ -15,20 +15,14 @@ from skthermo._arrays import Array, real_array
 from skthermo._warnings import warn_user
 from skthermo.studies.detectability._intervals import clopper_pearson
 
-DOUBT = 0.01
-"""Probability with which rates drawn from the curve itself lie outside the bounds at any severity."""
-
-MISSED = 0.03
-"""Distance in POD beyond these bounds from which the curve is said to miss a severity."""
+DOUBT = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
+MISSED = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
 
 
 MOST_NEWTON_STEPS = 100
 
-CONVERGED = 1e-10
-"""Newton's decrement, in units of log likelihood, at which the fit ends."""
-
-FLAT = 1e-6
-"""Increase of the logit over the tested severities up to which the curve counts as flat."""
+CONVERGED = 1e-10  # Newton's decrement, in units of log likelihood, at which the fit ends
+FLAT = 1e-6  # increase of the logit over the tested severities up to which the curve counts as flat
 
 
 @dataclass(frozen=True, eq=False, repr=False)

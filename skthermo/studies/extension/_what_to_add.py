@@ -23,9 +23,7 @@ from skthermo.studies.detectability import Arrangement, DetectabilityStudy
 from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name
 from skthermo.studies.scenarios import Scenario
 
-SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)
-"""Severities at which a family is simulated, in units of its present a90."""
-
+SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)  # severities at which a family is simulated, in units of its present a90
 HIGHEST_SEVERITY = 0.95
 N_MODES = 3
 CONFIDENCE = 0.95

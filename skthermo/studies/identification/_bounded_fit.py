@@ -9,14 +9,9 @@ from scipy.optimize import brentq, nnls
 
 from skthermo._arrays import Array
 
-HIGHEST_SEVERITY = 0.95
-"""Upper bound of fitted severities."""
-
-MOST_STEPS = 12
-"""Largest number of Gauss-Newton steps."""
-
-TOLERANCE = 1e-6
-"""Change of the severities in one step below which the fit has converged."""
+HIGHEST_SEVERITY = 0.95  # upper bound of fitted severities
+MOST_STEPS = 12  # largest number of Gauss-Newton steps
+TOLERANCE = 1e-6  # change of the severities in one step below which the fit has converged
 
 Effects = Callable[[Array], tuple[Array, Array]]
 

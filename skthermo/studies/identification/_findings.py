@@ -19,8 +19,7 @@ from skthermo.studies.identification._identified import IdentifiedDamage
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
 from skthermo.studies.identification._shift import Shift
 
-N_DRAWS = 500
-"""Number of fits to redrawn shifts, for standard errors and p-values."""
+N_DRAWS = 500  # number of fits to redrawn shifts, for standard errors and p-values
 
 
 def findings(

@@ -11,11 +11,8 @@ from skthermo._arrays import Array, as_floats, spread_evenly
 MOST_ROWS, MOST_SLOW_ROWS = 100, 24
 """Number of records over which effects are averaged; fewer for models that are slow to solve."""
 
-STEP = 1e-3
-"""Step of differences in severity, for models without damage parameters, and in ln frequency."""
-
-LEVELS = (0.3, 0.6, 1.0)
-"""Highest severities for which reduced models are made, each when it is needed."""
+STEP = 1e-3  # step of differences in severity, for models without damage parameters, and in ln frequency
+LEVELS = (0.3, 0.6, 1.0)  # highest severities for which reduced models are made, each when it is needed
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from skthermo.studies.scenarios import UncertainDamage
 NEAR_2_PI = 0.25
 """Relative distance from 2 pi up to which ratios of frequencies suggest rad/s."""
 
-CLEARLY_HIGHER = 2.0
-"""Standard errors by which a frequency must rise to count as higher."""
+CLEARLY_HIGHER = 2.0  # standard errors by which a frequency must rise to count as higher
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,8 @@ from scipy.optimize import nnls
 
 from skthermo._arrays import Array
 
-VISIBLE = 0.1
-"""Largest standard error with which a severity counts as known."""
-
-IMITATING_SHARE = 0.25
-"""Smallest share in the reproduced effect with which a group counts as imitating another."""
+VISIBLE = 0.1  # largest standard error with which a severity counts as known
+IMITATING_SHARE = 0.25  # smallest share in the reproduced effect with which a group counts as imitating another
 
 
 def cosines(slopes: Array) -> Array:

@@ -13,8 +13,7 @@ from skthermo.studies.identification._frequency_effects import healthy_frequenci
 N_PERIODS, MOST_PERIODS = 12, 60
 """Fewest and most periods that the training records are divided into; the fewer the new records, the more periods."""
 
-PSEUDO_PERIODS = 24
-"""Weight, in periods, of the correlations of single records beside those of the periods' means."""
+PSEUDO_PERIODS = 24  # weight, in periods, of the correlations of single records beside those of the periods' means
 
 
 class Shift(NamedTuple):

@@ -15,7 +15,6 @@ are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta
 
 REACH = 3.0  # half-widths of the box, in ln theta, from its middle to the limits of an estimate
 LEAST_DAMPING = 1e-14  # share of the diagonal added to precision matrices, which rounding could make singular
-
 LONGEST_STEP = 0.5  # largest change of ln theta in one step
 
 
