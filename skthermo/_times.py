@@ -1,6 +1,6 @@
 """When a record was taken: its time on a DatetimeIndex, else its number."""
 
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ def row_times(T: Any) -> Array:
 def time_of(T: Any, moment: Any, what: str) -> float:
     """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last."""
     times, is_timed = row_times(T), _has_stamps(T)
-    if isinstance(moment, Integral) and not isinstance(moment, bool) and moment >= 0:
+    if isinstance(moment, int | np.integer) and not isinstance(moment, bool) and moment >= 0:
         return float(times[moment]) if moment < len(times) else np.inf
     try:
         if is_timed and not isinstance(moment, Real):

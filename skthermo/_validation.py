@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.impute._base import _BaseImputer
 from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
+from sklearn.pipeline import Pipeline
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval, InvalidParameterError, StrOptions
 from sklearn.utils.metaestimators import _BaseComposition
@@ -155,3 +156,12 @@ def clone_sharing_models(estimator: BaseEstimator) -> BaseEstimator:
         if hasattr(estimator, name):
             setattr(twin, name, clone(getattr(estimator, name), safe=False))
     return twin
+
+
+def last_step(estimator: Any) -> Any:
+    """The estimator at the end of a pipeline, the best one of a fitted search, or the estimator itself."""
+    if isinstance(estimator, Pipeline):
+        return last_step(estimator.steps[-1][1])
+    if isinstance(estimator, BaseSearchCV):
+        return last_step(getattr(estimator, "best_estimator_", estimator.estimator))
+    return estimator

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from skthermo._arrays import Array
-from skthermo._pipelines import last_step
-from skthermo._validation import _BaseComposition
+from skthermo._validation import _BaseComposition, last_step
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
 

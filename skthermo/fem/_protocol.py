@@ -65,6 +65,11 @@ class FEModel(Protocol):
         -------
         ndarray of shape (n_samples, n_modes)
             In Hz.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width, or a value that is not finite and positive.
         """
 
 
@@ -92,7 +97,7 @@ class ModalModel(FEModel, Protocol):
         frequencies : ndarray of shape (n_samples, n_modes)
             In Hz.
         shapes : ndarray of shape (n_samples, n_dof, n_modes)
-            With unit modal mass.
+            With unit modal mass; signs are arbitrary.
         """
 
 
@@ -108,12 +113,13 @@ class DifferentiableModel(FEModel, Protocol):
     """
 
     def jacobian(self, theta: ArrayLike) -> Array:
-        """Derivatives of the frequencies.
+        """Derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi where they are exact.
 
         Parameters
         ----------
         theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
+            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of single modes do not exist,
+            and the values depend on the arbitrary choice of mode shapes.
 
         Returns
         -------

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._pipelines import last_step
+from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened

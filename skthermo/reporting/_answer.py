@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._formatting import bounds_text, counted, duration_text, percent, share_text
-from skthermo._pipelines import last_step
+from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding

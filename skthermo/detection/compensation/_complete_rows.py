@@ -16,9 +16,8 @@ from sklearn.utils import get_tags
 from skthermo._arguments import is_model
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
-from skthermo._pipelines import last_step
 from skthermo._regressors import fit_outputs
-from skthermo._validation import BaseSearchCV, _BaseImputer
+from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):

@@ -16,13 +16,14 @@ from skthermo._arguments import check_dofs, check_theta
 from skthermo._arrays import Array, MatrixLike
 from skthermo._threads import map_on_blas_threads
 from skthermo._warnings import warn_user
+from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import check_different, check_modes, read_matrix
 from skthermo.fem.modal import LocalModes
 
 
-class AffineBase(ABC):
+class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel, ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
     A subclass stores ``_parameter_names``, ``_groups`` and ``_core``. ``_basis`` and `_bounds_warning` are for models
@@ -39,7 +40,6 @@ class AffineBase(ABC):
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Columns of theta."""
         return self._parameter_names
 
     @property
@@ -59,12 +59,10 @@ class AffineBase(ABC):
 
     @property
     def n_dof(self) -> int:
-        """Number of degrees of freedom."""
         return self._full_core.stiffness.n_dof
 
     @property
     def track(self) -> bool:
-        """Whether a column follows its mode rather than its rank."""
         return self._core.track
 
     @property
@@ -83,57 +81,13 @@ class AffineBase(ABC):
         return "threads" if self._core.is_dense else "processes"
 
     def frequencies(self, theta: ArrayLike) -> Array:
-        """Natural frequencies.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_modes)
-            In Hz.
-
-        Raises
-        ------
-        ValueError
-            If theta has the wrong width, or a value that is not finite and positive.
-        """
         return self._in_chunks(self._core.frequencies, theta)[0]
 
     def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
-        """Natural frequencies and mode shapes.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
-
-        Returns
-        -------
-        frequencies : ndarray of shape (n_samples, n_modes)
-            In Hz.
-        shapes : ndarray of shape (n_samples, n_dof, n_modes)
-            With unit modal mass; signs are arbitrary.
-        """
         frequencies, shapes = self._in_chunks(self._core.modes, theta)
         return frequencies, shapes if self._basis is None else self._basis @ shapes
 
     def jacobian(self, theta: ArrayLike) -> Array:
-        """Exact derivatives of the frequencies, d lambda = phi' (dK - lambda dM) phi.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of single modes do not exist,
-            and the values depend on the arbitrary choice of mode shapes.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_modes, n_parameters)
-            Derivatives d f / d theta in Hz.
-        """
         return self.linearised(theta)[1]
 
     def linearised(self, theta: ArrayLike) -> tuple[Array, Array]:
@@ -188,20 +142,6 @@ class AffineBase(ABC):
         return frequencies, jacobian, shapes, derivatives
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
-        """The lowest modes at one theta, with their derivatives.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_parameters,) or (1, n_parameters)
-            Multipliers of the nominal parameters.
-        follow : bool, default=False
-            Whether to compute enough modes to find every nominal mode among them.
-
-        Returns
-        -------
-        LocalModes
-            More modes than ``n_modes``, in ascending order.
-        """
         row = check_theta(theta, self.parameter_names, one_row=True)
         self._warn_of_bounds(row)
         return self._core.local_modes(row, follow=follow, basis=self._basis)
@@ -390,26 +330,9 @@ class AffineBase(ABC):
         return self._changed(lambda core: core.with_added(*added))
 
     def quiet(self) -> Self:
-        """The same model without warnings.
-
-        Returns
-        -------
-        AffineModel or ReducedModel
-            For searches that may pass through theta outside the box or without a solution. It shares the matrices of
-            this model.
-        """
         return self._twin(_is_quiet=True)
 
     def warn_of(self, theta: Array, frequencies: NDArray) -> None:
-        """Warn of rows outside the bounds of a reduced model, and of rows without a solution.
-
-        Parameters
-        ----------
-        theta : ndarray of shape (n_samples, n_parameters)
-            Multipliers; rows with NaN are ignored.
-        frequencies : ndarray of shape (n_samples, ...)
-            The solution for each row.
-        """
         self._warn_of_bounds(theta)
         if not self._is_quiet:
             warn_of_failures(theta, frequencies)

@@ -13,9 +13,8 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo._arrays import as_random_state, positive_integer
-from skthermo._pipelines import last_step
 from skthermo._threads import single_blas_thread
-from skthermo._validation import _num_samples, seed_parts, seeded
+from skthermo._validation import _num_samples, last_step, seed_parts, seeded
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._arrangement import Arrangement

@@ -11,7 +11,7 @@ from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names, frame_like
-from skthermo._pipelines import last_step
+from skthermo._validation import last_step
 from skthermo._warnings import warn_user
 from skthermo.fem import linearise, shape_components
 from skthermo.surrogate._mapper import TemperatureMapper

@@ -13,8 +13,8 @@ import pandas as pd
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names
-from skthermo._pipelines import last_step
 from skthermo._saved_frames import SavesFrames
+from skthermo._validation import last_step
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.surrogate.chain._estimates import Estimates
