@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 from sklearn.dummy import DummyRegressor
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.neighbors import KNeighborsRegressor
@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign, make_z24
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate.refinement import Prior
+from skthermo.surrogate.refinement._posterior import Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 
@@ -98,6 +98,38 @@ def test_sorted_modes_that_cross_give_one_of_both_solutions(regressor):
     squared = (2 * np.pi * solved) ** 2
     both = np.stack([squared / stiffness, squared[:, ::-1] / stiffness])
     np.testing.assert_allclose((np.abs(theta / both - 1).max(axis=2)).min(axis=0), 0, atol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:modes change their order")
+def test_sorted_modes_beyond_a_crossing_come_back():
+    """A third mode tells the order of two that cross: steps from the other side of the crossing must get past it."""
+    terms = {("k0",): np.diag([400.0, 0.0, 900.0]), ("k1",): np.diag([0.0, 420.0, 300.0])}
+    model, theta = AffineModel(terms, np.eye(3), n_modes=3, track=False), drawn(200, 2, lowest=0.9, highest=1.1)
+    found = surrogate(model, DummyRegressor()).invert(model.frequencies(theta))
+    assert found.converged.all()
+    np.testing.assert_allclose(found.theta, theta, rtol=1e-6)
+
+
+def test_steps_that_raise_the_misfit_are_not_taken():
+    """Full Gauss-Newton steps on an arctangent jump to and fro between its flat ends."""
+    model = CallableModel(lambda theta: 5 * np.exp(0.1 * np.arctan(np.log(theta) / 0.05)), ["k"], 1)
+    highest = DummyRegressor(strategy="quantile", quantile=1.0)
+    found = surrogate(model, highest, refine=50).invert([[5.0]])
+    np.testing.assert_allclose(found.theta, 1, rtol=1e-6)
+    assert found.converged.all()
+
+
+def test_a_step_beyond_a_limit_is_the_best_one_within_it():
+    rng = np.random.default_rng(0)
+    sensitivity, residual = 0.1 * rng.standard_normal((50, 6, 3)), 0.005 * rng.standard_normal((50, 6))
+    gradient = -np.einsum("smp,sm->sp", sensitivity, residual)
+    hessian = sensitivity.swapaxes(1, 2) @ sensitivity
+    prior = Prior(np.zeros(3), np.ones(3), np.array([-0.02, -9.0, -9.0]), np.array([0.02, 9.0, 9.0]))
+    here = Local(np.zeros((50, 3)), np.zeros(50), gradient, hessian, residual, sensitivity)
+    limits = prior.lowest, prior.highest
+    expected = [lsq_linear(a, b, limits, tol=1e-14).x for a, b in zip(sensitivity, residual, strict=True)]
+    assert 10 < (np.abs(np.array(expected)[:, 0]) > 0.0199).sum() < 40
+    np.testing.assert_allclose(here.step(prior, np.zeros(50)), expected, atol=1e-6)
 
 
 # Posterior mode
