@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
+from sklearn.base import clone
 from sklearn.ensemble import GradientBoostingRegressor, RandomForestRegressor
 from sklearn.frozen import FrozenEstimator
 from sklearn.gaussian_process import GaussianProcessRegressor
@@ -171,6 +172,19 @@ def fitted_chain(campaign, regressor, seed):
     mapper = TemperatureMapper(regressor)
     chain = DataInformedFEM(campaign.model, inverse=inverse, mapper=mapper, aligner=campaign.aligner, random_state=seed)
     return chain.fit(*campaign.train)
+
+
+def forest_errors(campaign, seed):
+    """Errors in percent of a chain with a random forest as its M2, in a `TemperatureMapper` and by itself."""
+    T_test, F_test = campaign.test
+    wrapped = fitted_chain(campaign, RandomForestRegressor(), seed)
+    bare = clone(wrapped).set_params(mapper=RandomForestRegressor()).fit(*campaign.train)
+    return pd.Series(
+        {
+            name: mape(F_test, chain.predict(T_test)).mean()
+            for name, chain in {"in a TemperatureMapper": wrapped, "by itself": bare}.items()
+        }
+    )
 
 
 def fitted_directly(campaign, regressor, seed):
