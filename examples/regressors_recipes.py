@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
-from sklearn.base import clone
 from sklearn.ensemble import GradientBoostingRegressor, RandomForestRegressor
 from sklearn.frozen import FrozenEstimator
 from sklearn.gaussian_process import GaussianProcessRegressor
@@ -166,25 +165,18 @@ def z24_campaign(model, file):
     return Campaign(model, (T[:n], F[:n]), (T[n:], F[n:]), noise=0.005, bounds=0.3, network="truss", aligner=aligner)
 
 
-def fitted_chain(campaign, regressor, seed):
-    """The whole chain with a regressor as its M2; M1 refines, so that every M2 learns the same parameters."""
+def fitted_chain(campaign, regressor, seed, bare=False):
+    """The whole chain with a regressor as its M2, `bare` or in a `TemperatureMapper`; M1 refines."""
     inverse = InverseSurrogate(campaign.model, quadratic(), bounds=campaign.bounds, noise=campaign.noise)
-    mapper = TemperatureMapper(regressor)
+    mapper = regressor if bare else TemperatureMapper(regressor)
     chain = DataInformedFEM(campaign.model, inverse=inverse, mapper=mapper, aligner=campaign.aligner, random_state=seed)
     return chain.fit(*campaign.train)
 
 
-def forest_errors(campaign, seed):
-    """Errors in percent of a chain with a random forest as its M2, in a `TemperatureMapper` and by itself."""
-    T_test, F_test = campaign.test
-    wrapped = fitted_chain(campaign, RandomForestRegressor(), seed)
-    bare = clone(wrapped).set_params(mapper=RandomForestRegressor()).fit(*campaign.train)
-    return pd.Series(
-        {
-            name: mape(F_test, chain.predict(T_test)).mean()
-            for name, chain in {"in a TemperatureMapper": wrapped, "by itself": bare}.items()
-        }
-    )
+def bare_forest_error(campaign, seed):
+    """Error in percent of a chain whose M2 is a random forest without a `TemperatureMapper` around it."""
+    T, F = campaign.test
+    return mape(F, fitted_chain(campaign, RandomForestRegressor(), seed, bare=True).predict(T)).mean()
 
 
 def fitted_directly(campaign, regressor, seed):
