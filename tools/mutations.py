@@ -94,7 +94,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("limits of estimates", "REACH = 3.0", "REACH = 1.0"),
         ("parameters at their limits", "held, fixed = held | beyond", "held, fixed = held"),
     ],
-    ("surrogate/refinement/_refine.py", "surrogate/test_refinement.py"): [
+    ("surrogate/refinement/_levenberg_marquardt.py", "surrogate/test_refinement.py"): [
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         (
             "steps that fail",

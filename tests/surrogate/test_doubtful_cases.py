@@ -93,5 +93,5 @@ def test_labels_that_have_no_order():
 
 def test_records_with_hardly_any_mode_are_named():
     gaps = np.random.default_rng(0).random(F.shape) < 0.85
-    with pytest.warns(UserWarning, match=r"records tell on average \d+% of what complete ones would tell .* imputer="):
+    with pytest.warns(UserWarning, match=r"a record carries on average \d+% of the parameter precision .* imputer="):
         DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))

@@ -55,9 +55,9 @@ class Estimates:
         weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
         if weight < SCARCE:
             warn_user(
-                f"because of their gaps, records tell on average {weight:.0%} of what complete ones would tell "
-                "about the parameters, and predictions are drawn towards the model's nominal state; expected more "
-                "modes a record, imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
+                f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
+                "one, and predictions are drawn towards the model's nominal state; expected more modes a record, "
+                "imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
                 "scarce modes",
             )
         return cls(as_floats(found.theta), found.residuals, found.weight, int(unconverged(found).sum()))

@@ -11,8 +11,8 @@ from sklearn.utils import Bunch
 from skthermo._arguments import check_bounds, check_noise, check_prior
 from skthermo._arrays import Array, spread_evenly
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.refinement._levenberg_marquardt import refine
 from skthermo.surrogate.refinement._posterior import Objective, Prior
-from skthermo.surrogate.refinement._refine import refine
 from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
