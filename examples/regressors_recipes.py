@@ -165,12 +165,18 @@ def z24_campaign(model, file):
     return Campaign(model, (T[:n], F[:n]), (T[n:], F[n:]), noise=0.005, bounds=0.3, network="truss", aligner=aligner)
 
 
-def fitted_chain(campaign, regressor, seed):
-    """The whole chain with a regressor as its M2; M1 refines, so that every M2 learns the same parameters."""
+def fitted_chain(campaign, regressor, seed, bare=False):
+    """The whole chain with a regressor as its M2, `bare` or in a `TemperatureMapper`; M1 refines."""
     inverse = InverseSurrogate(campaign.model, quadratic(), bounds=campaign.bounds, noise=campaign.noise)
-    mapper = TemperatureMapper(regressor)
+    mapper = regressor if bare else TemperatureMapper(regressor)
     chain = DataInformedFEM(campaign.model, inverse=inverse, mapper=mapper, aligner=campaign.aligner, random_state=seed)
     return chain.fit(*campaign.train)
+
+
+def bare_forest_error(campaign, seed):
+    """Error in percent of a chain whose M2 is a random forest without a `TemperatureMapper` around it."""
+    T, F = campaign.test
+    return mape(F, fitted_chain(campaign, RandomForestRegressor(), seed, bare=True).predict(T)).mean()
 
 
 def fitted_directly(campaign, regressor, seed):

@@ -37,7 +37,7 @@ def owner_report(
     Parameters
     ----------
     study : DetectabilityStudy
-        With the results of `DetectabilityStudy.run`.
+        With the results of `~skthermo.studies.DetectabilityStudy.run`.
     path : str or path
         The file; an older one is replaced when the new one is complete.
     identified : IdentifiedDamage, optional

@@ -45,7 +45,7 @@ class Spring(PhysicalElement):
         return [(self.node, self.direction)]
 
     def stiffness(self, coordinates: Array) -> ByProperties:
-        """k."""
+        """Its stiffness in N/m, or in N m/rad for a rotation."""
         return {("k",): np.array([[self.k]])}
 
     def mass(self, coordinates: Array) -> ByProperties:

@@ -104,7 +104,8 @@ def load_affine(
       only the mass, the terms and the total are read from a folder.
     - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
     - Files are read in a process of their own, which takes about half a second, so that a damaged one can do no harm.
-      It may take at most ten times their size in memory, or 256 MB.
+      The process may take a minute, and a second more for each MB; where the platform can limit memory, it may take ten
+      times the size of the files, and 256 MB in any case.
     - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If the total is
       more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal, that is an
       error. If ``stiffness`` names only some of the terms in a file with a total, these terms vary and the others are
