@@ -207,8 +207,8 @@ FrequencyTemperatureDisplay.from_predictions(T["T2"], F, history)
 # %%
 # What if the records are wrong?
 # ------------------------------
-# Typical mistakes, made on purpose in the first 400 records. Every one is named by a warning or refused with an error, and correct records
-# cause neither. :doc:`/guide/troubleshooting` says what to do about each.
+# Typical mistakes, made on purpose in the first 400 records. Every one is named by a warning or refused with an error,
+# and correct records cause neither. :doc:`/guide/troubleshooting` says what to do about each.
 
 T, F = T[:400], F[:400]
 swapped = F.rename(columns={"f2": "f3", "f3": "f2"})[list(F)]
