@@ -141,7 +141,7 @@ def chain(model, *, lags=LAGS, bounds=0.3):
     quadratic = make_pipeline(PolynomialFeatures(2), LinearRegression())
     return DataInformedFEM(
         model,
-        inverse=InverseSurrogate(model, quadratic, bounds=bounds, noise=SCATTER),
+        inverse=InverseSurrogate(model, quadratic, n_samples=300, bounds=bounds, noise=SCATTER),
         mapper=make_pipeline(LagFeatures(lags, freq="30min"), TemperatureMapper(Ridge())),
         aligner=BiasAligner(model, method="scale"),
         random_state=0,
@@ -207,10 +207,10 @@ FrequencyTemperatureDisplay.from_predictions(T["T2"], F, history)
 # %%
 # What if the records are wrong?
 # ------------------------------
-# Typical mistakes, made on purpose. Every one is named by a warning or refused with an error, and correct records
-# cause neither. :doc:`/guide/troubleshooting` says what to do about each.
+# Typical mistakes, made on purpose in the first 400 records. Every one is named by a warning or refused with an error,
+# and correct records cause neither. :doc:`/guide/troubleshooting` says what to do about each.
 
-T, F = T[:n_train], F[:n_train]
+T, F = T[:400], F[:400]
 swapped = F.rename(columns={"f2": "f3", "f3": "f2"})[list(F)]
 gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
 mistakes = {

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo.datasets import load_kw51, make_kw51_campaign
+from skthermo.datasets import load_kw51, make_kw51, make_kw51_campaign
 from tests.datasets.kw51_file import write_kw51
 from tests.examples.pages import recipes
 
@@ -13,14 +13,33 @@ INDEX = {"check_freq": False, "check_index_type": False}  # a file's time stamps
 FOURTEEN = [f"f{mode}" for mode in range(1, 15)]
 
 
+N_AFTER = 300
+
+
 @pytest.fixture(scope="module")
 def records():
-    return study.Records.read(seed=1)
+    """The records of the study's baseline, and some in which a retrofit shifts each mode by its mean."""
+    campaign = make_kw51_campaign(n_hours=study.BASELINE + N_AFTER, retrofit=False, random_state=1)
+    theta, model = campaign.theta[-N_AFTER::50], campaign.model
+    strengthened = model.damaged(campaign.retrofit["damage"]).with_added(mass=campaign.retrofit["mass"])
+    ratio = (strengthened.frequencies(theta) / model.frequencies(theta)).mean(axis=0)
+    after = np.arange(len(campaign.theta)) >= study.BASELINE
+    shift = np.where(after[:, np.newaxis], ratio, 1.0)
+    return study.Records(
+        "KW51, synthetic",
+        campaign.temperatures,
+        campaign.frequencies * shift,
+        campaign.state.mask(after, "after"),
+        campaign.retrofit,
+        campaign.clean_frequencies * shift,
+    )
 
 
 @pytest.fixture(scope="module")
 def fitted(records):
-    return study.Fitted.by(records, study.RECIPES[study.DEFAULT])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "MODEL", make_kw51(updated=True).reduced(0.3, tol=2e-4, random_state=0))
+        return study.Fitted.by(records, study.RECIPES[study.DEFAULT])
 
 
 def test_a_campaign_in_the_format_of_the_file_is_read_back_equal(tmp_path):

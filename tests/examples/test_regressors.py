@@ -22,10 +22,11 @@ pytestmark = pytest.mark.filterwarnings(
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _networks_of_few_epochs():
-    """The laws hold for a paper's network that has hardly learned."""
+def _little_learning():
+    """The laws hold for a paper's network that has hardly learned, and for chains of few simulations."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(EXAMPLE, "paper_network", functools.partial(paper_network, max_iter=20))
+        patch.setattr(EXAMPLE, "InverseSurrogate", functools.partial(InverseSurrogate, n_samples=200))
         yield
 
 
