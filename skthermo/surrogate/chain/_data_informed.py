@@ -634,10 +634,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
 
     def _weather(self, X: ArrayLike) -> Array:
         """Inputs of M2."""
-        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)))
+        T = self._temperatures(X)
+        return as_floats(inputs_of_last_step(self.mapper_, T))
 
     def _predict_theta(self, X: ArrayLike) -> Array:
-        """Parameters at given temperatures, with warnings about weather and parameters that are unlike the training."""
+        """Parameters at given temperatures; warns of weather outside the training range and impossible parameters."""
         T = self._temperatures(X)
         message = self.training_range_.warning(inputs_of_last_step(self.mapper_, T))
         if message:
