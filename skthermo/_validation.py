@@ -45,6 +45,7 @@ __all__ = [
     "HasMethods",
     "Interval",
     "InvalidParameterError",
+    "NaNEstimator",
     "StrOptions",
     "TransformerMixin",
     "_BaseComposition",
@@ -63,6 +64,15 @@ __all__ = [
     "validate_data",
     "with_nan",
 ]
+
+
+class NaNEstimator(BaseEstimator):
+    """Base of estimators that accept NaN in X."""
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:

@@ -7,13 +7,14 @@ from typing import Any, Literal, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin
+from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._arguments import is_model
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
     HasMethods,
+    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _fit_context,
@@ -24,7 +25,7 @@ from skthermo._validation import (
 )
 
 
-class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
+class BiasAligner(OneToOneFeatureMixin, TransformerMixin, NaNEstimator):
     """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
@@ -178,8 +179,3 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 
     def __sklearn_clone__(self) -> BiasAligner:
         return clone_sharing_models(self)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags

@@ -10,11 +10,11 @@ from typing import Any, Literal, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
     Interval,
+    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _check_feature_names_in,
@@ -30,7 +30,7 @@ MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end
 LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
-class LagFeatures(TransformerMixin, BaseEstimator):
+class LagFeatures(TransformerMixin, NaNEstimator):
     """Current and earlier values of every sensor: a structure follows the temperature with delay.
 
     Parameters
@@ -248,11 +248,6 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
         return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

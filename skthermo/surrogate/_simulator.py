@@ -87,12 +87,7 @@ class Simulator:
         return frequencies
 
     def linearise(
-        self,
-        theta: Array,
-        n_jobs: int | None = None,
-        dofs: NDArray[np.intp] | None = None,
-        *,
-        relative: bool = False,
+        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None, *, relative: bool = False
     ) -> tuple[Array, ...]:
         """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters), without warnings.
 

@@ -15,6 +15,7 @@ from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, frame_like, warn_of_absurd, warn_of_disorder
 from skthermo._validation import (
     HasMethods,
+    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _check_feature_names_in,
@@ -32,7 +33,7 @@ Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
-class TemperatureCompensator(TransformerMixin, BaseEstimator):
+class TemperatureCompensator(TransformerMixin, NaNEstimator):
     """Residuals of frequencies: measured minus predicted from temperatures.
 
     Parameters
@@ -329,11 +330,6 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         size = np.fmax.reduce(np.abs(as_floats(frequencies)))
         self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
         return white
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:

@@ -23,8 +23,7 @@ from skthermo.studies.detectability._simulation import SIMULATED, Simulation, cl
 from skthermo.studies.detectability._view import read_baseline
 from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
 
-MANY_FALSE_ALARMS = 0.5
-"""Rate of false alarms above which a warning says that baseline and simulation are not of the same structure."""
+MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 

@@ -24,13 +24,10 @@ from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator
 from skthermo.studies.scenarios import Scenario
 
 SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)  # severities at which a family is simulated, in units of its present a90
-HIGHEST_SEVERITY = 0.95
-N_MODES = 3
-CONFIDENCE = 0.95
-
-DOUBTFUL_RATIO = 2.0
-"""Error of a mode predicted from one record, relative to that of the measured modes, above which its gain is doubtful.
-"""
+HIGHEST_SEVERITY = 0.95  # of those that are simulated
+N_MODES = 3  # number of further modes that are candidates by default
+CONFIDENCE = 0.95  # of the bounds of a gain
+DOUBTFUL_RATIO = 2.0  # scatter of a mode predicted from one record, over that of measured modes, that makes it doubtful
 
 
 @dataclass(frozen=True)

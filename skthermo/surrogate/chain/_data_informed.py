@@ -20,6 +20,7 @@ from skthermo._times import row_times
 from skthermo._validation import (
     HasMethods,
     Interval,
+    NaNEstimator,
     StrOptions,
     _fit_context,
     check_array,
@@ -43,7 +44,7 @@ POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
+class DataInformedFEM(SavesFrames, RegressorMixin, NaNEstimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -611,7 +612,6 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
         tags.target_tags.multi_output = True
         tags.target_tags.single_output = False
         return tags
