@@ -80,7 +80,7 @@ class Simulator:
             if warn:
                 warn_user(
                     f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
-                    "the full one: the weather is unlike that of the training rows",
+                    "the full one: the weather is outside that of the training rows",
                     "outside the reduced model",
                 )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)

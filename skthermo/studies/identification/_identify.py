@@ -82,7 +82,7 @@ def identify_damage(
     Warns
     -----
     UserWarning
-        Once for each kind: if the weather is unlike that of the training records, temperatures have other names than in
+        Once for each kind: if the weather is outside the training range, temperatures have other names than in
         fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
         the shifts.
 
