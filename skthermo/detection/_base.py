@@ -13,11 +13,11 @@ from sklearn.base import OutlierMixin
 
 from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
-from skthermo._validation import Interval, NaNEstimator, _fit_context, check_is_fitted, validate_data
+from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import warn_user
 
 
-class DamageDetector(OutlierMixin, NaNEstimator, ABC):
+class DamageDetector(OutlierMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
     A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes

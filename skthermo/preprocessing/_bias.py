@@ -13,19 +13,18 @@ from skthermo._arguments import is_model
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
+    Estimator,
     HasMethods,
-    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _fit_context,
     check_array,
     check_is_fitted,
-    clone_sharing_models,
     validate_data,
 )
 
 
-class BiasAligner(OneToOneFeatureMixin, TransformerMixin, NaNEstimator):
+class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
     """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
@@ -176,6 +175,3 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, NaNEstimator):
                 f"{n_modes} modes of X"
             )
         return reference
-
-    def __sklearn_clone__(self) -> BiasAligner:
-        return clone_sharing_models(self)

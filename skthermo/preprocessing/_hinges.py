@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
+    Estimator,
     Interval,
-    NaNEstimator,
     TransformerMixin,
     _check_feature_names_in,
     _check_sample_weight,
@@ -22,7 +22,7 @@ from skthermo._validation import (
 )
 
 
-class HingeFeatures(TransformerMixin, NaNEstimator):
+class HingeFeatures(TransformerMixin, Estimator):
     """Append max(x - knot, 0) for some knots of every column, so that linear regression fits broken lines.
 
     Frequencies over temperature are broken lines: a bridge that freezes has a kink at 0 °C. Beyond the data the lines

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
+    Estimator,
     Interval,
-    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _check_feature_names_in,
@@ -30,7 +30,7 @@ MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end
 LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
-class LagFeatures(TransformerMixin, NaNEstimator):
+class LagFeatures(TransformerMixin, Estimator):
     """Current and earlier values of every sensor: a structure follows the temperature with delay.
 
     Parameters

@@ -22,8 +22,8 @@ from skthermo._frames import (
     warn_of_markers,
 )
 from skthermo._validation import (
+    Estimator,
     HasMethods,
-    NaNEstimator,
     StrOptions,
     TransformerMixin,
     _check_feature_names_in,
@@ -40,7 +40,7 @@ Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
-class TemperatureCompensator(TransformerMixin, NaNEstimator):
+class TemperatureCompensator(TransformerMixin, Estimator):
     """Residuals of frequencies: measured minus predicted from temperatures.
 
     Parameters
@@ -258,8 +258,7 @@ class TemperatureCompensator(TransformerMixin, NaNEstimator):
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         weather = as_floats(temperatures)
-        known = ~np.isnan(weather).any(axis=1)
-        message = self.training_range_.warning(weather) if known.any() else ""
+        message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)

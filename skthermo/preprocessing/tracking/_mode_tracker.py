@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import TransformerMixin
 
-from skthermo._validation import Interval, NaNEstimator, _fit_context, check_is_fitted
+from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.preprocessing._stamps import as_duration, as_stamps
 from skthermo.preprocessing.tracking._assignment import assign_near, assign_while_following, fitting_pairs
 from skthermo.preprocessing.tracking._poles import read_poles
@@ -19,7 +19,7 @@ from skthermo.preprocessing.tracking._reference import ReferenceModes, read_refe
 from skthermo.preprocessing.tracking._results import TrackedModes, tracked_modes, warn_of_doubts
 
 
-class ModeTracker(TransformerMixin, NaNEstimator, auto_wrap_output_keys=None):
+class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     """Assign the poles of each record to the modes of a reference, by mode shape and frequency.
 
     Operational modal analysis finds in each record any number of poles, in the order of their frequencies. Some are

@@ -220,9 +220,11 @@ def pod_curve(
         expected = "severities in between, with some misses and hits"
         if not k.any():
             expected = "some records in alarm: severities are small, or outliers of the baseline raise the threshold"
+        lowest, highest = bracket
+        place = f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
-            f"unknown, and a90 lies {within(bracket)}; expected {expected}",
+            f"unknown, and a90 lies {place}; expected {expected}",
             "separated severities",
         )
     else:
@@ -286,12 +288,6 @@ def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, floa
         return 0.0, float(magnitudes[0])
     above = magnitudes[magnitudes > magnitudes[below[-1]]]
     return float(magnitudes[below[-1]]), float(above[0]) if above.size else float("nan")
-
-
-def within(bracket: tuple[float, float]) -> str:
-    """Text of a bracket, whose upper end may be unknown (NaN)."""
-    lowest, highest = bracket
-    return f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
 
 
 def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:

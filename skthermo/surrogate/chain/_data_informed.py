@@ -18,14 +18,13 @@ from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import (
+    Estimator,
     HasMethods,
     Interval,
-    NaNEstimator,
     StrOptions,
     _fit_context,
     check_array,
     check_is_fitted,
-    clone_sharing_models,
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
@@ -44,7 +43,7 @@ POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(SavesFrames, RegressorMixin, NaNEstimator):
+class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -606,9 +605,6 @@ class DataInformedFEM(SavesFrames, RegressorMixin, NaNEstimator):
         if 2 * scored < len(predicted):
             warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
         return complete_r2(y, predicted)
-
-    def __sklearn_clone__(self) -> DataInformedFEM:
-        return clone_sharing_models(self)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
