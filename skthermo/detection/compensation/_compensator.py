@@ -320,7 +320,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.training_range_ = TrainingRange.of(temperatures, ~np.isnan(as_floats(frequencies)).all(axis=1))
 
     def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
-        """Learn from all rows, and give residuals of each by what the other folds teach."""
+        """Learn from all rows; residuals of each from a clone fitted on the other folds."""
         folds, untested = folds_of(self.cv, temperatures)
         self._learn(temperatures, frequencies)
         partition = [*folds, (untested, untested)] if untested.size else folds

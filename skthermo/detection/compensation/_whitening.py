@@ -21,9 +21,9 @@ ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's te
 class Spread:
     """Mean of residuals, and their covariance by weather.
 
-    ``covariances`` are those at the ``places`` of the baseline's weather, and at last the overall one, for unknown
-    weather; ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's
-    temperatures residuals may be larger.
+    ``covariances`` are those at the ``places`` of the baseline's weather; the last one is the overall covariance, for
+    unknown weather. ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's temperatures
+    residuals may be larger.
     """
 
     overall: Gaussian
