@@ -146,9 +146,8 @@ def what_to_add(
     candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
     simulator = CampaignSimulator(fem, T, changes, study.noise, longest, ranks, check_noise(scatter, len(ranks)))
-    seeds = as_random_state(study.random_state).randint(
-        LARGEST_SEED, size=positive_integer(study.n_repeats, "n_repeats")
-    )
+    n_repeats = positive_integer(study.n_repeats, "n_repeats")
+    seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
     with warnings_once("in the simulations of this study"):
         if ranks:
