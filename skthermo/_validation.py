@@ -42,6 +42,7 @@ else:
 
 __all__ = [
     "BaseSearchCV",
+    "Estimator",
     "HasMethods",
     "Interval",
     "InvalidParameterError",
@@ -56,13 +57,29 @@ __all__ = [
     "_num_samples",
     "check_array",
     "check_is_fitted",
-    "clone_sharing_models",
     "numbers_expected",
     "seed_parts",
     "seeded",
     "validate_data",
     "with_nan",
 ]
+
+
+class Estimator(BaseEstimator):
+    """Base of estimators that accept NaN in X, and of which clones share FE models."""
+
+    def __sklearn_clone__(self) -> Self:
+        parameters = self.get_params(deep=False)
+        twin = type(self)(**{k: v if is_model(v) else clone(v, safe=False) for k, v in parameters.items()})
+        for name in ("_metadata_request", "_sklearn_output_config"):
+            if hasattr(self, name):
+                setattr(twin, name, clone(getattr(self, name), safe=False))
+        return twin
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
@@ -144,18 +161,6 @@ def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | N
             if all(parameters.get(owner) is None for owner in owners):
                 seeds[name] = seed
     estimator.set_params(**seeds)
-
-
-def clone_sharing_models(estimator: BaseEstimator) -> BaseEstimator:
-    """scikit-learn's clone, except that FE models are shared, never copied."""
-    parameters = estimator.get_params(deep=False)
-    twin = type(estimator)(
-        **{name: value if is_model(value) else clone(value, safe=False) for name, value in parameters.items()}
-    )
-    for name in ("_metadata_request", "_sklearn_output_config"):
-        if hasattr(estimator, name):
-            setattr(twin, name, clone(getattr(estimator, name), safe=False))
-    return twin
 
 
 def last_step(estimator: Any) -> Any:

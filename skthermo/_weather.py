@@ -1,4 +1,4 @@
-"""How alike the weather of two records is, and statistics of residuals in order of time."""
+"""Similarity of the weather of two records, and statistics of residuals in order of time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,8 +1,10 @@
 """scikit-learn's own estimator checks, every expected failure named with its reason."""
 
 import importlib
+import inspect
 import pickle
 import pkgutil
+import re
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,7 @@ import pytest
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EllipticEnvelope
 from sklearn.ensemble import IsolationForest
+from sklearn.exceptions import NotFittedError
 from sklearn.impute import KNNImputer
 from sklearn.linear_model import Ridge
 from sklearn.neighbors import LocalOutlierFactor
@@ -180,6 +183,28 @@ def test_fitted_state_has_a_trailing_underscore():
             state -= set(vars(KNNImputer().fit(RECORDS)))  # scikit-learn's own
         hidden = sorted(name for name in state if name.startswith("_") or not name.endswith("_"))
         wrong += [f"{type(estimator).__name__}: {', '.join(hidden)}"] if hidden or not state else []
+    assert not wrong, "\n" + "\n".join(wrong)
+
+
+NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|warn_of$")  # beginnings of names
+
+
+def test_every_method_says_that_the_estimator_is_not_fitted():
+    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY]
+    wrong = []
+    for kind in {type(estimator): estimator for estimator in estimators}.values():
+        for name in dir(type(kind)):
+            if NEED_NO_FIT.match(name):
+                continue
+            try:
+                member = getattr(clone(kind), name)
+                needed = inspect.signature(member).parameters.values() if callable(member) else ()
+                member(*[T for one in needed if one.default is one.empty and one.kind is one.POSITIONAL_OR_KEYWORD])
+                wrong.append(f"{type(kind).__name__}.{name} needs no fit")
+            except NotFittedError:
+                pass
+            except Exception as error:
+                wrong.append(f"{type(kind).__name__}.{name} raises {error!r}")
     assert not wrong, "\n" + "\n".join(wrong)
 
 

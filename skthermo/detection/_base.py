@@ -9,15 +9,15 @@ from typing import Any, Self, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OutlierMixin
+from sklearn.base import OutlierMixin
 
 from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
-from skthermo._validation import Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import warn_user
 
 
-class DamageDetector(OutlierMixin, BaseEstimator, ABC):
+class DamageDetector(OutlierMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
     A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes
@@ -154,8 +154,3 @@ class DamageDetector(OutlierMixin, BaseEstimator, ABC):
                 "missing values",
             )
         return np.where(decision < 0, -1, 1)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags

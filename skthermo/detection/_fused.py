@@ -18,8 +18,9 @@ from skthermo.detection._thresholds import conformal_threshold
 class FusedDetector(DamageDetector, _BaseComposition):
     """Alarm where several detectors together find records far from a healthy baseline.
 
-    The damage index is the mean of theirs, each divided by its own threshold. What one compensator makes of the
-    weather, another may not: their mean is nearly as good as the best of them, or better, without a choice.
+    The damage index is the mean of theirs, each divided by its own threshold. Compensators differ in
+    how well they remove the effect of temperature; the mean index is nearly as good as the best of them, or better,
+    without a choice.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class MahalanobisDetector(DamageDetector):
 
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty. Where the baseline
-    shows that rows with so many modes, or with just these modes, exceed the threshold more or less often than others,
+    shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than others,
     a factor corrects it, shrunk to 1 as far as chance may explain the difference. An alarm then means the same
     whichever modes are missing. Complete rows have the plain distance; rows without any mode have NaN, and
     ``predict`` raises no alarm there.

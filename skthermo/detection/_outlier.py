@@ -79,10 +79,7 @@ class OutlierDetector(DamageDetector):
     that scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)
     """
 
-    _parameter_constraints: dict = {
-        **DamageDetector._parameter_constraints,
-        "estimator": [HasMethods("fit")],
-    }
+    _parameter_constraints: dict = {**DamageDetector._parameter_constraints, "estimator": [HasMethods("fit")]}
 
     def __init__(self, estimator: BaseEstimator, contamination: float = 0.02):
         self.estimator = estimator

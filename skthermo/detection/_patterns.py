@@ -12,7 +12,7 @@ from skthermo._arrays import Array, patterns
 from skthermo.detection._gaussian import Mask
 
 CHANCE = 0.95  # groups of rows get factors only if they differ by more than chance would with this probability
-PATTERN_SHARE = 0.1  # of a pattern's rows are above the level that gives its factor: it has too few alarms for that
+PATTERN_SHARE = 0.1  # of a pattern's rows above the level that gives its factor; alarms alone are too few for that
 FEWEST_ROWS = 50  # of a group that gets a factor of its own
 
 

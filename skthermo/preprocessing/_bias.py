@@ -7,24 +7,24 @@ from typing import Any, Literal, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin
+from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._arguments import is_model
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
+    Estimator,
     HasMethods,
     StrOptions,
     TransformerMixin,
     _fit_context,
     check_array,
     check_is_fitted,
-    clone_sharing_models,
     validate_data,
 )
 
 
-class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
+class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
     """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
@@ -175,11 +175,3 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
                 f"{n_modes} modes of X"
             )
         return reference
-
-    def __sklearn_clone__(self) -> BiasAligner:
-        return clone_sharing_models(self)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags

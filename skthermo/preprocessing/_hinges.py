@@ -8,10 +8,10 @@ from typing import overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
+    Estimator,
     Interval,
     TransformerMixin,
     _check_feature_names_in,
@@ -22,7 +22,7 @@ from skthermo._validation import (
 )
 
 
-class HingeFeatures(TransformerMixin, BaseEstimator):
+class HingeFeatures(TransformerMixin, Estimator):
     """Append max(x - knot, 0) for some knots of every column, so that linear regression fits broken lines.
 
     Frequencies over temperature are broken lines: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
@@ -148,11 +148,6 @@ class HingeFeatures(TransformerMixin, BaseEstimator):
         names = _check_feature_names_in(self, input_features)
         above = [f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in names]
         return np.array([*names, *above], dtype=object)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def weighted_quantiles(values: NDArray[np.float64], shares: NDArray, weights: NDArray) -> NDArray[np.float64]:

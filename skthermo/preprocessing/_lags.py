@@ -10,10 +10,10 @@ from typing import Any, Literal, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
+    Estimator,
     Interval,
     StrOptions,
     TransformerMixin,
@@ -30,7 +30,7 @@ MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end
 LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
-class LagFeatures(TransformerMixin, BaseEstimator):
+class LagFeatures(TransformerMixin, Estimator):
     """Current and earlier values of every sensor: a structure follows the temperature with delay.
 
     Parameters
@@ -160,7 +160,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
             self.history_ = values.copy()
-            self.stamps_ = _nanoseconds(stamps).view("datetime64[ns]")
+            self.stamps_ = stamps.as_unit("ns").asi8.view("datetime64[ns]")
             self.time_zone_ = _time_zone(stamps)
         return self
 
@@ -230,7 +230,7 @@ class LagFeatures(TransformerMixin, BaseEstimator):
     def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> NDArray:
         if (self.time_zone_ is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {_time_zone(stamps)}; expected {self.time_zone_}, as in fit")
-        own, old = _nanoseconds(stamps), self.stamps_.view(np.int64)
+        own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
@@ -248,11 +248,6 @@ class LagFeatures(TransformerMixin, BaseEstimator):
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
         return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
@@ -307,15 +302,11 @@ def _stamps(X: Any) -> pd.DatetimeIndex | None:
 
 
 def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
-    steps = np.diff(np.sort(_nanoseconds(stamps)))
+    steps = np.diff(np.sort(stamps.as_unit("ns").asi8))
     if not steps.size:
         raise ValueError("X has 1 sample, whose stamp gives no step between records; expected freq, such as '1h'")
     lengths, counts = np.unique(steps, return_counts=True)
     return np.timedelta64(lengths[counts.argmax()], "ns")
-
-
-def _nanoseconds(stamps: pd.DatetimeIndex) -> NDArray[np.int64]:
-    return stamps.as_unit("ns").asi8
 
 
 def _time_zone(stamps: pd.DatetimeIndex) -> str | None:

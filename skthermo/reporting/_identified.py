@@ -61,7 +61,7 @@ def identified_damage(identified: Any) -> Html:
         element("h3", "What cannot be said"),
         bullets(_limits(identified)) or paragraphs("All groups can be seen and told apart by the measured modes."),
         figure(
-            "Severity of each group; shift of each natural frequency, measured and explained; and how alike "
+            "Severity of each group; shift of each natural frequency, measured and explained; and how similar "
             "the effects of the groups are: 1 means that two groups change all modes alike and cannot be told apart.",
             [draw_identified_damage(identified)],
         ),

@@ -34,11 +34,12 @@ class Box:
 
     def outside(self, theta: Array) -> NDArray[np.bool_]:
         """Which parameters of each row are outside the box; NaN is not."""
-        return _beyond(theta, self.bounds)
+        lowest, highest = self.bounds.T
+        return (theta < lowest) | (theta > highest)
 
     def far_outside(self, theta: Array) -> NDArray[np.bool_]:
         """Which parameters of each row are not even near the box; NaN is not."""
-        return _beyond(theta, self.near)
+        return Box(self.near, self.names).outside(theta)
 
     def warning(self, theta: Array, far: NDArray[np.bool_]) -> str:
         """Text of the warning if parameters are far outside the box in many rows, else an empty string."""
@@ -56,8 +57,3 @@ class Box:
             f"{lowest:.6g} to {highest:.6g}; expected frequencies in Hz in the order of the model's modes, wider "
             "bounds, or the noise of the measurement"
         )
-
-
-def _beyond(theta: Array, bounds: Array) -> NDArray[np.bool_]:
-    lowest, highest = bounds.T
-    return (theta < lowest) | (theta > highest)

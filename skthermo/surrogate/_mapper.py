@@ -122,12 +122,7 @@ class TemperatureMapper(MultiplierRegressor):
         check_columns(named, "temperature", varying=True)
         weights = None if sample_weight is None else _check_sample_weight(sample_weight, T, ensure_non_negative=True)
         self._learn(
-            T,
-            theta,
-            seeded(self.random_state),
-            log_inputs=False,
-            coordinates=self.coordinates,
-            sample_weight=weights,
+            T, theta, seeded(self.random_state), log_inputs=False, coordinates=self.coordinates, sample_weight=weights
         )
         return self
 

@@ -15,17 +15,12 @@ from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
-from skthermo._validation import (
-    check_array,
-    clone_sharing_models,
-    seed_parts,
-    validate_data,
-)
+from skthermo._validation import Estimator, check_array, seed_parts, validate_data
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
 
 
-class MultiplierRegressor(RegressorMixin, BaseEstimator):
+class MultiplierRegressor(RegressorMixin, Estimator):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
     A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hook:
@@ -155,11 +150,7 @@ class MultiplierRegressor(RegressorMixin, BaseEstimator):
             return values[:, 0]
         return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
 
-    def __sklearn_clone__(self) -> MultiplierRegressor:
-        return clone_sharing_models(self)
-
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
         tags.target_tags.multi_output = True
         return tags

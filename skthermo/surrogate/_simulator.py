@@ -80,19 +80,14 @@ class Simulator:
             if warn:
                 warn_user(
                     f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
-                    "the full one: the weather is unlike that of the training rows",
+                    "the full one: the weather is outside that of the training rows",
                     "outside the reduced model",
                 )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
         return frequencies
 
     def linearise(
-        self,
-        theta: Array,
-        n_jobs: int | None = None,
-        dofs: NDArray[np.intp] | None = None,
-        *,
-        relative: bool = False,
+        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None, *, relative: bool = False
     ) -> tuple[Array, ...]:
         """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters), without warnings.
 

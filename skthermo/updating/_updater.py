@@ -12,13 +12,19 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
 from skthermo._arguments import check_bounds, check_model, check_prior
 from skthermo._arrays import Array, Bounds, real_array
 from skthermo._frames import column_names
-from skthermo._validation import HasMethods, Interval, StrOptions, _fit_context, clone_sharing_models, validate_data
+from skthermo._validation import (
+    Estimator,
+    HasMethods,
+    Interval,
+    StrOptions,
+    _fit_context,
+    validate_data,
+)
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import (
     doubtful_frequencies,
@@ -34,7 +40,7 @@ from skthermo.updating._optimise import Outcome, optimise
 from skthermo.updating._residuals import Residuals
 
 
-class ModelUpdater(BaseEstimator):
+class ModelUpdater(Estimator):
     """Estimate the parameters of an FE model from measured frequencies and, if there are any, mode shapes.
 
     Within bounds on the multipliers theta of the nominal parameters, it minimises
@@ -296,14 +302,6 @@ class ModelUpdater(BaseEstimator):
         parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
         starts = np.vstack([np.ones(len(bounds)), drawn])
         return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
-
-    def __sklearn_clone__(self) -> ModelUpdater:
-        return clone_sharing_models(self)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
 
 
 def _rescaled(model: FEModel, theta: Array) -> FEModel:

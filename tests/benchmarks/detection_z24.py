@@ -35,7 +35,7 @@ WINDOWS = {
 }
 DAY = 24
 """Records in a day of hourly ones."""
-FAR = 0.25
+FAR_OUTSIDE = 0.25
 """Ranges of the baseline's temperatures outside them from which the compensator warns."""
 ASKED = 0.02
 LATER, DAMAGED = "later healthy", "damaged"
@@ -175,12 +175,12 @@ def print_other_detectors(residuals):
 
 def print_short_baselines(records, names, shares):
     """False alarms on the fifth that follows a shorter baseline, and how much of its weather the baseline lacks."""
-    n, foreign = len(records.healthy), {}
+    n, outside = len(records.healthy), {}
     for share in shares:
         first, last = int(share * n), int(share * n) + n // 5
         compensator = TemperatureCompensator(TemperatureMapper(), targets=records.modes).fit(records.healthy[:first])
         excess = compensator.applicability(records.healthy[first:last]).max(axis=1)
-        foreign[f"first {share:.0%}"] = 100 * (excess > FAR).mean()
+        outside[f"first {share:.0%}"] = 100 * (excess > FAR_OUTSIDE).mean()
     rows = {
         (name, str(scale)): {
             f"first {share:.0%}": alarm_rates(
@@ -191,7 +191,7 @@ def print_short_baselines(records, names, shares):
         for name in names
         for scale in (None, "local")
     }
-    rows["records with a temperature far", "outside the baseline's"] = foreign
+    rows["records with a temperature far", "outside the baseline's"] = outside
     print("False alarms on the next fifth of the healthy records after a baseline of only the first records, %\n")
     print(pd.DataFrame(rows).T.round(1).to_string(), end="\n\n")
 

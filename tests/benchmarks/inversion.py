@@ -20,7 +20,7 @@ from skthermo.updating import cramer_rao
 
 EXACT = 1e-5
 NORMAL_90 = 1.645
-FAR = 4
+FAR_DEVIATIONS = 4
 FEW_ROWS = 0.1
 """Share of the rows with a Cramer-Rao deviation within the box up to which they are too few for a mean."""
 MEMBERS = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
@@ -82,14 +82,15 @@ class Inversion:
             here, truth = (self.surprise(inverse, theta, frequencies) for theta in (found.theta, self.test.theta))
             missed = far & (here > truth)
             print(
-                f"{name}: rows with a parameter off by more than {FAR} reported deviations: {far.sum()} of {len(far)};"
+                f"{name}: rows with a parameter off by more than {FAR_DEVIATIONS} reported deviations: "
+                f"{far.sum()} of {len(far)};"
             )
             print(f"  in {missed.sum()} of them the true parameters are more probable than those found")
         print(pd.DataFrame(table, index=self.names).round(3).T.to_string(na_rep="-"))
 
     def far(self, found):
         """Which rows are off by many reported deviations in some parameter."""
-        return (np.abs(found.theta - self.test.theta) > FAR * found.std).any(axis=1)
+        return (np.abs(found.theta - self.test.theta) > FAR_DEVIATIONS * found.std).any(axis=1)
 
     def surprise(self, inverse, theta, frequencies):
         """Minus the logarithm of the posterior density of each row of parameters, up to a constant."""
@@ -112,7 +113,7 @@ class Inversion:
             "share of rows where the Cramer-Rao deviation is within the box": informed.mean().to_numpy(),
             "median of that deviation there, %": 100 * typical.to_numpy(),
             "rms error over that deviation, at most 1.2": rms(ratios),
-            f"the same without rows off by more than {FAR} reported deviations": rms(ratios[~far]),
+            f"the same without rows off by more than {FAR_DEVIATIONS} reported deviations": rms(ratios[~far]),
             "rms error over the reported deviation": rms(reported),
             "coverage of 90 % intervals, 0.85 to 0.95": held.mean(axis=0),
             "share of rows that converged": np.full(len(self.names), found.converged.mean()),

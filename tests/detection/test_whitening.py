@@ -165,7 +165,7 @@ def test_weather_beyond_the_baseline_widens_the_local_spread(scale, width_of_one
 
 
 @pytest.mark.parametrize("scale", [None, "global", "local"])
-def test_foreign_weather_is_counted_in_one_warning(scale):
+def test_weather_outside_the_baseline_is_counted_in_one_warning(scale):
     fitted, hot = compensator(scale).fit(X), LATER.copy()
     hot.iloc[[3, 5, 800], 1] += 60
     with pytest.warns(UserWarning, match="3 of 3000 rows have temperatures far outside") as given:
@@ -186,7 +186,7 @@ def test_a_missing_temperature_takes_the_overall_covariance():
     assert not compensator("local", boosting).fit_transform(holed).isna().any(axis=None)
 
 
-def test_the_row_of_foreign_weather_is_named_beside_gaps():
+def test_the_row_outside_the_baseline_is_named_beside_gaps():
     fitted, hot = compensator(None, HistGradientBoostingRegressor(max_iter=2)).fit(X), LATER[:20].copy()
     hot.iloc[:5, 0] = np.nan
     hot.iloc[7, 1] += 60

@@ -42,7 +42,7 @@ def assert_each_once(texts, kinds):
         (lambda: T.set_axis(range(3), axis=1), [UNNAMED]),
         (lambda: T.to_numpy() + 60, [UNNAMED, FOREIGN, UNEXPLAINED]),
     ],
-    ids=["as in fit", "foreign weather", "arrays", "numbered columns", "foreign arrays"],
+    ids=["as in fit", "outside the training range", "arrays", "numbered columns", "arrays outside the training range"],
 )
 def test_each_kind_of_warning_comes_once(fem, make_T, kinds):
     found, texts, files = warned(fem, make_T(), F)
@@ -68,7 +68,7 @@ def test_networks_of_all_folds_warn_together():
     assert sum(warning.category is ConvergenceWarning for warning in caught) == 1
 
 
-def test_foreign_weather_of_a_reduced_model(reduced_fem):
+def test_weather_outside_the_box_of_a_reduced_model(reduced_fem):
     assert_each_once(warned(reduced_fem, T + 60, F)[1], [FOREIGN, "outside the box of the reduced model", UNEXPLAINED])
 
 

@@ -273,7 +273,7 @@ def test_records_that_cannot_be_judged_do_not_count():
 
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
-def test_foreign_weather_is_said_once(fem):
+def test_weather_outside_the_training_range_is_said_once(fem):
     study = DetectabilityStudy(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2, random_state=0)
     with pytest.warns(UserWarning, match="far outside") as caught:
         study.run(WEATHER + 60)

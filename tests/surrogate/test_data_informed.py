@@ -127,7 +127,7 @@ def test_clone_shares_the_model_and_drops_what_was_fitted():
 
 
 def test_third_party_models_are_held_by_reference():
-    class Foreign:
+    class OwnModel:
         parameter_names = TRUSS.parameter_names
         n_modes = 6
 
@@ -137,11 +137,11 @@ def test_third_party_models_are_held_by_reference():
         def __deepcopy__(self, memo):
             raise AssertionError("copied")
 
-    foreign = Foreign()
-    inverse = InverseSurrogate(foreign, LinearRegression())
-    model = clone(DataInformedFEM(foreign, inverse=inverse, aligner=BiasAligner(foreign), mapper=mapper()))
-    assert model.inverse.model is foreign
-    assert clone(model.fit(T, F).aligner).reference is foreign
+    own = OwnModel()
+    inverse = InverseSurrogate(own, LinearRegression())
+    model = clone(DataInformedFEM(own, inverse=inverse, aligner=BiasAligner(own), mapper=mapper()))
+    assert model.inverse.model is own
+    assert clone(model.fit(T, F).aligner).reference is own
     with pytest.raises(ValueError, match="has no method 'damaged'"):
         model.simulate(T, damage={"top": 0.1})
 

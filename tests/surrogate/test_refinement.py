@@ -248,7 +248,7 @@ def test_fewer_modes_make_estimates_less_sure():
 
 
 def test_weight_of_a_parameter_without_its_mode_is_that_of_the_prior():
-    """Of two oscillators one is missing: its parameter is as sure as the prior, the other as with all modes."""
+    """Of two oscillators one is missing: its parameter deviates as the prior, the other as with all modes."""
     model, noise, width = oscillators(400.0, 900.0, track=True), 0.01, 0.1
     found = surrogate(model, noise=noise, prior=width).invert([[model.frequencies([[1.0, 1.0]])[0, 0], np.nan]])
     precision = 0.25 / noise**2 + 1 / width**2

@@ -195,9 +195,9 @@ class TestForeignWeather:
     def test_is_counted_once_by_predict_and_simulate(self, fitted, weather, value):
         for method in (fitted.predict, fitted.simulate, fitted.predict_parameters):
             record = caught(method, weather)
-            foreign = [str(w.message) for w in record if "temperatures far outside" in str(w.message)]
-            assert len(foreign) == 1
-            assert "expected degrees Celsius" in foreign[0]
+            outside = [str(w.message) for w in record if "temperatures far outside" in str(w.message)]
+            assert len(outside) == 1
+            assert "expected degrees Celsius" in outside[0]
 
     def test_applicability_is_in_units_of_the_training_range(self, fitted):
         width = T.max() - T.min()

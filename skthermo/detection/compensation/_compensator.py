@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from numbers import Integral
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -12,8 +13,16 @@ from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
 
 from skthermo._arrays import Array, as_floats
-from skthermo._frames import check_columns, frame_like, warn_of_absurd, warn_of_disorder
+from skthermo._frames import (
+    check_columns,
+    check_temperatures,
+    frame_like,
+    warn_of_absurd,
+    warn_of_disorder,
+    warn_of_markers,
+)
 from skthermo._validation import (
+    Estimator,
     HasMethods,
     StrOptions,
     TransformerMixin,
@@ -25,14 +34,13 @@ from skthermo._validation import (
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange
 from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
-from skthermo.detection.compensation._targets import check_positions_are_names, positions_of, split_columns
 from skthermo.detection.compensation._whitening import Spread
 
 Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
-class TemperatureCompensator(TransformerMixin, BaseEstimator):
+class TemperatureCompensator(TransformerMixin, Estimator):
     """Residuals of frequencies: measured minus predicted from temperatures.
 
     Parameters
@@ -250,8 +258,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         weather = as_floats(temperatures)
-        known = ~np.isnan(weather).any(axis=1)
-        message = self.training_range_.warning(weather) if known.any() else ""
+        message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
         residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
@@ -313,7 +320,7 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.training_range_ = TrainingRange.of(temperatures, ~np.isnan(as_floats(frequencies)).all(axis=1))
 
     def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
-        """Learn from all rows, and give residuals of each by what the other folds teach."""
+        """Learn from all rows; residuals of each from a clone fitted on the other folds."""
         folds, untested = folds_of(self.cv, temperatures)
         self._learn(temperatures, frequencies)
         partition = [*folds, (untested, untested)] if untested.size else folds
@@ -330,11 +337,6 @@ class TemperatureCompensator(TransformerMixin, BaseEstimator):
         self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
         return white
 
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
-
 
 def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
     """Folds that test every row once, and the first rows, which a splitter that goes forward in time does not test."""
@@ -349,3 +351,54 @@ def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
             "first, as TimeSeriesSplit does"
         )
     return folds, untested
+
+
+def check_positions_are_names(targets: Any, columns: Any) -> None:
+    """Refuse integer targets where they could be names of columns as well as positions."""
+    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
+    if integers and list(columns) not in ([], list(range(len(columns)))):
+        raise ValueError(
+            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
+            "; expected columns named by text, or 0, 1, 2, ..."
+        )
+
+
+def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
+    """Positions of the targets, which are given by name or by position."""
+    targets = list(targets)
+    if targets and all(isinstance(target, str) for target in targets):
+        if names is None:
+            raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
+        columns = list(names)
+        unknown = [target for target in targets if columns.count(target) != 1]
+        if unknown:
+            raise ValueError(f"targets {unknown} are not columns of X, or more than one; expected some of {columns}")
+        positions = [columns.index(target) for target in targets]
+    elif all(isinstance(target, Integral) and not isinstance(target, bool) for target in targets):
+        positions = [int(target) for target in targets]
+        outside = [position for position in positions if not 0 <= position < n_columns]
+        if outside:
+            raise ValueError(f"targets {outside} are not columns of X; expected indexes from 0 to {n_columns - 1}")
+    else:
+        raise ValueError(f"targets is {targets}; expected names of columns or their indexes, not both")
+    if len(set(positions)) < len(positions):
+        raise ValueError(f"targets {targets} repeat a column; expected each once")
+    if not 0 < len(positions) < n_columns:
+        raise ValueError(
+            f"targets are {len(positions)} of the {n_columns} columns of X; expected at least one, and at least one "
+            "other column to predict them from"
+        )
+    return np.array(positions, dtype=np.intp)
+
+
+def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:
+    """The other columns and the targets, as frames if X is one."""
+    columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
+    others = np.delete(np.arange(len(columns)), targets)
+    temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, targets))
+    warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[targets], axis=1))
+    try:
+        check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
+    except ValueError as error:  # only a warning, as another column may be something else than a temperature
+        warn_user(str(error), "temperatures")
+    return temperatures, frequencies

@@ -13,7 +13,7 @@ from skthermo._arrays import Array
 from skthermo._weather import nearest
 from skthermo.detection._gaussian import Gaussian, Mask, whitenings
 
-NEAR_IN_TIME = 24  # records fewer rows apart, a day of hourly ones, do not tell each other's covariance
+NEAR_IN_TIME = 24  # rows, a day of hourly ones: the covariance of a record is learned from records at least so far away
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 

@@ -13,7 +13,7 @@ from skthermo._weather import TrainingRange, nearest, weather_coordinates
 from skthermo.detection._gaussian import Gaussian, check_invertible, whiten_by
 from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
 
-MOST_PLACES = 5000  # baseline records, evenly spaced in time, that tell covariances by weather
+MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned
 ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's temperatures that a record is beyond them
 
 
@@ -21,9 +21,9 @@ ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's te
 class Spread:
     """Mean of residuals, and their covariance by weather.
 
-    ``covariances`` are those at the ``places`` of the baseline's weather, and at last the overall one, for unknown
-    weather; ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's
-    temperatures residuals may be larger.
+    ``covariances`` are those at the ``places`` of the baseline's weather; the last one is the overall covariance, for
+    unknown weather. ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's temperatures
+    residuals may be larger.
     """
 
     overall: Gaussian
@@ -48,9 +48,9 @@ class Spread:
         if not local or len(usable) < 2 * CANDIDATES[0].n_neighbors:
             return plain, white
         coordinates = weather_coordinates(weather[usable])
-        told = spread_evenly(usable, MOST_PLACES)
-        places = coordinates.transform(weather[told])
-        covariance = History(told, places, residuals[told], overall).likeliest()
+        chosen = spread_evenly(usable, MOST_PLACES)
+        places = coordinates.transform(weather[chosen])
+        covariance = History(chosen, places, residuals[chosen], overall).likeliest()
         if covariance is None:
             return plain, white
         step = max(NUMBERS_AT_ONCE // covariance.smoothing.n_neighbors, 1)

@@ -18,7 +18,7 @@ from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection.windows._laws import CountLaw, MeanLaw
 from skthermo.detection.windows._windows import Windows
 
-MOST_PERIODS = 50  # of the baseline, whose windows are judged by what the others teach
+MOST_PERIODS = 50  # into which the baseline is divided; the windows of each are judged by the others
 
 
 class WindowedAlarm(DamageDetector):
@@ -49,11 +49,11 @@ class WindowedAlarm(DamageDetector):
     Attributes
     ----------
     law_ : object
-        What the baseline teaches about windows.
+        Distribution of the records, learned from the baseline, by which windows are judged.
     width_ : int
         Largest number of records in a window.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline's windows, each judged by what other periods teach.
+        Damage index of the baseline's windows, each by a distribution learned from the other periods.
     threshold_ : float
         A damage index above it is an alarm.
     offset_ : float
@@ -72,7 +72,7 @@ class WindowedAlarm(DamageDetector):
     -----
     Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a
     single one. The standard deviation of a mean therefore includes the mean correlation of two records in one window,
-    mode by mode. The threshold comes from the baseline's own windows, each judged by what other periods teach; the
+    mode by mode. The threshold comes from the baseline's own windows, each judged by the other periods; the
     number of independent ones, by the correlation time of the highest (at least half a window), decides which index it
     is. If there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
     compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
@@ -132,7 +132,7 @@ class WindowedAlarm(DamageDetector):
         return np.concatenate(index)
 
     def _law(self, windows: Windows, rows: NDArray[np.intp]) -> MeanLaw | CountLaw:
-        """What the records in some rows teach about windows."""
+        """The distribution learned from the records in some rows."""
         if self.rule == "mean":
             return MeanLaw.of(windows, rows)
         return CountLaw.of(windows, rows, self.contamination, self.m)

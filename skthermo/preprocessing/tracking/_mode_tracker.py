@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import TransformerMixin
 
-from skthermo._validation import Interval, _fit_context, check_is_fitted
+from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.preprocessing._stamps import as_duration, as_stamps
 from skthermo.preprocessing.tracking._assignment import assign_near, assign_while_following, fitting_pairs
 from skthermo.preprocessing.tracking._poles import read_poles
@@ -19,7 +19,7 @@ from skthermo.preprocessing.tracking._reference import ReferenceModes, read_refe
 from skthermo.preprocessing.tracking._results import TrackedModes, tracked_modes, warn_of_doubts
 
 
-class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
+class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     """Assign the poles of each record to the modes of a reference, by mode shape and frequency.
 
     Operational modal analysis finds in each record any number of poles, in the order of their frequencies. Some are
@@ -268,5 +268,4 @@ class ModeTracker(TransformerMixin, BaseEstimator, auto_wrap_output_keys=None):
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.two_d_array = False
-        tags.input_tags.allow_nan = True
         return tags

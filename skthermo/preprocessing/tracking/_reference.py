@@ -37,15 +37,11 @@ class ReferenceModes(NamedTuple):
             similar &= mac[pairs[:, 0], pairs[:, 1]] >= min_mac
         if similar.any():
             first = "/".join(self.names[mode] for mode in pairs[similar][0])
-            by = (
-                "no shapes are given"
-                if self.shapes is None
-                else f"their shapes at the sensors have a MAC of {min_mac:g}"
-            )
+            by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
             warn_user(
                 f"{similar.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
-                f"frequency can lie within max_shift={max_shift:g} of both, and "
-                f"{'no shapes are given' if self.shapes is None else by}; expected a smaller max_shift or more sensors",
+                f"frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift or "
+                "more sensors",
                 "modes that can be confused",
             )
 

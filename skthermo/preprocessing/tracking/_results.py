@@ -107,8 +107,7 @@ def warn_of_doubts(
     is_free = ~np.isin(np.arange(len(poles.record)), pairs.pole[chosen])
     left = pairs.at(is_free[pairs.pole])
     _warn_of_losses(left, left.frequency / followed[left.record, left.mode], found, modes.names)
-    if modes.shapes is not None:
-        _warn_of_other_shapes(poles, is_free, followed, found, modes)
+    _warn_of_other_shapes(poles, is_free, followed, found, modes)
     n_present = (~np.isnan(poles.shapes)).sum(axis=1)
     is_zero = ~np.nan_to_num(poles.shapes).any(axis=1)
     n_without = (is_zero | (n_present < min(2, poles.shapes.shape[1]))).sum()

@@ -15,12 +15,9 @@ from skthermo._arrays import Array, real_array
 from skthermo._warnings import warn_user
 from skthermo.studies.detectability._intervals import clopper_pearson
 
-DOUBT = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
-MISSED = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
-
-
+MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
+MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
 MOST_NEWTON_STEPS = 100
-
 CONVERGED = 1e-10  # Newton's decrement, in units of log likelihood, at which the fit ends
 FLAT = 1e-6  # increase of the logit over the tested severities up to which the curve counts as flat
 
@@ -86,11 +83,11 @@ class PODCurve:
         """
         if np.isnan(self.slope):
             return 0
-        confidence = 1 - DOUBT / len(self.severities)
+        confidence = 1 - MISFIT_CHANCE / len(self.severities)
         counts = zip(self.n_detected, self.n_records, strict=True)
         lowest, highest = np.array([clopper_pearson(k, n, confidence) for k, n in counts]).T
         pod = self.predict(self.severities)[0]
-        return int(((pod < lowest - MISSED) | (pod > highest + MISSED)).sum())
+        return int(((pod < lowest - MISFIT_MARGIN) | (pod > highest + MISFIT_MARGIN)).sum())
 
     def predict(self, severity: ArrayLike) -> tuple[Any, Any, Any]:
         """POD at some severities, with bounds.
@@ -113,7 +110,10 @@ class PODCurve:
         ValueError
             If a severity is not a number of this sign.
         """
-        places = places_of(self._magnitudes(severity), self.log)
+        magnitudes = real_array(severity, "severity") * np.sign(self.severities[0])
+        if not (magnitudes >= 0).all():
+            raise ValueError(f"severity is {severity!r:.200}; expected the sign of those tested, {self.severities}")
+        places = np.log(magnitudes) if self.log else magnitudes
         centre = self.intercept + self.slope * places
         deviation = np.sqrt(
             self.covariance[0, 0] + places * (2 * self.covariance[0, 1] + places * self.covariance[1, 1])
@@ -156,12 +156,6 @@ class PODCurve:
             place = (-b + np.sign(z) * np.sqrt(max(b**2 - a * c, 0.0))) / a
             magnitude = np.exp(place) if self.log else max(place, 0.0)
         return float(np.sign(self.severities[0]) * magnitude)
-
-    def _magnitudes(self, severity: ArrayLike) -> Array:
-        magnitudes = real_array(severity, "severity") * np.sign(self.severities[0])
-        if not (magnitudes >= 0).all():
-            raise ValueError(f"severity is {severity!r:.200}; expected the sign of those tested, {self.severities}")
-        return magnitudes
 
     def __repr__(self) -> str:
         return f"PODCurve(a50={self.a50:.3g}, a90={self.a90:.3g}, a90_95={self.a90_95:.3g}, log={self.log})"
@@ -220,15 +214,17 @@ def pod_curve(
     """
     s, k, n = checked_counts(severities, n_detected, n_records)
     check_probability(confidence, "confidence")
-    x, bracket = places_of(np.abs(s), log), bracket_of(s, k / n, 0.9)
+    x, bracket = np.log(np.abs(s)) if log else np.abs(s), bracket_of(s, k / n, 0.9)
     coefficients, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
     if not k.any() or not (n - k).any() or x[k < n].max() <= x[k > 0].min():
         expected = "severities in between, with some misses and hits"
         if not k.any():
             expected = "some records in alarm: severities are small, or outliers of the baseline raise the threshold"
+        lowest, highest = bracket
+        place = f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
-            f"unknown, and a90 lies {within(bracket)}; expected {expected}",
+            f"unknown, and a90 lies {place}; expected {expected}",
             "separated severities",
         )
     else:
@@ -284,11 +280,6 @@ def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: Arra
     return s, k, n
 
 
-def places_of(magnitudes: Array, log: bool) -> Array:
-    """Places on the axis along which the logit is linear: magnitudes of severities, or their logarithms."""
-    return np.log(magnitudes) if log else magnitudes
-
-
 def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, float]:
     """Magnitudes of the highest severity with a POD below a level, and of the next one."""
     magnitudes = np.abs(severities)
@@ -297,12 +288,6 @@ def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, floa
         return 0.0, float(magnitudes[0])
     above = magnitudes[magnitudes > magnitudes[below[-1]]]
     return float(magnitudes[below[-1]]), float(above[0]) if above.size else float("nan")
-
-
-def within(bracket: tuple[float, float]) -> str:
-    """Text of a bracket, whose upper end may be unknown (NaN)."""
-    lowest, highest = bracket
-    return f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
 
 
 def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:

@@ -23,8 +23,7 @@ from skthermo.studies.detectability._simulation import SIMULATED, Simulation, cl
 from skthermo.studies.detectability._view import read_baseline
 from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
 
-MANY_FALSE_ALARMS = 0.5
-"""Rate of false alarms above which a warning says that baseline and simulation are not of the same structure."""
+MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
@@ -83,8 +82,8 @@ class DetectabilityStudy(BaseEstimator):
     The intervals are those of a rate over noise, for this weather, this baseline and this model: another year, another
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
     their number over the design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten
-    correlation times in different repeats, to that of independent records. With it, Clopper-Pearson bounds are honest
-    also for rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between
+    correlation times in different repeats, to that of independent records. With it, Clopper-Pearson bounds keep
+    their confidence also for rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between
     blocks of time holds that of the weather, too.
 
     References

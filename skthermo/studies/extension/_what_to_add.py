@@ -24,13 +24,10 @@ from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator
 from skthermo.studies.scenarios import Scenario
 
 SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)  # severities at which a family is simulated, in units of its present a90
-HIGHEST_SEVERITY = 0.95
-N_MODES = 3
-CONFIDENCE = 0.95
-
-DOUBTFUL_RATIO = 2.0
-"""Error of a mode predicted from one record, relative to that of the measured modes, above which its gain is doubtful.
-"""
+HIGHEST_SEVERITY = 0.95  # of those that are simulated
+N_MODES = 3  # number of further modes that are candidates by default
+CONFIDENCE = 0.95  # of the bounds of a gain
+DOUBTFUL_RATIO = 2.0  # scatter of a mode predicted from one record, over that of measured modes, that makes it doubtful
 
 
 @dataclass(frozen=True)
@@ -149,9 +146,8 @@ def what_to_add(
     candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
     simulator = CampaignSimulator(fem, T, changes, study.noise, longest, ranks, check_noise(scatter, len(ranks)))
-    seeds = as_random_state(study.random_state).randint(
-        LARGEST_SEED, size=positive_integer(study.n_repeats, "n_repeats")
-    )
+    n_repeats = positive_integer(study.n_repeats, "n_repeats")
+    seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
     with warnings_once("in the simulations of this study"):
         if ranks:

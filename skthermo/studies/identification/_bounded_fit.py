@@ -45,10 +45,8 @@ def fit_severities(effects: Effects, shift: Array, whitening: Array, n_groups: i
         severities = found
     change, slopes = effects(severities)
     residual = whitening @ (shift - change)
-    whitened = whitening @ slopes
-    return BoundedFit(
-        severities, float(residual @ residual), whitened, residual + whitened @ severities, change, converged
-    )
+    misfit, whitened = float(residual @ residual), whitening @ slopes
+    return BoundedFit(severities, misfit, whitened, residual + whitened @ severities, change, converged)
 
 
 def solve(slopes: Array, target: Array) -> Array:

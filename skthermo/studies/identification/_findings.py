@@ -1,7 +1,5 @@
 """The result of an identification: tables and tests from fits."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pandas as pd
 
@@ -40,10 +38,11 @@ def findings(
     errors, covariance = standard_errors(fit, N_DRAWS, random)
     for column in {column for group in confused for column in group}:
         errors[column] = max(errors[column], error_beside(at_nominal, fit.severities, column))
-    p_values = [
-        p_of_group(fit, without, shift.n_periods, column, at_nominal)
-        for column, without in enumerate(_fits_without(comparison, fit))
-    ]
+    p_values = []
+    for column, severity in enumerate(fit.severities):
+        others = [[other] for other in range(len(names)) if other != column]
+        without = comparison.of(others).fit() if severity > 0 else fit
+        p_values.append(p_of_group(fit, without, shift.n_periods, column, at_nominal))
     table = pd.DataFrame(
         {
             "severity": fit.severities,
@@ -85,13 +84,6 @@ def _shift_table(shift: Shift, fit: BoundedFit) -> pd.DataFrame:
         },
         index=list(shift.modes),
     )
-
-
-def _fits_without(comparison: Comparison, fit: BoundedFit) -> Iterator[BoundedFit]:
-    """The best fit without each group, in which the other severities may be quite different."""
-    for column, severity in enumerate(fit.severities):
-        others = [[other] for other in range(len(fit.severities)) if other != column]
-        yield comparison.of(others).fit() if severity > 0 else fit
 
 
 def _single_fits(comparison: Comparison, shift: Shift) -> pd.DataFrame:

@@ -14,9 +14,7 @@ from skthermo._formatting import listed
 from skthermo.studies.identification._bounded_fit import HIGHEST_SEVERITY
 from skthermo.studies.scenarios import UncertainDamage
 
-NEAR_2_PI = 0.25
-"""Relative distance from 2 pi up to which ratios of frequencies suggest rad/s."""
-
+NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
 CLEARLY_HIGHER = 2.0  # standard errors by which a frequency must rise to count as higher
 
 

@@ -57,7 +57,7 @@ def identify_damage(
         Whether groups that cannot be told apart get one severity together.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
-        complex ones are turned to be real, and NaN stands for what was not measured.
+        complex ones are rotated to be real; NaN where a component was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
@@ -82,7 +82,7 @@ def identify_damage(
     Warns
     -----
     UserWarning
-        Once for each kind: if the weather is unlike that of the training records, temperatures have other names than in
+        Once for each kind: if the weather is outside the training range, temperatures have other names than in
         fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
         the shifts.
 

@@ -12,7 +12,7 @@ from skthermo._validation import check_is_fitted
 
 
 class BaseScenario(ABC):
-    """A name, what is changed from the onset on, and the place in a family of scenarios that differ in severity only.
+    """What changes in a structure from the onset on; scenarios of one family differ in severity only.
 
     The severity is NaN where there is no single one, and the onset None where the change is there from the beginning.
     The repeats of a study take ``n_draws`` different states in turn.

@@ -18,13 +18,13 @@ from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import (
+    Estimator,
     HasMethods,
     Interval,
     StrOptions,
     _fit_context,
     check_array,
     check_is_fitted,
-    clone_sharing_models,
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
@@ -43,7 +43,7 @@ POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
+class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -517,7 +517,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
     @overload
     def expected_residuals(self, X: pd.DataFrame, return_number: Literal[True]) -> tuple[pd.DataFrame, Array]: ...
     @overload
-    def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any: ...
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[False] = False) -> Array: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: Literal[True]) -> tuple[Array, Array]: ...
+    @overload
+    def expected_residuals(self, X: ArrayLike, return_number: bool) -> Any: ...
     def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
         """Mean relative residual of the training records in weather like that of each row.
 
@@ -606,12 +610,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
             warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
         return complete_r2(y, predicted)
 
-    def __sklearn_clone__(self) -> DataInformedFEM:
-        return clone_sharing_models(self)
-
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
         tags.target_tags.multi_output = True
         tags.target_tags.single_output = False
         return tags
@@ -634,10 +634,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, BaseEstimator):
 
     def _weather(self, X: ArrayLike) -> Array:
         """Inputs of M2."""
-        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)))
+        T = self._temperatures(X)
+        return as_floats(inputs_of_last_step(self.mapper_, T))
 
     def _predict_theta(self, X: ArrayLike) -> Array:
-        """Parameters at given temperatures, with warnings about weather and parameters that are unlike the training."""
+        """Parameters at given temperatures; warns of weather outside the training range and impossible parameters."""
         T = self._temperatures(X)
         message = self.training_range_.warning(inputs_of_last_step(self.mapper_, T))
         if message:

@@ -22,11 +22,9 @@ from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
-LEAST_SCATTER = 1e-12
-
+LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
 MOST_SCORED = 365  # largest number of rows that errors are computed for
-ROWS_PER_PARAMETER = 10
-
+ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
 UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
 LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
@@ -151,7 +149,6 @@ class FitReport(SavesFrames):
                 f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these "
                 "modes: see report_.offsets, update the model, or use aligner=BiasAligner(model)",
             )
-
         round_trip = pd.Series(dtype=float) if self.round_trip is None else self.round_trip.abs()
         if (round_trip > self.scatter.clip(lower=UNSEEN)).any():
             worst = (round_trip / self.scatter.clip(lower=UNSEEN)).idxmax()

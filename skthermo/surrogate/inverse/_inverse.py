@@ -109,7 +109,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
         Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
-        ``noise`` or, where it is 0, what the model leaves of the records that `fit` saw; 0.001 where they cannot tell.
+        ``noise`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where
+        that cannot be estimated.
     n_parameters_ : int
         Number of parameters.
     parameter_names_ : list of str or None
