@@ -114,9 +114,12 @@ class TemperatureMapper(MultiplierRegressor):
         ------
         ValueError
             If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
-            that stands for a missing value, such as -999, or fewer than two rows are complete.
+            that stands for a missing value, such as -999, or fewer than two rows are complete; if the ``coordinates``
+            are of another number of parameters, or a multiplier is not positive there.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
+        if self.coordinates is not None:
+            self.coordinates.check(theta)
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)

@@ -1,30 +1,79 @@
 """Standardisation of inputs and targets: logarithms, coordinates of frequencies, zero mean, unit variance."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrequencyCoordinates:
-    """Coordinates z = A ln theta: the changes of ln f that belong to changes of ln theta, to first order.
+    """Coordinates z = A ln theta in which errors of parameters count as much as they change the frequencies.
 
-    ``sensitivities`` is A, (n_modes, n_parameters): d ln f / d ln theta in units of any scale. ``damping``, a number or
-    (n_parameters,), is what damped least squares adds to the diagonal of A'A to find ln theta again.
+    Parameters
+    ----------
+    sensitivities : array-like of shape (n_modes, n_parameters)
+        A: derivatives d ln f / d ln theta of an FE model, divided by the relative standard deviation of each mode.
+    damping : float or array-like of shape (n_parameters,), default=0.0
+        What damped least squares adds to the diagonal of A'A to find ln theta again. It keeps parameters that hardly
+        change the frequencies near their means.
+
+    Raises
+    ------
+    ValueError
+        If the sensitivities are no table of finite numbers, or the damping is negative or of another length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import linearise
+    >>> from skthermo.surrogate import FrequencyCoordinates, TemperatureMapper
+    >>> jacobian = linearise(make_truss(), np.ones((1, 4)), relative=True)[1][0]
+    >>> mapper = TemperatureMapper(coordinates=FrequencyCoordinates(jacobian / 0.01, damping=1.0))
     """
 
-    sensitivities: Array
-    damping: Array | float = 0.0
+    sensitivities: ArrayLike
+    damping: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        A, damping = real_array(self.sensitivities, "sensitivities"), real_array(self.damping, "damping")
+        if A.ndim != 2 or not np.isfinite(A).all():
+            raise ValueError(f"sensitivities have shape {A.shape}; expected finite numbers, (n_modes, n_parameters)")
+        if damping.shape not in ((), A.shape[1:]) or not ((damping >= 0) & np.isfinite(damping)).all():
+            raise ValueError(f"damping is {damping}; expected one number from 0, or {A.shape[1]}, one a parameter")
+        object.__setattr__(self, "sensitivities", A)
+        object.__setattr__(self, "damping", np.broadcast_to(damping, A.shape[1:]))
 
     @property
     def inverse(self) -> Array:
         """(A'A + damping)^-1 A', the pseudo-inverse without damping, (n_parameters, n_modes)."""
         A = self.sensitivities
-        damping = np.broadcast_to(self.damping, (A.shape[1],))
-        return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(damping))]))[:, : len(A)]
+        return np.linalg.pinv(np.vstack([A, np.diag(np.sqrt(self.damping))]))[:, : len(A)]
+
+    def check(self, theta: Array) -> None:
+        """Refuse parameters that these coordinates are not of.
+
+        Parameters
+        ----------
+        theta : ndarray of shape (n_samples, n_parameters)
+            Multipliers; NaN is ignored.
+
+        Raises
+        ------
+        ValueError
+            If a multiplier is not positive, or their number is another one.
+        """
+        n_parameters = self.sensitivities.shape[1]
+        if theta.shape[1] != n_parameters:
+            raise ValueError(f"theta has {theta.shape[1]} columns; expected the {n_parameters} of the sensitivities")
+        if (theta <= 0).any():
+            raise ValueError(f"theta falls to {np.nanmin(theta):g}; expected positive multipliers with coordinates")
 
 
 @dataclass(frozen=True)
@@ -49,7 +98,7 @@ class Standardiser:
         log: bool,
         coordinates: FrequencyCoordinates | None = None,
         sample_weight: Array | None = None,
-    ) -> "Standardiser":
+    ) -> Standardiser:
         """Mean and standard deviation of some values; the scale of a constant column is 1."""
         x = np.log(values) if log else values
         z = x if coordinates is None else x @ coordinates.sensitivities.T

@@ -10,8 +10,8 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.fem import Beam, Spring, Structure, add_noise
 from skthermo.metrics import mape
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
+from skthermo.surrogate import DataInformedFEM, FrequencyCoordinates, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate._standardiser import Standardiser
 from tests.surrogate.chains import TRUSS, F, T
 
 
@@ -124,3 +124,21 @@ def test_parameters_that_no_mode_tells_apart_stay_near_each_other():
     assert mape(model.frequencies(truth), chain.predict(temperatures)).max() < 0.2
     theta = chain.predict_parameters(temperatures)
     np.testing.assert_allclose(theta[:, 1], theta[:, 2], rtol=0.05)
+
+
+def test_coordinates_of_other_parameters_or_values_are_refused():
+    T, theta = np.linspace(0, 30, 20)[:, np.newaxis], np.linspace(0.9, 1.1, 40).reshape(20, 2)
+    for sensitivities, message in (
+        ([1.0, 2.0], r"sensitivities have shape \(2,\); expected finite numbers"),
+        ([[1.0, np.nan]], r"sensitivities have shape \(1, 2\); expected finite numbers"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            FrequencyCoordinates(sensitivities)
+    with pytest.raises(ValueError, match=r"damping is \[1. 2. 3.\]; expected one number from 0, or 2"):
+        FrequencyCoordinates(np.eye(2), [1.0, 2.0, 3.0])
+    mapper = TemperatureMapper(coordinates=FrequencyCoordinates(np.eye(3)))
+    with pytest.raises(ValueError, match="theta has 2 columns; expected the 3 of the sensitivities"):
+        mapper.fit(T, theta)
+    mapper = TemperatureMapper(coordinates=FrequencyCoordinates(np.eye(2)))
+    with pytest.raises(ValueError, match=r"theta falls to -0\.1; expected positive multipliers"):
+        mapper.fit(T, theta - 1)

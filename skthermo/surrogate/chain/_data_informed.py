@@ -487,7 +487,16 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         shape = (np.shape(X)[0], len(self.mode_names_))
         return check_noise(noise, shape[1]) * random.standard_normal(shape)
 
-    def simulate_modes(self, X: ArrayLike, modes: Sequence[int], **changes: Any) -> Array:
+    def simulate_modes(
+        self,
+        X: ArrayLike,
+        modes: Sequence[int],
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
         """Frequencies of other modes than the measured ones, without noise and as the model gives them.
 
         Parameters
@@ -496,8 +505,12 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Temperatures in degrees Celsius.
         modes : sequence of int
             Ranks of modes of the healthy nominal model, the lowest being 0.
-        **changes
-            ``damage``, ``parameters``, ``stiffness`` and ``mass``, as in `simulate`.
+        damage : mapping of str to float or array-like of shape (n_samples,), optional
+            As in `simulate`, and so are the next three.
+        parameters : mapping of str to float, optional
+            Factors of parameters.
+        stiffness, mass : matrix of shape (n_dof, n_dof), optional
+            What is added.
 
         Returns
         -------
@@ -510,7 +523,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             As in `simulate`; if the model has no such modes.
         """
         check_is_fitted(self)
-        return self._simulate(X, modes, **changes)
+        return self._simulate(X, modes, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
 
     @overload
     def expected_residuals(self, X: pd.DataFrame, return_number: Literal[False] = False) -> pd.DataFrame: ...
