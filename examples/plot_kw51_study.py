@@ -23,7 +23,6 @@ from joblib import Parallel, delayed
 from kw51_recipes import (
     BASELINE,
     DEFAULT,
-    MODEL,
     MODES,
     NOISE,
     PAIR,
@@ -31,6 +30,7 @@ from kw51_recipes import (
     TRAINED,
     Fitted,
     Records,
+    bridge,
     quiet,
 )
 from kw51_tables_recipes import (
@@ -124,7 +124,7 @@ show(table_of_updating())
 # %%
 # One record tells the five moduli that depend on temperature to so many percent of their values:
 
-known = identifiability(MODEL, noise=NOISE)
+known = identifiability(bridge(), noise=NOISE)
 print((100 * known.deviations).round(2).to_frame().T.to_string(index=False))
 
 # %%
@@ -132,7 +132,7 @@ print((100 * known.deviations).round(2).to_frame().T.to_string(index=False))
 # ----------------------------------
 # Parameters of test samples, and as M1 finds them with the paper's network.
 
-test = sample(MODEL, 0.3, 200, random_state=1)
+test = sample(bridge(), 0.3, 200, random_state=1)
 with quiet():
     found = paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES))
 true = pd.DataFrame(test.theta, columns=PARAMETERS)
@@ -143,7 +143,7 @@ PredictionDisplay.from_predictions(true, found, labels=("true", "by M1"), kind="
 # there is no noise. A few rows have not converged after a hundred steps: a warning counts them, which is silenced here.
 
 with quiet():
-    show(table_5(MODEL))
+    show(table_5(bridge()))
 
 # %%
 # M2: from temperatures to parameters

@@ -38,7 +38,8 @@ def records():
 @pytest.fixture(scope="module")
 def fitted(records):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "MODEL", make_kw51(updated=True).reduced(0.3, tol=2e-4, random_state=0))
+        model = make_kw51(updated=True).reduced(0.3, tol=2e-4, random_state=0)
+        patch.setattr(study, "bridge", lambda: model)
         return study.Fitted.by(records, study.RECIPES[study.DEFAULT])
 
 
