@@ -232,6 +232,7 @@ def read(file: str, form: str) -> Any:
 
 
 def main() -> None:
+    """Read the files that standard input names, within the limits that it sets."""
     job = json.load(sys.stdin)
     with contextlib.suppress(ImportError, OSError, ValueError):  # where the platform has no limits
         import resource
