@@ -55,19 +55,6 @@ def quality(study: Any) -> Html:
     """Errors by mode, doubtful data, predicted and measured frequencies, and agreement with reference records."""
     report = study.fem.report_
     T, F = training_tables(study.fem)
-    errors = report.errors[["MAPE", "MAPE of the mean"]].to_numpy()
-    modes = [
-        [name, *(f"{significant(error)} %" for error in pair), f"{offset:+.1f} %"]
-        for (name, offset), pair in zip(report.offsets.items(), errors, strict=True)
-    ]
-    parameters = [
-        [
-            name,
-            share_text(deviation) if np.isfinite(deviation) else "not determined",
-            share_text(report.outside.iloc[i]),
-        ]
-        for i, (name, deviation) in enumerate(report.deviations.items())
-    ]
     error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
     measured, predicted, temperature = _over_temperature(study.fem, T, F)
     sensor = temperature.name
@@ -81,7 +68,7 @@ def quality(study: Any) -> Html:
         table(
             "Errors of the predicted frequencies, and how far the measured mean is from the model before it learned.",
             ["Mode", "Mean error", "Error of the mean frequency", "Measured mean against the model"],
-            modes,
+            _modes(report),
         ),
         figure(
             f"Frequencies over the temperature {sensor}, which goes most closely with them: measured, and predicted by "
@@ -96,13 +83,28 @@ def quality(study: Any) -> Html:
         table(
             "Stiffnesses that the model adjusts to temperature.",
             ["Parameter", "Smallest possible standard deviation", "Records outside the range"],
-            parameters,
+            _parameters(report),
         ),
         element("h3", "What is doubtful"),
         bullets(_doubts(report)) or paragraphs("Nothing is doubtful about the records, the modes or the stiffnesses."),
         *_agreement(study.results_),
     ]
     return section("model", "How good the model is", *parts)
+
+
+def _modes(report: Any) -> list[list[str]]:
+    errors = report.errors[["MAPE", "MAPE of the mean"]].to_numpy()
+    return [
+        [name, *(f"{significant(error)} %" for error in pair), f"{offset:+.1f} %"]
+        for (name, offset), pair in zip(report.offsets.items(), errors, strict=True)
+    ]
+
+
+def _parameters(report: Any) -> list[list[str]]:
+    return [
+        [name, share_text(deviation) if np.isfinite(deviation) else "not determined", share_text(share)]
+        for (name, deviation), share in zip(report.deviations.items(), report.outside, strict=True)
+    ]
 
 
 def training_tables(fem: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
