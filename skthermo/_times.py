@@ -12,7 +12,7 @@ from skthermo._validation import _num_samples
 
 def row_times(T: Any) -> Array:
     """Time of every row since the first one in nanoseconds, or its number where T has no ``DatetimeIndex``."""
-    if not _has_stamps(T):
+    if not has_stamps(T):
         return np.arange(_num_samples(T), dtype=float)
     stamps = T.index.as_unit("ns").asi8
     return (stamps - stamps[:1]).astype(float)
@@ -20,7 +20,7 @@ def row_times(T: Any) -> Array:
 
 def time_of(T: Any, moment: Any, what: str) -> float:
     """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last."""
-    times, is_timed = row_times(T), _has_stamps(T)
+    times, is_timed = row_times(T), has_stamps(T)
     if isinstance(moment, int | np.integer) and not isinstance(moment, bool) and moment >= 0:
         return float(times[moment]) if moment < len(times) else np.inf
     try:
@@ -33,5 +33,6 @@ def time_of(T: Any, moment: Any, what: str) -> float:
     raise ValueError(f"{what} is {moment!r} for {len(times)} records; expected {expected}")
 
 
-def _has_stamps(T: Any) -> bool:
+def has_stamps(T: Any) -> bool:
+    """Whether rows have times: a frame on a ``DatetimeIndex``."""
     return isinstance(getattr(T, "index", None), pd.DatetimeIndex)

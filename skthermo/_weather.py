@@ -1,4 +1,4 @@
-"""Similarity of the weather of two records, and statistics of residuals in order of time."""
+"""Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
+from skthermo._gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
@@ -62,6 +63,34 @@ class TrainingRange:
         )
 
 
+@dataclass(frozen=True)
+class SensorRegression:
+    """What each sensor shows, given any others, as learned from records."""
+
+    gaussian: Gaussian
+    learned: Array
+
+    @classmethod
+    def of(cls, temperatures: Any) -> "SensorRegression":
+        """Learn from records; a sensor without any value is not learned."""
+        values = as_floats(temperatures)
+        learned = ~np.isnan(values).all(axis=0)
+        return cls(Gaussian.of(values[:, learned]), learned)
+
+    def fill(self, temperatures: Any) -> tuple[Array, Array]:
+        """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
+
+        These are zero where a sensor has a value. Rows without any value stay NaN.
+        """
+        values = as_floats(temperatures).copy()
+        deviations = np.where(np.isnan(values), np.nan, 0.0)
+        gaps = np.isnan(values[:, self.learned]).any(axis=1)
+        if gaps.any():
+            rows = np.ix_(gaps, self.learned)
+            values[rows], deviations[rows] = self.gaussian.completed(values[rows])
+        return values, deviations
+
+
 def weather_coordinates(weather: Array) -> Pipeline:
     """Principal components of the standardised weather, in which similar records are near each other."""
     return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(weather)
@@ -76,17 +105,3 @@ def order_statistic(scores: Array, confidence: float) -> float:
     """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
     rank = int(np.ceil((len(scores) + 1) * confidence))
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
-
-
-def correlation_time(series: Array) -> float:
-    """1 + 2 * the sum of the autocorrelations up to the first that is not clearly above zero."""
-    known = ~np.isnan(series)
-    centred = np.where(known, series - series[known].mean(), 0.0) if known.any() else np.zeros(len(series))
-    variance, time = (centred**2).sum() / max(known.sum(), 1), 1.0
-    for lag in range(1, len(series) // 10 if variance > 0 else 1):
-        pairs = max(np.count_nonzero(known[lag:] & known[:-lag]), 1)
-        correlation = (centred[lag:] @ centred[:-lag]) / pairs / variance
-        if correlation <= 2 / np.sqrt(pairs):
-            break
-        time += 2 * correlation
-    return time

@@ -20,7 +20,7 @@ MAY_IMPORT = {
     "fem": set(),
     "preprocessing": set(),
     "metrics": set(),
-    "detection": {"metrics"},
+    "detection": {"metrics", "preprocessing"},
     "surrogate": {"fem", "metrics", "preprocessing", "updating"},
     "updating": {"fem", "metrics"},
     "datasets": {"fem"},

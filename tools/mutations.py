@@ -160,13 +160,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),
     ],
-    ("detection/_gaussian.py", "detection/test_gaps.py"): [
+    ("_gaussian.py", "detection/test_gaps.py"): [
         ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),
         ("mean of modes with gaps", "[[mean + step], (updated", "[[mean], (updated"),
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
         ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
     ],
-    ("detection/_gaussian.py", "detection/test_whitening.py"): [
+    ("_gaussian.py", "detection/test_whitening.py"): [
         ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
     ],
     ("detection/_patterns.py", "detection/test_gaps.py"): [

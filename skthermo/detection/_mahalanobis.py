@@ -11,10 +11,10 @@ from sklearn.covariance import EmpiricalCovariance
 from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
+from skthermo._gaussian import Gaussian, check_invertible, check_not_empty
 from skthermo._validation import HasMethods, StrOptions
 from skthermo._warnings import warn_user
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._gaussian import Gaussian, check_invertible, check_not_empty
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 

@@ -9,8 +9,8 @@ from scipy.spatial.distance import mahalanobis
 from scipy.stats import chi, multivariate_normal
 from sklearn.covariance import LedoitWolf
 
+from skthermo._gaussian import Gaussian, patterns
 from skthermo.detection import MahalanobisDetector
-from skthermo.detection._gaussian import Gaussian, patterns
 from skthermo.detection._patterns import as_if_complete
 
 MEAN = np.array([4.0, 9.0, 12.0])

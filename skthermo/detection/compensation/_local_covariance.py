@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._gaussian import Gaussian, Mask, whitenings
 from skthermo._weather import nearest
-from skthermo.detection._gaussian import Gaussian, Mask, whitenings
 
 NEAR_IN_TIME = 24  # rows, a day of hourly ones: the covariance of a record is learned from records at least so far away
 NUMBERS_AT_ONCE = 4_000_000  # held in memory

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, spread_evenly
+from skthermo._gaussian import Gaussian, check_invertible, whiten_by
 from skthermo._weather import TrainingRange, nearest, weather_coordinates
-from skthermo.detection._gaussian import Gaussian, check_invertible, whiten_by
 from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
 
 MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned

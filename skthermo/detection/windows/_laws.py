@@ -11,7 +11,7 @@ from scipy.special import betainc, betaincinv
 from scipy.stats import chi
 
 from skthermo._arrays import Array
-from skthermo.detection._gaussian import Gaussian, check_invertible
+from skthermo._gaussian import Gaussian, check_invertible
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._patterns import as_if_complete
 from skthermo.detection.windows._windows import Windows

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
+from skthermo._dependence import correlation_time
+from skthermo._gaussian import check_not_empty
 from skthermo._validation import Interval, StrOptions
-from skthermo._weather import correlation_time
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._gaussian import check_not_empty
 from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection.windows._laws import CountLaw, MeanLaw
 from skthermo.detection.windows._windows import Windows

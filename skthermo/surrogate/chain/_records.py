@@ -12,11 +12,12 @@ from sklearn.model_selection import KFold
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._dependence import correlation_time
 from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import last_step
-from skthermo._weather import TrainingRange, correlation_time, nearest, order_statistic, weather_coordinates
+from skthermo._weather import TrainingRange, nearest, order_statistic, weather_coordinates
 
 N_FOLDS = 5
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from

@@ -56,6 +56,19 @@ class Gaussian:
         squared = np.einsum("ij,ij->i", scaled, standard)
         return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
+    def completed(self, rows: Array) -> tuple[Array, Array]:
+        """Rows whose gaps hold what is expected given the values that are there, and the standard deviations of those.
+
+        These are zero where a value is there; rows without any stay NaN.
+        """
+        masks, of_row = patterns(~np.isnan(rows))
+        fill, rest = _conditionals(self.covariance, masks)
+        expected = self.mean + np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
+        deviations = np.sqrt(np.maximum(np.einsum("ijj->ij", rest), 0.0))[of_row]
+        empty = np.isnan(rows).all(axis=1)[:, np.newaxis]
+        filled = np.where(np.isnan(rows), np.where(empty, np.nan, expected), rows)
+        return filled, np.where(np.isnan(rows), np.where(empty, np.nan, deviations), 0.0)
+
     def second_moments(self, rows: Array) -> Array:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
         masks, of_row = patterns(~np.isnan(rows))

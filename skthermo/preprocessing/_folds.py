@@ -1,0 +1,119 @@
+"""Folds of records in time that all see each season."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.model_selection import BaseCrossValidator
+
+from skthermo._times import has_stamps, row_times
+from skthermo.preprocessing._stamps import as_duration
+
+WEEK = "7D"
+BLOCKS_OF_ROWS = 52  # into which records without stamps are divided: weeks, if they are those of a year
+
+
+class BlockedKFold(BaseCrossValidator):
+    """Folds of blocks of time, dealt in turn: the first block to the first fold, the second to the second, and so on.
+
+    Each fold then holds records of all seasons that there are, and so do the records that it is predicted from. With
+    ``KFold``, whose folds are long periods, the records of a fold are predicted from other seasons, and with random
+    folds from their neighbours in time, which are nearly the same records.
+
+    Parameters
+    ----------
+    n_splits : int, default=5
+        Number of folds, at least 2.
+    block : int or duration, optional
+        Length of a block: a number of rows or, for frames on a ``DatetimeIndex``, a duration such as "7D". It should be
+        several times as long as records remember what was before them. By default a week on a ``DatetimeIndex``, else
+        a 52nd of the rows; shorter where the records are fewer than a block for each fold.
+
+    See Also
+    --------
+    TemperatureCompensator : Predicts the records of its baseline by such folds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.preprocessing import BlockedKFold
+    >>> for train, test in BlockedKFold(2, block=3).split(np.zeros((10, 1))):
+    ...     print(train, test)
+    [3 4 5 9] [0 1 2 6 7 8]
+    [0 1 2 6 7 8] [3 4 5 9]
+    """
+
+    def __init__(self, n_splits: int = 5, *, block: Any = None):
+        self.n_splits = n_splits
+        self.block = block
+
+    def get_n_splits(self, X: Any = None, y: Any = None, groups: Any = None) -> int:
+        """Number of folds.
+
+        Parameters
+        ----------
+        X, y, groups : object
+            Ignored.
+
+        Returns
+        -------
+        int
+            Number of folds.
+        """
+        return self.n_splits
+
+    def fold_of(self, X: Any) -> NDArray[np.intp]:
+        """The fold of every row, counted from 0.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records; the index of a frame tells their times.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            From 0 to ``n_splits - 1``.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer rows than folds, or ``n_splits`` or ``block`` is not as described.
+        """
+        if not isinstance(self.n_splits, Integral) or isinstance(self.n_splits, bool) or self.n_splits < 2:
+            raise ValueError(f"n_splits is {self.n_splits!r}; expected an integer of 2 or more")
+        times = row_times(X)
+        n_rows = len(times)
+        if n_rows < self.n_splits:
+            raise ValueError(f"{n_rows} rows are fewer than {self.n_splits} folds")
+        positions, length = times - times.min(), self._length(X)
+        if (is_rows := isinstance(length, int)) or not has_stamps(X):
+            positions = np.empty(n_rows)
+            positions[np.argsort(times, kind="stable")] = np.arange(n_rows)
+        blocks = np.unique(positions // (length if is_rows else length.astype(np.int64)), return_inverse=True)[1]
+        if blocks.max() + 1 < self.n_splits:
+            blocks = np.empty(n_rows, dtype=np.intp)
+            order = np.argsort(times, kind="stable")
+            blocks[order] = np.arange(n_rows) * self.n_splits // n_rows
+        return blocks % self.n_splits
+
+    def _length(self, X: Any) -> Any:
+        """Length of a block, as an integer for a number of rows, else as a duration."""
+        if isinstance(self.block, Integral) and not isinstance(self.block, bool):
+            if self.block < 1:
+                raise ValueError(f"block is {self.block!r}; expected a number of rows of 1 or more, or a duration")
+            return int(self.block)
+        if has_stamps(X):
+            return as_duration(WEEK if self.block is None else self.block, "block")
+        if self.block is not None:
+            raise ValueError(f"block is {self.block!r}, but X has no DatetimeIndex; expected a number of rows")
+        return max(len(X) // BLOCKS_OF_ROWS, 1)
+
+    def _iter_test_masks(self, X: Any = None, y: Any = None, groups: Any = None) -> Iterator[NDArray[np.bool_]]:
+        folds = self.fold_of(X)
+        for fold in range(self.n_splits):
+            yield folds == fold

@@ -1,0 +1,51 @@
+"""Laws of folds of blocks that are dealt in turn."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skthermo.preprocessing import BlockedKFold
+
+
+@given(n_rows=st.integers(2, 400), n_splits=st.integers(2, 6), block=st.one_of(st.none(), st.integers(1, 500)))
+def test_every_row_is_tested_once_and_no_fold_is_empty(n_rows, n_splits, block):
+    if n_rows < n_splits:
+        with pytest.raises(ValueError, match=f"{n_rows} rows are fewer than {n_splits} folds"):
+            list(BlockedKFold(n_splits, block=block).split(np.zeros((n_rows, 1))))
+        return
+    folds = list(BlockedKFold(n_splits, block=block).split(np.zeros((n_rows, 1))))
+    assert len(folds) == n_splits
+    assert all(len(train) and len(test) for train, test in folds)
+    assert sorted(np.concatenate([test for _, test in folds])) == list(range(n_rows))
+
+
+def test_each_fold_of_a_year_holds_each_season():
+    hours = pd.date_range("2023-01-01", periods=365 * 24, freq="h")
+    folds = BlockedKFold().fold_of(pd.DataFrame(index=hours))
+    assert (pd.crosstab(folds, hours.quarter) > 300).all(axis=None)
+    assert (np.bincount(folds[: 5 * 168]) == 168).all()
+
+
+def test_stamps_tell_the_block_whatever_the_order_of_the_rows():
+    stamps = pd.date_range("2023-01-01", periods=1000, freq="3h").delete(slice(100, 160))
+    frame, shuffled = pd.DataFrame(index=stamps), np.random.default_rng(0).permutation(len(stamps))
+    for block in (None, "2D", 17):
+        folds = BlockedKFold(4, block=block)
+        assert (folds.fold_of(frame)[shuffled] == folds.fold_of(frame.iloc[shuffled])).all()
+
+
+@pytest.mark.parametrize(
+    ("folds", "message"),
+    [
+        (BlockedKFold(1), "n_splits is 1; expected an integer of 2 or more"),
+        (BlockedKFold(True), "n_splits is True"),
+        (BlockedKFold(block=0), "block is 0; expected a number of rows of 1 or more"),
+        (BlockedKFold(block="7D"), "block is '7D', but X has no DatetimeIndex; expected a number of rows"),
+        (BlockedKFold(block=2.5), "block is 2.5"),
+    ],
+)
+def test_bad_folds_are_refused(folds, message):
+    with pytest.raises(ValueError, match=message):
+        folds.fold_of(np.zeros((10, 1)))
