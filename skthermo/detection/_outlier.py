@@ -147,7 +147,14 @@ class OutlierDetector(DamageDetector):
         return index
 
     def _index_from(self, others: Array, rows: Array) -> Array:
-        return _index_of(clone(self.estimator).fit(others), rows)
+        """Damage index of rows by a clone fitted on others, on the scale that the estimator itself gives those.
+
+        The score of a support vector machine, as an example, grows with the number of records that it was fitted on.
+        """
+        fitted = clone(self.estimator).fit(others)
+        own, ours = (np.quantile(_index_of(one, others), [0.25, 0.5, 0.75]) for one in (fitted, self.estimator_))
+        scale = (ours[2] - ours[0]) / (own[2] - own[0]) if own[2] > own[0] else 1.0
+        return ours[1] + scale * (_index_of(fitted, rows) - own[1])
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         lacking = np.isnan(as_floats(X)[rows]).sum(axis=0)

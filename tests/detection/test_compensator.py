@@ -31,7 +31,10 @@ from tests.detection.compensated import (
 )
 
 # The chain's linear inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
-pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
+pytestmark = [
+    pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside"),
+    pytest.mark.filterwarnings(r"ignore:the \d+ baseline records depend on each other"),
+]
 
 
 def alarm_rate(detector, records):
