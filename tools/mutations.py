@@ -176,20 +176,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("factors by chance", "- chi2.ppf(CHANCE, len(values) - 1)", ""),
     ],
     ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
-        ("leave-one-out distances", "(n_rows - 1 - distances**2)", "(n_rows - distances**2)"),
-        (
-            "records behind a mode",
-            "present.sum(axis=0), len(F)).min(axis=1)",
-            "present.sum(axis=0), len(F)).max(axis=1)",
-        ),
-        (
-            "periods of a covariance estimator",
-            "clone(self.covariance).fit(F[complete[rest]])",
-            "clone(self.covariance).fit(F[complete])",
-        ),
+        ("records that a covariance estimator learns from", "clone(self.covariance).fit(others)", "self.covariance_"),
+    ],
+    ("detection/_neighbourhoods.py", "detection/test_thresholds.py"): [
+        ("size of a neighbourhood", "REACH = 2 ", "REACH = 1 "),
+        ("neighbours in time", "np.median(steps)", "1.0"),
+        ("mean of the others", "mean = -_sums(", "mean = _sums("),
+        ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
+    ],
+    ("detection/_base.py", "detection/test_mahalanobis.py"): [
+        ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
-        ("rank of the threshold", "(n_independent + 1) * (1 - contamination)", "n_independent * (1 - contamination)"),
+        ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
     ],
     ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
@@ -210,7 +209,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("edge of a window of time", 'side="right"', 'side="left"'),
     ],
     ("detection/windows/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
-        ("periods of windows", "self._law(windows, rest)", "self._law(windows, np.arange(n_rows))"),
+        ("periods of windows", "baseline.away_from(np.isin(np.arange(n_rows), fold))", "np.arange(n_rows)"),
+        ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
     ("_warnings.py", "surrogate/test_report.py"): [

@@ -74,7 +74,10 @@ class OutlierDetector(DamageDetector):
 
     The correlation time, and the neighbours that are left out, are those of `MahalanobisDetector`; blocks last five
     correlation times at least. The promise is also the same: about the rate asked for or less, on the mean over
-    baselines that are like the records to come. RATES
+    baselines that are like the records to come. After 365 records of 6 modes, 2 % asked, ``LocalOutlierFactor``,
+    ``IsolationForest``, ``EllipticEnvelope`` and ``OneClassSVM`` raise 1.8, 1.7, 1.8 and 1.5 % false alarms; where
+    neighbours in time have a correlation of 0.9, 2.1, 2.2, 1.6 and 1.1 % (by "quantile" 19.6, 7.3, 7.1 and 12.2 %).
+    Clones are put on the scale of the estimator by their quartiles on the records that both were fitted on.
 
     Rows with a missing mode are left out of the baseline and cannot be judged: their damage index is NaN, and
     ``predict`` gives 0.

@@ -20,8 +20,8 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ----------
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the healthy structure that are not in the baseline; NaN where nothing can be
-        judged, which counts neither as healthy nor as an alarm. `~skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
-        of that.
+        judged, which counts neither as healthy nor as an alarm. `~skthermo.detection.MahalanobisDetector` gives the
+        unsquared distance, and its ``threshold_`` is one of that.
     threshold : float
         A damage index above it is an alarm.
 
@@ -209,8 +209,8 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     present = index[~np.isnan(index)]
     if len(present) < len(index):
         warn_user(
-            f"{len(index) - len(present)} of {len(index)} records are not judged, their damage index is NaN: the rate is "
-            f"that of the other {len(present)}",
+            f"{len(index) - len(present)} of {len(index)} records are not judged, their damage index is NaN: the rate "
+            f"is that of the other {len(present)}",
             "records not judged",
         )
     return float((present > limit).mean()) if present.size else float("nan")

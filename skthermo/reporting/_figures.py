@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._arrays import as_floats
-from skthermo._formatting import percent, share_text, significant
+from skthermo._formatting import counted, percent, share_text, significant
 from skthermo._optional import import_optional
 from skthermo.plotting import (
     DamageIndexDisplay,
@@ -141,6 +141,7 @@ def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) ->
     threshold = study.threshold_
     above = "; ".join(
         f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
+        + (f", {counted(int(index.isna().sum()), 'record')} not judged" if index.isna().any() else "")
         for name, index in shown.items()
     )
 
