@@ -100,6 +100,12 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        if n_parameters > n_modes:
+            lines.append(
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
+                "apart."
+            )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
