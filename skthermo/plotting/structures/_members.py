@@ -28,7 +28,9 @@ def check_structure(structure: Any, groups: Iterable[str] | None) -> None:
 def structure_axes(ax: Axes, view: View, width: float) -> Axes:
     """Axes of a plane or of space: those that are given, or those of a new figure."""
     if ax is None:
-        height = width * height_of(np.array(list(view.nodes.values()))) + 0.8
+        ratio = height_of(np.array(list(view.nodes.values())))
+        width /= max(ratio, 1.0)  # tall structures are as high as others are wide
+        height = width * ratio + 0.8
         if not view.is_space:
             return one_axes(None, (width, height))
         return space_axes(pyplot().figure(figsize=(width, height)))

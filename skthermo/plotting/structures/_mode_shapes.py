@@ -225,12 +225,13 @@ class ModeShapesDisplay:
         """Axes of a new figure, and in space the cell of the figure that each of them should fill."""
         n_columns = min(n_columns, len(self.modes))
         n_rows = -(-len(self.modes) // n_columns)
+        tall = max(ratio, 1.0)  # panels of tall structures are as high as those of others are wide
         if not view.is_space:
             names = [f"mode {mode + 1}" for mode in self.modes]
-            self.axes_ = panels(None, names, (5.0, 5.0 * ratio + 0.5), n_columns)
+            self.axes_ = panels(None, names, (5.0 / tall, 5.0 * ratio / tall + 0.5), n_columns)
             return [None] * len(self.modes)
-        inches = 5.5 * ratio + 0.5
-        figure = pyplot().figure(figsize=(5.5 * n_columns, inches * n_rows))
+        inches = 5.5 * ratio / tall + 0.5
+        figure = pyplot().figure(figsize=(5.5 / tall * n_columns, inches * n_rows))
         self.axes_ = np.array([space_axes(figure) for _ in self.modes], dtype=object)
         width, height = 1 / n_columns, 1 / n_rows
         places = (divmod(number, n_columns) for number in range(len(self.modes)))
