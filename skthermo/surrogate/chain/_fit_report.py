@@ -109,6 +109,12 @@ class FitReport(SavesFrames):
             f"Filled from the other sensors: {rows:.0f} temperatures of {name!r} (standard deviation {deviation:.2g})."
             for name, rows, deviation in self.filled.itertuples()
         ]
+        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        if n_parameters > n_modes:
+            lines.append(
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
+                "apart."
+            )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
