@@ -13,7 +13,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._dependence import correlation_time
-from skthermo._regressors import weights_for
+from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import last_step
@@ -209,7 +209,14 @@ class TrainingRecords(SavesFrames):
     @property
     def trained(self) -> NDArray[np.bool_]:
         """Which rows trained M2."""
-        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1))
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1)) & self.counted
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which rows have a weight, or had no mode that could give them one."""
+        if self.weights is None:
+            return np.ones(len(self.inputs), dtype=bool)
+        return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
     def out_of_fold(self, mapper: Any, frequencies_of: Callable[[Array], Array]) -> WeatherResiduals:
         """Relative residuals of the records, each predicted by a mapper fitted on other periods of time.
@@ -218,7 +225,7 @@ class TrainingRecords(SavesFrames):
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         inputs, theta, measured = self.inputs[order], self.targets[order], as_floats(self.frequencies)[order]
-        rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1))
+        rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted[order])
         usable = ~np.isnan(theta[rows]).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
             raise ValueError(f"{usable.sum()} records have parameters; expected at least {2 * N_FOLDS} for residuals")
@@ -226,7 +233,7 @@ class TrainingRecords(SavesFrames):
         for fold, (train, test) in enumerate(KFold(N_FOLDS).split(rows)):
             train = train[usable[train]]
             weights = None if self.weights is None else self.weights[order][rows][train]
-            fitted = clone(learner).fit(inputs[rows][train], theta[rows][train], **weights_for(learner, weights))
+            fitted = fit_weighted(clone(learner), inputs[rows][train], theta[rows][train], weights)
             predicted[test], folds[test] = as_columns(fitted.predict(inputs[rows][test])), fold
         own = as_columns(mapper.predict(self.temperatures))[order][rows]
         values, own = (measured[rows] / frequencies_of(theta) - 1 for theta in (predicted, own))
