@@ -118,9 +118,10 @@ class Estimator(BaseEstimator):
         """
         own = {name: value for name, value in params.items() if "__" not in name}
         nested: dict[str, dict[str, Any]] = {}
-        for name in params.keys() - own.keys():
-            part, _, parameter = name.partition("__")
-            nested.setdefault(part, {})[parameter] = params[name]
+        for name, value in params.items():
+            part, parts, parameter = name.partition("__")
+            if parts:
+                nested.setdefault(part, {})[parameter] = value
         super().set_params(**own)
         for name, values in nested.items():
             part = self.get_params(deep=False).get(name, self)
