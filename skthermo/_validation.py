@@ -3,6 +3,7 @@ seeds and default parts inside estimators; stages of a fit."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 import numpy as np
@@ -241,6 +242,8 @@ class Stages:
     """
 
     def __init__(self, estimator: Any, number: int, X: Any = None, y: Any = None):
+        if not isinstance(estimator.verbose, Integral) or estimator.verbose < 0:
+            raise ValueError(f"verbose is {estimator.verbose!r}; expected a boolean or an integer from 0")
         self._estimator, self._number, self._begun = estimator, number, 0
         begin = getattr(estimator, "_init_callback_context", None)
         self._task = None if begin is None else begin(max_subtasks=number)

@@ -52,7 +52,8 @@ class DetectabilityStudy(BaseEstimator):
     random_state : int, RandomState or None, default=None
         Seed of the noise, and of parts of the detector without a seed of their own.
     verbose : bool or int, default=0
-        Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are done.
+        Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are
+        done.
 
     Attributes
     ----------
