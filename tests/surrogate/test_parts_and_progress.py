@@ -86,14 +86,13 @@ def test_verbose_tells_the_stages(capsys):
     quiet = chain().fit(T, F)
     assert capsys.readouterr().out == ""
     fem = chain(verbose=True, inverse__verbose=1, inverse__narrow_bounds=True).fit(T, F)
-    inner = ["simulations", "regressor", "simulations in narrower bounds", "regressor in narrower bounds"]
+    inner = ["simulations", "regressor", "narrower simulations", "regressor again"]
     outer = ["inverse surrogate", "parameters of the records", "temperature mapper", "report"]
     expected = [("InverseSurrogate", f"({i} of 4) {name}") for i, name in enumerate(inner, 1)]
     expected += [("DataInformedFEM", f"({i} of 4) {name}") for i, name in enumerate(outer, 1)]
     assert lines_of(capsys.readouterr().out) == expected
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.2,), groups=["bottom"]), n_repeats=2, verbose=1
-    )
+    scenarios = sweep(fem, (0.2,), groups=["bottom"])
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, verbose=1)
     study.run(T)
     stages = ["baseline of the detector", "frequencies of all scenarios", "first repeat", "other 1 repeats"]
     found = lines_of(capsys.readouterr().out)

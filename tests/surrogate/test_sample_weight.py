@@ -110,7 +110,7 @@ def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
         (
             WEIGHTS,
             TemperatureMapper(KNeighborsRegressor()),
-            r"fit of TemperatureMapper\(regressor=KN.* takes no weights",
+            r"fit of TemperatureMapper\(regressor=.* takes no",
         ),
         (WEIGHTS, make_pipeline(LagFeatures(2), KNeighborsRegressor()), r"(?s)fit of Pipeline.* takes no weights"),
     ],
@@ -139,7 +139,7 @@ def test_cross_validation_and_search_hand_weights_on(routing):
         search.fit(T, F, sample_weight=WEIGHTS)
         unasked = chain()
         if routing:
-            with pytest.raises(UnsetMetadataPassedError, match=r"set_fit_request\({{metadata}}=True\)|sample_weight"):
+            with pytest.raises(UnsetMetadataPassedError, match=r"\[sample_weight\] .* DataInformedFEM"):
                 cross_validate(unasked, T, F, cv=FOLDS, params={"sample_weight": series})
     for fit, train in zip(found["estimator"], found["indices"]["train"], strict=True):
         np.testing.assert_array_equal(fit.mapper_.regressor_.weights_, WEIGHTS[train])
@@ -159,7 +159,7 @@ def test_with_routing_the_steps_that_request_weights_get_them():
         refusing[0].set_fit_request(sample_weight=False)
         refusing[1].set_fit_request(sample_weight=False)
         refused = chain(make_pipeline(LagFeatures(1), refusing))
-        with pytest.raises(ValueError, match="takes no weights; expected .* by set_fit_request"):
+        with pytest.raises(ValueError, match=r"takes no weights; expected .* by set_fit_request"):
             refused.fit(T, F, sample_weight=WEIGHTS)
         refused.fit(T, F)
         half = clone(lines)

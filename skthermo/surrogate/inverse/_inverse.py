@@ -512,10 +512,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         with stages.stage("regressor"):
             self._learn_samples(training.samples, random, seed)
         if self.narrow_bounds:
-            with stages.stage("simulations in narrower bounds"):
+            with stages.stage("narrower simulations"):
                 estimates = np.empty((0, 1)) if X is None else self._estimate(self.columns_.read(self, X))[0]
                 training = training.narrower(self, random, estimates)
-            with stages.stage("regressor in narrower bounds"):
+            with stages.stage("regressor again"):
                 self._learn_samples(training.samples, random, seed)
         self.box_, self.samples_, self.simulator_ = training.box, training.samples, training.simulator
 
