@@ -153,8 +153,9 @@ def row_weights(sample_weight: Any, X: Any) -> Array | None:
                 f"{len(missing)} of its {n_rows}{', and labels repeat' if repeats else ''}; expected the index of X"
             )
         sample_weight = sample_weight if sample_weight.index.equals(X.index) else sample_weight.reindex(X.index)
-    is_mask = getattr(getattr(sample_weight, "dtype", None), "kind", "") == "b"  # which rows count
-    weights = real_array(sample_weight.astype(float) if is_mask else sample_weight, "sample_weight")
+    given = sample_weight if hasattr(sample_weight, "dtype") else np.asarray(sample_weight)
+    is_mask = getattr(given.dtype, "kind", "") == "b"  # which rows count
+    weights = real_array(given.astype(float) if is_mask else given, "sample_weight")
     weights = np.full(n_rows, weights) if weights.ndim == 0 else weights
     if weights.shape != (n_rows,):
         raise ValueError(f"sample_weight has shape {weights.shape}; expected ({n_rows},), a weight for each row of X")
@@ -165,5 +166,5 @@ def row_weights(sample_weight: Any, X: Any) -> Array | None:
             f"of {n_rows} rows; expected numbers from 0"
         )
     if not weights.any():
-        raise ValueError(f"sample_weight is 0 in all {n_rows} rows; expected a positive weight in some")
+        raise ValueError(f"sample_weight is zero in all {n_rows} rows; expected a positive weight in some")
     return weights

@@ -204,11 +204,11 @@ class DetectabilityStudy(BaseEstimator):
         self.detector_ = clone(self.detector)
         seed_parts(self.detector_, seeded(self.random_state))
         stages = Stages(self, 4)
-        with stages.stage("baseline of the detector"):
+        with stages.stage("detector"):
             self.detector_.fit(healthy)
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
-            with stages.stage("frequencies of all scenarios"):
+            with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
             simulation = Simulation(self.fem, self.detector_, view, scenarios, T, clean, self.noise, function)
             with stages.stage("first repeat"):
