@@ -237,6 +237,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
             reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
     reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
+    reasons["their weight is 0"] = int((~records.counted).sum())
     reasons["no parameters were found"] = int((complete_F & without_theta).sum())
     counts = pd.Series(reasons, dtype=int)
     return counts[counts > 0]

@@ -15,7 +15,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._dependence import correlation_time
-from skthermo._regressors import weights_for
+from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
@@ -233,7 +233,14 @@ class TrainingRecords(SavesFrames):
     @property
     def trained(self) -> NDArray[np.bool_]:
         """Which rows trained M2."""
-        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1))
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1)) & self.counted
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which rows have a weight, or had no mode that could give them one."""
+        if self.weights is None:
+            return np.ones(len(self.inputs), dtype=bool)
+        return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
     def out_of_fold(
         self, mapper: Any, frequencies_of: Callable[[Array], Array], folds: BaseCrossValidator | None = None
@@ -245,7 +252,8 @@ class TrainingRecords(SavesFrames):
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
-        order = order[~(np.isnan(self.inputs).any(axis=1) | np.isnan(measured).all(axis=1))[order]]
+        known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
+        order = order[known[order]]
         inputs, theta, measured = self.inputs[order], self.targets[order], measured[order]
         usable = ~np.isnan(theta).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
@@ -260,7 +268,7 @@ class TrainingRecords(SavesFrames):
         for fold, (train, test) in enumerate(folds.split(records)):
             train = train[usable[train]]
             weights = None if self.weights is None else self.weights[order][train]
-            fitted = clone(learner).fit(inputs[train], theta[train], **weights_for(learner, weights))
+            fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
             predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
         warn_of_unseen(inputs, fold_of)
         values = measured / frequencies_of(predicted) - 1
