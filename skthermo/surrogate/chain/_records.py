@@ -60,34 +60,30 @@ class WeatherResiduals:
         everywhere = np.ones(len(self.own), dtype=bool)
         return self._where_known(weather, lambda known: self._similar_mean(self.own, known, everywhere))
 
+    def shares(self, weather: Array) -> Array:
+        """Share of each record in the mean of the expected residuals over all rows, (n_records, n_modes)."""
+        known, shares = weather[~np.isnan(weather).any(axis=1)], np.zeros_like(self.values)
+        if len(known):
+            for mode, near in enumerate(self._similar(self.values, known, np.ones(len(self.own), dtype=bool))):
+                shares[:, mode] = np.bincount(near.ravel(), minlength=len(self.own)) / max(near.size, 1)
+        return shares
+
     def n_expected(self, weather: Array) -> Array:
-        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,)."""
-        known = weather[~np.isnan(weather).any(axis=1)]
-        return self._n_similar(known, np.ones(len(self.own), dtype=bool)) if len(known) else np.zeros(self.n_modes)
+        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,); 0 without any."""
+        squares = (self.shares(weather) ** 2).sum(axis=0)
+        return np.divide(1.0, squares, out=np.zeros(self.n_modes), where=squares > 0)
+
+    def less_similar(self, values: Array) -> Array:
+        """Values of the records, (n_records, n_columns), less the mean of those in similar weather."""
+        return values - self._similar_mean(values, self.weather, np.ones(len(values), dtype=bool))
 
     @property
     def n_modes(self) -> int:
         """Number of modes."""
         return self.values.shape[1]
 
-    def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
-        """Residuals of each of some periods less those that the other periods have in similar weather.
-
-        With the effective sample size, (n_modes,), of the mean of what is subtracted. The mapper of all records gives
-        both, so that its own error in such weather cancels, unless it follows its own records too closely.
-        """
-        residuals = self.values if self._is_overfitted else self.own
-        parts = []
-        for period in np.array_split(np.arange(len(self.values)), n_periods):
-            others = np.ones(len(self.values), dtype=bool)
-            others[period] = False
-            weather = self.weather[period]
-            similar = self._similar_mean(residuals, weather, others)
-            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
-        return parts
-
     @property
-    def _is_overfitted(self) -> bool:
+    def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
         own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
         return bool((own < OVERFITTED * out_of_fold).any())
@@ -128,8 +124,7 @@ class WeatherResiduals:
 
         A fold that must extrapolate has an error that the mapper of all records has not.
         """
-        similar = self._similar_mean(self.values, self.weather, np.ones(len(self.values), dtype=bool))
-        return self.values - similar + self.expected(self.weather)
+        return self.less_similar(self.values) + self.expected(self.weather)
 
     def _where_known(self, weather: Array, of_known: Callable[[Array], Array]) -> Array:
         """Results for the rows of weather that are complete, NaN for others."""
@@ -146,11 +141,6 @@ class WeatherResiduals:
             if near.size:
                 means[:, mode] = values[near, mode].mean(axis=1)
         return means
-
-    def _n_similar(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
-        """The reciprocal of the sum of squared weights that records have in the mean over all rows; 0 without any."""
-        shares = [np.bincount(near.ravel()) / max(near.size, 1) for near in self._similar(self.values, weather, rows)]
-        return np.array([1 / (share**2).sum() if share.size else 0.0 for share in shares])
 
     def _similar(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
         """For each mode, positions of the records with weather most like that of each row, (n_samples, n_similar)."""
