@@ -1,6 +1,6 @@
 """Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from skthermo._gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
+JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,10 @@ class SensorRegression:
         """Learn from records; a sensor without any value is not learned."""
         values = as_floats(temperatures)
         learned = ~np.isnan(values).all(axis=0)
-        return cls(Gaussian.of(values[:, learned]), learned)
+        found = Gaussian.of(values[:, learned])
+        variances = np.diag(found.covariance)
+        own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
+        return cls(Gaussian(found.mean, found.covariance + own), learned)
 
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
@@ -89,6 +93,20 @@ class SensorRegression:
             rows = np.ix_(gaps, self.learned)
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
         return values, deviations
+
+    def errors(self, temperatures: Any) -> Iterator[Array]:
+        """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
+
+        There is one for each sensor with gaps; zero where a sensor has a value.
+        """
+        values = as_floats(temperatures)
+        missing = np.isnan(values[:, self.learned])
+        gaps = missing.any(axis=1) & ~missing.all(axis=1)
+        roots, of_row = self.gaussian.error_roots(values[np.ix_(gaps, self.learned)])
+        for sensor in np.flatnonzero(missing[gaps].any(axis=0)):
+            error = np.zeros_like(values)
+            error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
+            yield error
 
 
 def weather_coordinates(weather: Array) -> Pipeline:

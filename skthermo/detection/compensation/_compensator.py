@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
-from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
+from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import (
@@ -31,12 +31,13 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._warnings import warn_user
-from skthermo._weather import TrainingRange
-from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
+from skthermo._warnings import warn_user, warnings_once
+from skthermo._weather import SensorRegression, TrainingRange
+from skthermo.detection.compensation._complete_rows import Regression
+from skthermo.detection.compensation._folds import Folds
+from skthermo.detection.compensation._gaps import FillError, fill_temperatures
 from skthermo.detection.compensation._whitening import Spread
 
-Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
@@ -141,7 +142,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     _parameter_constraints: dict = {
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
-        "cv": ["cv_object"],
+        "cv": ["cv_object", StrOptions({"contiguous"})],
         "scale": [StrOptions({"global", "local"}), None],
     }
 
@@ -150,7 +151,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         estimator: BaseEstimator,
         *,
         targets: Sequence[Hashable],
-        cv: int | BaseCrossValidator | Iterable | None = None,
+        cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
         scale: Literal["global", "local"] | None = None,
     ):
         self.estimator = estimator
@@ -187,11 +188,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
             frequencies absurdly far from the others; if stamps are not in order.
         """
-        temperatures, frequencies = self._read_baseline(X)
-        if self.scale is None:
-            self._learn(temperatures, frequencies)
-        else:
-            self._out_of_fold(temperatures, frequencies)
+        self._learn(*self._read_baseline(X))
         return self
 
     @overload
@@ -225,7 +222,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             As in `fit`.
         """
         temperatures, frequencies = self._read_baseline(X)
-        return frame_like(frequencies, self._out_of_fold(temperatures, frequencies))
+        return frame_like(frequencies, self._learn(temperatures, frequencies))
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -257,12 +254,20 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
-        weather = as_floats(temperatures)
+        filled = fill_temperatures(self.sensors_, temperatures)
+        weather = as_floats(filled)
         message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
-        residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
-        return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
+        residuals = as_floats(frequencies) - self.regression_.predict(filled)
+        residuals[np.isnan(weather).all(axis=1)] = np.nan
+        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        scaled = (
+            self.spread_.shrunk(residuals, fills)
+            if self.scale is None
+            else self.spread_.whiten(weather, residuals, fills)
+        )
+        return frame_like(frequencies, scaled)
 
     @overload
     def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -314,43 +319,38 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
         return temperatures, frequencies
 
-    def _learn(self, temperatures: Any, frequencies: Any) -> None:
-        self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
-        self.estimator_ = self.regression_.estimator_
-        self.training_range_ = TrainingRange.of(temperatures, ~np.isnan(as_floats(frequencies)).all(axis=1))
-
-    def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
+    def _learn(self, temperatures: Any, frequencies: Any) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""
-        folds, untested = folds_of(self.cv, temperatures)
-        self._learn(temperatures, frequencies)
-        partition = [*folds, (untested, untested)] if untested.size else folds
-        predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=partition)
-        residuals, weather = as_floats(frequencies) - predicted, as_floats(temperatures)
-        residuals[untested] = np.nan
+        self.sensors_ = SensorRegression.of(temperatures)
+        filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
+        folds = Folds.of(self.cv, filled)
+        self.regression_ = Regression.of(self.estimator, filled, frequencies)
+        self.estimator_ = self.regression_.estimator
+        self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
+        with warnings_once():
+            residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
+            longer = folds.longer(filled, residuals)
+            if longer is not None:
+                folds = longer
+                residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
+        folds.warn_of_unseen(filled)
+        self.folds_, self.block_ = folds.of_row(len(measured)), folds.block
+        residuals[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
+        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        taught = residuals.copy()
+        if len(fills.rows) < len(residuals) / 2:
+            taught[fills.rows] = np.nan
         if self.scale is None:
-            return residuals
-        empty = np.isnan(residuals).all(axis=0)
+            self.spread_ = Spread.of_all(taught)
+            return self.spread_.shrunk(residuals, fills)
+        empty = np.isnan(taught).all(axis=0)
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
-        size = np.fmax.reduce(np.abs(as_floats(frequencies)))
-        self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
-        return white
-
-
-def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
-    """Folds that test every row once, and the first rows, which a splitter that goes forward in time does not test."""
-    folds = list(check_cv(cv).split(X))
-    tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
-    untested = np.arange(tested.argmax())
-    wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
-    if wrong.size:
-        raise ValueError(
-            f"cv is {cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
-            "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
-            "first, as TimeSeriesSplit does"
-        )
-    return folds, untested
+        size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
+        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local")
+        untaught = np.isnan(taught).all(axis=1)
+        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
 
 
 def check_positions_are_names(targets: Any, columns: Any) -> None:
