@@ -10,7 +10,6 @@ and judges the second: healthy, and with two kinds of damage. The exit code is 1
 
 import argparse
 import sys
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -61,7 +60,9 @@ def campaign(seed):
     random, model = np.random.default_rng(seed), make_truss()
     T, bars, deck, supports = weather(random)
     frost = np.log1p(np.exp(-supports / 1.5)) * 0.01
-    theta = np.column_stack([1 - 1e-3 * bars, 1 - 1e-3 * deck + frost, 1 - 1e-3 * bars + 2 * frost, 1 - 5e-4 * supports])
+    theta = np.column_stack(
+        [1 - 1e-3 * bars, 1 - 1e-3 * deck + frost, 1 - 1e-3 * bars + 2 * frost, 1 - 5e-4 * supports]
+    )
     half = len(T) // 2
     names = [f"f{mode + 1}" for mode in range(model.n_modes)]
     states = {}

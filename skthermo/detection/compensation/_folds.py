@@ -108,19 +108,16 @@ def checked(cv: Any, n_rows: int) -> Any:
         return cv
     pairs = list(cv)
     for number, pair in enumerate(pairs):
-        try:
-            rows = [np.asarray(part) for part in pair]
-            fits = len(rows) == 2 and all(
-                part.ndim == 1
-                and part.dtype.kind in "iu"
-                and (part.size == 0 or (part.min() >= 0 and part.max() < n_rows))
-                for part in rows
-            )
-        except (TypeError, ValueError):
-            fits = False
-        if not fits:
+        if not (isinstance(pair, tuple | list) and len(pair) == 2 and all(are_rows(part, n_rows) for part in pair)):
             raise ValueError(
                 f"cv holds {pair!r:.100} as its element {number}; expected a number of folds, a splitter, or pairs of "
                 f"training and test rows, positions from 0 to {n_rows - 1}"
             )
     return pairs
+
+
+def are_rows(part: Any, n_rows: int) -> bool:
+    """Whether a part of a fold holds positions of rows."""
+    rows = np.asarray(part)
+    whole = rows.ndim == 1 and (rows.size == 0 or rows.dtype.kind in "iu")
+    return whole and (rows.size == 0 or (rows.min() >= 0 and rows.max() < n_rows))

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
@@ -35,6 +36,12 @@ class Neighbours:
 
     rows: NDArray[np.intp]
     counted: Mask
+
+    def weights(self, n_records: int) -> scipy.sparse.csr_array:
+        """A row for each place: 1 at the records that count, else 0."""
+        ends = np.arange(0, self.rows.size + 1, self.rows.shape[1])
+        shape = (len(self.rows), n_records)
+        return scipy.sparse.csr_array((self.counted.ravel().astype(float), self.rows.ravel(), ends), shape)
 
 
 @dataclass(frozen=True)
@@ -106,14 +113,11 @@ class LocalCovariance:
     def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
         """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
         known, filled = ~np.isnan(values), np.nan_to_num(values)
-        means, pseudo = np.empty((len(neighbours.rows), *prior.shape)), self.smoothing.n_pseudo
-        step = max(NUMBERS_AT_ONCE // (neighbours.rows.shape[1] * prior.size), 1)
-        for first in range(0, len(means), step):
-            rows, counted = (part[first : first + step] for part in (neighbours.rows, neighbours.counted))
-            sums = np.einsum("ij,ij...->i...", counted, filled[rows])
-            counts = np.einsum("ij,ij...->i...", counted, known[rows], dtype=float)
-            means[first : first + step] = (sums + pseudo * prior) / (counts + pseudo)
-        return means
+        weights, pseudo = neighbours.weights(len(values)), self.smoothing.n_pseudo
+        shape = (len(neighbours.rows), *prior.shape)
+        sums = (weights @ filled.reshape(len(values), -1)).reshape(shape)
+        counts = (weights @ known.reshape(len(values), -1).astype(float)).reshape(shape)
+        return (sums + pseudo * prior) / (counts + pseudo)
 
 
 def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:

@@ -38,11 +38,8 @@ class Spread:
     @classmethod
     def of_all(cls, residuals: Array) -> Spread:
         """That of residuals which are not scaled; a mode without any has no spread."""
-        return cls(
-            overall := Gaussian.of(np.where(np.isnan(residuals).all(axis=0), 0.0, residuals)),
-            overall.covariance[np.newaxis],
-            None,
-        )
+        overall = Gaussian.of(np.where(np.isnan(residuals).all(axis=0), 0.0, residuals))
+        return cls(overall, overall.covariance[np.newaxis], None)
 
     @classmethod
     def of(cls, weather: Array, residuals: Array, size: Array, *, local: bool) -> tuple[Spread, Array]:
