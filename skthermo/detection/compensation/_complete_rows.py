@@ -21,6 +21,7 @@ from skthermo._frames import column_names
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
 from skthermo.detection.compensation._folds import Folds
+from skthermo.preprocessing import LagFeatures
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,12 @@ def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstim
     if not n_head:
         return None, estimator
     return estimator[:n_head], steps[-1] if n_head == len(steps) - 1 else estimator[n_head:]
+
+
+def has_lags_behind(estimator: BaseEstimator) -> bool:
+    """Whether lags stand behind the first transformers, where they see the rows of their folds only."""
+    parts = split_pipeline(estimator)[1].get_params(deep=True).values()
+    return any(isinstance(part, LagFeatures) for part in parts)
 
 
 def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:

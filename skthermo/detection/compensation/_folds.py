@@ -22,7 +22,7 @@ Rows = NDArray[np.intp]
 N_FOLDS = 5
 WEEK = pd.Timedelta("7D")
 BLOCKS_OF_ROWS = 52  # into which records without stamps are divided
-CORRELATION_TIMES = 5  # of the residuals, that a block is longer than
+CORRELATION_TIMES = 5  # of the residuals (the mean over modes) that a block is longer than
 LEAST_BLOCKS = 2  # of each fold, in different seasons
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which a record's weather is unknown to them
 UNSEEN = 0.1  # share of a fold's records in unknown weather from which it is warned of
@@ -67,7 +67,7 @@ class Folds:
             return None
         times = row_times(X)
         order = np.argsort(times, kind="stable")
-        steps = CORRELATION_TIMES * max(correlation_time(mode) for mode in residuals[order].T)
+        steps = CORRELATION_TIMES * np.mean([correlation_time(mode) for mode in residuals[order].T])
         # Where each fold would have one block only, it could not see each season.
         longest = np.ptp(times) / (LEAST_BLOCKS * N_FOLDS)
         block = int(min(steps * np.median(np.diff(times[order])), longest)) if len(X) > 1 else 0

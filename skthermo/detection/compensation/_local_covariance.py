@@ -11,10 +11,12 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._dependence import correlation_time
 from skthermo._gaussian import Gaussian, Mask, whitenings
 from skthermo._weather import nearest
 
-NEAR_IN_TIME = 24  # rows, a day of hourly ones: the covariance of a record is learned from records at least so far away
+CORRELATION_TIMES = 2  # of the residuals: the covariance of a record is learned from records at least so far away
+LEAST_NEAR, MOST_NEAR = 24, 0.05  # records, a day of hourly ones, and share of all of them, between which that is
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 
@@ -46,21 +48,30 @@ class Neighbours:
 
 @dataclass(frozen=True)
 class History:
-    """Residuals of records at positions in time and places in weather, and the distribution of all residuals."""
+    """Residuals of records at positions in time and places in weather, and the distribution of all residuals.
+
+    Records fewer than ``near`` positions apart do not tell each other's covariance.
+    """
 
     order: NDArray[np.intp]
     places: Array
     residuals: Array
     overall: Gaussian
+    near: int = LEAST_NEAR
 
     def neighbours(self, size: int, places: Array, order: NDArray[np.intp] | None = None) -> Neighbours:
         """The records nearest to each place, without those near ``order`` in time."""
         if order is None:
             near = nearest(self.places, places, size)[1]
             return Neighbours(near, np.ones(near.shape, dtype=bool))
-        near = nearest(self.places, places, size + 2 * NEAR_IN_TIME - 1)[1]
-        far = np.abs(self.order[near] - order[:, np.newaxis]) >= NEAR_IN_TIME
+        near = nearest(self.places, places, size + self.most_near)[1]
+        far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
         return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+
+    @cached_property
+    def most_near(self) -> int:
+        """The most records that may be near one in time."""
+        return int((np.searchsorted(self.order, self.order + 2 * self.near - 1) - np.arange(len(self.order))).max())
 
     def likeliest(self) -> LocalCovariance | None:
         """The covariance by weather, or none, under which records are likeliest given the others."""
@@ -68,6 +79,12 @@ class History:
         plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
         likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
         return [None, *candidates][int(np.argmax(likelihoods))]
+
+
+def reach_in_time(residuals: Array) -> int:
+    """How many records remember each other."""
+    longest = max(correlation_time(mode) for mode in residuals.T)
+    return int(max(min(np.ceil(CORRELATION_TIMES * longest), MOST_NEAR * len(residuals)), LEAST_NEAR))
 
 
 @dataclass(frozen=True)
@@ -91,6 +108,11 @@ class LocalCovariance:
     def at(self, places: Array, order: NDArray[np.intp] | None = None) -> Array:
         """Covariances at some places, without the records near ``order`` in time."""
         return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
+
+    @property
+    def numbers_per_record(self) -> int:
+        """How many numbers `at` holds in memory for each place."""
+        return self.smoothing.n_neighbors + self.history.most_near + self.history.overall.covariance.size
 
     def likelihood(self) -> float:
         """Log-likelihood of the records, each given the others."""

@@ -12,7 +12,14 @@ from skthermo._arrays import Array, patterns, spread_evenly
 from skthermo._gaussian import Gaussian, check_invertible, whiten_by, whitenings
 from skthermo._weather import TrainingRange, nearest, weather_coordinates
 from skthermo.detection.compensation._gaps import FillError
-from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
+from skthermo.detection.compensation._local_covariance import (
+    CANDIDATES,
+    NUMBERS_AT_ONCE,
+    History,
+    Smoothing,
+    reach_in_time,
+    whitened,
+)
 
 MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned
 JITTER = 1e-12  # share of its variance that each mode has of its own, so that covariances have roots
@@ -58,10 +65,10 @@ class Spread:
         coordinates = weather_coordinates(weather[usable])
         chosen = spread_evenly(usable, MOST_PLACES)
         places = coordinates.transform(weather[chosen])
-        covariance = History(chosen, places, residuals[chosen], overall).likeliest()
+        covariance = History(chosen, places, residuals[chosen], overall, reach_in_time(residuals)).likeliest()
         if covariance is None:
             return plain, white
-        step = max(NUMBERS_AT_ONCE // covariance.smoothing.n_neighbors, 1)
+        step = max(NUMBERS_AT_ONCE // covariance.numbers_per_record, 1)
         for first in range(0, len(usable), step):
             block = usable[first : first + step]
             by_others = covariance.at(coordinates.transform(weather[block]), order=block)
