@@ -82,8 +82,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
         their standard deviations.
     spread_ : object
-        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records of
-        similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
+        of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
