@@ -1,5 +1,5 @@
-"""False alarms and detection on simulated residuals, whose law is known: thresholds, dependence in time, windows, missing
-modes, charts, drift, trend.
+"""False alarms and detection on simulated residuals, whose law is known: thresholds, dependence in time, windows,
+missing modes, charts, drift, trend.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_thresholds.py
 

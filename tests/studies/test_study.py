@@ -284,6 +284,7 @@ def test_weather_outside_the_training_range_is_said_once(fem):
     assert caught[0].filename == __file__
 
 
+@pytest.mark.filterwarnings("ignore:365 of 365 rows are not judged")
 @pytest.mark.parametrize(
     ("options", "message"),
     [
