@@ -195,7 +195,7 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
             return int(self.window)
         if not has_stamps(X):
             raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")
-        return pd.Timedelta(as_duration(self.window, "freq"))
+        return pd.Timedelta(as_duration(self.window, "window"))
 
 
 def distances_from_neighbours(values: Array, times: Array, window: int | pd.Timedelta) -> tuple[Array, Array]:

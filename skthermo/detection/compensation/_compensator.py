@@ -17,7 +17,6 @@ from skthermo._frames import (
     check_columns,
     check_temperatures,
     frame_like,
-    warn_of_absurd,
     warn_of_disorder,
     warn_of_markers,
 )
@@ -31,10 +30,11 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._warnings import warn_user
+from skthermo._warnings import warn_each, warn_user
 from skthermo._weather import TrainingRange
 from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
 from skthermo.detection.compensation._whitening import Spread
+from skthermo.preprocessing import check_records
 
 Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
@@ -184,8 +184,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
-            frequencies absurdly far from the others; if stamps are not in order.
+            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999; if
+            stamps are not in order; and for each kind of fault that `~skthermo.preprocessing.check_records` finds.
         """
         temperatures, frequencies = self._read_baseline(X)
         if self.scale is None:
@@ -311,7 +311,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
-        warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
+        named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
+        warn_each(check_records(pd.DataFrame(temperatures), named).warnings())
         return temperatures, frequencies
 
     def _learn(self, temperatures: Any, frequencies: Any) -> None:

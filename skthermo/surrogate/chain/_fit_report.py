@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
@@ -9,14 +10,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names
 from skthermo._saved_frames import SavesFrames
+from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
+from skthermo.preprocessing import RecordFindings
 from skthermo.surrogate.chain._estimates import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
@@ -29,7 +33,6 @@ WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean
 UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
 LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
 SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
-ABSURD = 2.0  # times the median of its mode, or its inverse, from which a frequency counts as absurd
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
@@ -64,6 +67,8 @@ class FitReport(SavesFrames):
         where the inverse does not give it.
     scatter : Series or None
         Standard deviation of measured over predicted frequencies, by mode, in percent.
+    findings : RecordFindings or None
+        What `~skthermo.preprocessing.check_records` has found in the records.
 
     Examples
     --------
@@ -73,7 +78,7 @@ class FitReport(SavesFrames):
     >>> year.temperatures.iloc[10:15, 0] = float("nan")
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
     >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
-    (360, {"temperature 'T1' is missing": 5})
+    (360, {"temperature 'T1' is missing, 2025-01-11 to 2025-01-15": 5})
     """
 
     n_rows: int
@@ -88,6 +93,7 @@ class FitReport(SavesFrames):
     n_unconverged: int | None = None
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
+    findings: RecordFindings | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -104,6 +110,8 @@ class FitReport(SavesFrames):
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
             lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
+        if self.findings is not None and len(self.findings.table):
+            lines.append(self.findings.summary())
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
 
     def _modes(self) -> pd.DataFrame:
@@ -161,7 +169,7 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
+def report_of(chain: Any, estimates: Estimates, learned: Array, findings: RecordFindings) -> FitReport:
     """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
@@ -187,6 +195,7 @@ def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
         n_unconverged=estimates.n_unconverged,
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
+        findings=findings,
     )
 
 
@@ -197,19 +206,46 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
 
 
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
-    """Rows that do not train the mapper, by reason."""
-    T, F, inputs, trained = records.temperatures, records.frequencies, records.inputs, records.trained
-    reasons = {}
+    """Rows that do not train the mapper, by reason: a sensor or a mode that is missing, with the periods."""
+    T, F, trained = records.temperatures, records.frequencies, records.trained
     without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
-    for what, table, default, rows in (("temperature", T, "T", ~trained), ("frequency", F, "f", without_theta)):
-        missing = np.isnan(as_floats(table)[rows]).sum(axis=0)
-        for name, count in zip(column_names(table, default), missing, strict=True):
-            reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
-    reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
-    reasons["no parameters were found"] = int((complete_F & without_theta).sum())
-    counts = pd.Series(reasons, dtype=int)
-    return counts[counts > 0]
+    missing = {f"temperature {name!r} is missing": rows & ~trained for name, rows in _missing_by_sensor(T).items()}
+    for name, column in zip(column_names(F, "f"), as_floats(F).T, strict=True):
+        missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
+    missing["a lag reaches into a gap"] = complete_T & np.isnan(records.inputs).any(axis=1)
+    missing["no parameters were found"] = complete_F & without_theta
+    counts = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
+    return pd.Series(counts, dtype=int)
+
+
+def _missing_by_sensor(T: Any) -> dict[Any, NDArray[np.bool_]]:
+    """Rows in which a temperature is missing, or one of its lags that `LagFeatures` made columns of."""
+    rows: dict[Any, NDArray[np.bool_]] = {}
+    for name, column in zip(column_names(T, "T"), as_floats(T).T, strict=True):
+        sensor = re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name
+        rows[sensor] = rows.get(sensor, False) | np.isnan(column)
+    return rows
+
+
+def periods(T: Any, rows: NDArray[np.bool_]) -> str:
+    """When some rows of a table were taken: their period, or the longest one and how many there are."""
+    order = np.argsort(row_times(T), kind="stable")
+    places = np.flatnonzero(rows[order])
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    longest = max(runs, key=len)
+    label = _labels(T, order[longest[[0, -1]]])
+    text = label[0] if label[0] == label[1] else f"{label[0]} to {label[1]}"
+    return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
+
+
+def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
+    """What rows are called: their stamps, or their numbers."""
+    if not has_stamps(T):
+        return [f"row {row}" for row in rows]
+    stamps = T.index[rows]
+    at_midnight = (T.index == T.index.normalize()).all()
+    return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 
 def mode_offsets(model: FEModel, F: Any) -> pd.Series:
@@ -221,17 +257,6 @@ def mode_offsets(model: FEModel, F: Any) -> pd.Series:
 def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
     """Warnings about the order and the units of the modes: kind and text of each."""
     offsets = mode_offsets(model, F)
-    values = as_floats(F)
-    with np.errstate(invalid="ignore"):
-        absurd = np.abs(np.log(values / np.nanmedian(values, axis=0))) > np.log(ABSURD)
-    if absurd.any():
-        row, column = np.argwhere(absurd)[0]
-        yield (
-            "absurd frequencies",
-            f"{absurd.sum()} frequencies are more than {ABSURD:g} times the median of their mode, or less than "
-            f"1/{ABSURD:g} of it, first {offsets.index[column]!r} in row {row}: {values[row, column]:g} Hz; expected "
-            "NaN where a mode was not identified",
-        )
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
     if len(ratios) > 1:
