@@ -34,7 +34,7 @@ def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None
         if outside:
             raise ValueError(f"targets {outside} are not columns of X; expected indexes from 0 to {n_columns - 1}")
     else:
-        raise ValueError(f"targets is {targets}; expected names of columns or their indexes, not both")
+        raise ValueError(f"targets is {targets}; expected names of columns, or integers that are their indexes")
     if len(set(positions)) < len(positions):
         raise ValueError(f"targets {targets} repeat a column; expected each once")
     if not 0 < len(positions) < n_columns:

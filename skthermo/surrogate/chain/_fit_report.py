@@ -18,6 +18,7 @@ from skthermo._frames import column_names
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
+from skthermo._weather import SensorRegression
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
@@ -46,6 +47,9 @@ class FitReport(SavesFrames):
         Rows given, and rows that trained the temperature mapper.
     left_out : Series
         Rows that did not train the mapper, by reason; a row may have several reasons.
+    filled : DataFrame
+        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, the
+        ``standard deviation`` of what was filled, in degrees, and ``when`` they are missing.
     offsets : Series
         Mean measured frequency against the model's nominal one, by mode, in percent.
     n_outside : int or None
@@ -77,13 +81,14 @@ class FitReport(SavesFrames):
     >>> year = make_truss_campaign(random_state=0)
     >>> year.temperatures.iloc[10:15, 0] = float("nan")
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
-    (360, {"temperature 'T1' is missing, 2025-01-11 to 2025-01-15": 5})
+    >>> fem.report_.n_trained, fem.report_.filled["rows"].to_dict()
+    (365, {'T1': 5})
     """
 
     n_rows: int
     n_trained: int
     left_out: pd.Series
+    filled: pd.DataFrame
     offsets: pd.Series
     n_outside: int | None
     outside: pd.Series
@@ -106,6 +111,16 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        lines += [
+            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), {when}."
+            for name, rows, deviation, when in self.filled.itertuples()
+        ]
+        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        if n_parameters > n_modes:
+            lines.append(
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
+                "apart."
+            )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
@@ -138,15 +153,21 @@ class FitReport(SavesFrames):
             reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
             yield (
                 "half of the rows",
-                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); fill gaps "
-                "first: temperatures by KNNGapImputer().fit_transform(T), frequencies by "
-                "DataInformedFEM(..., imputer=KNNGapImputer())",
+                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected "
+                "records at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
             )
         if self.n_trained < ROWS_PER_PARAMETER * n_parameters:
             yield (
                 "few rows",
                 f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
                 f"{ROWS_PER_PARAMETER} rows for each",
+            )
+        mostly = self.filled[2 * self.filled["rows"] > self.n_rows]
+        for name, rows, deviation, when in mostly.itertuples():
+            yield (
+                f"mostly filled {name}",
+                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the "
+                f"others ({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
             )
         chain, mean = self.errors.mean()
         if chain > WORSE_THAN_MEAN * mean:
@@ -169,12 +190,12 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates, learned: Array, findings: RecordFindings) -> FitReport:
-    """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
+def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> FitReport:
+    """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-    measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
+    measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
     predicted = as_floats(chain.aligner_.inverse_transform(predicted))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
@@ -186,6 +207,7 @@ def report_of(chain: Any, estimates: Estimates, learned: Array, findings: Record
         n_rows=len(theta),
         n_trained=int(records.trained.sum()),
         left_out=left_out(records, theta),
+        filled=filled(records.temperatures, chain.sensors_),
         offsets=mode_offsets(chain.model, records.frequencies),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
@@ -205,27 +227,40 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
+def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
+    """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
+    deviations, found = sensors.fill(T)[1], {}
+    for sensor, columns in columns_by_sensor(T).items():
+        values = deviations[:, columns]
+        if (rows := (values > 0).any(axis=1)).any():
+            found[sensor] = [int(rows.sum()), float(values[values > 0].mean()), periods(T, rows)]
+    return pd.DataFrame.from_dict(found, orient="index", columns=["rows", "standard deviation", "when"])
+
+
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     """Rows that do not train the mapper, by reason: a sensor or a mode that is missing, with the periods."""
     T, F, trained = records.temperatures, records.frequencies, records.trained
     without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
-    missing = {f"temperature {name!r} is missing": rows & ~trained for name, rows in _missing_by_sensor(T).items()}
+    missing = {
+        f"temperature {sensor!r} is missing": np.isnan(as_floats(T)[:, columns]).any(axis=1) & ~trained
+        for sensor, columns in columns_by_sensor(T).items()
+    }
     for name, column in zip(column_names(F, "f"), as_floats(F).T, strict=True):
         missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
     missing["a lag reaches into a gap"] = complete_T & np.isnan(records.inputs).any(axis=1)
+    missing["their weight is 0"] = ~records.counted
     missing["no parameters were found"] = complete_F & without_theta
     counts = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
     return pd.Series(counts, dtype=int)
 
 
-def _missing_by_sensor(T: Any) -> dict[Any, NDArray[np.bool_]]:
-    """Rows in which a temperature is missing, or one of its lags that `LagFeatures` made columns of."""
-    rows: dict[Any, NDArray[np.bool_]] = {}
-    for name, column in zip(column_names(T, "T"), as_floats(T).T, strict=True):
-        sensor = re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name
-        rows[sensor] = rows.get(sensor, False) | np.isnan(column)
-    return rows
+def columns_by_sensor(T: Any) -> dict[Any, list[int]]:
+    """Positions of each sensor's columns: its own, and its lags where `LagFeatures` made columns of them."""
+    columns: dict[Any, list[int]] = {}
+    for position, name in enumerate(column_names(T, "T")):
+        columns.setdefault(re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name, []).append(position)
+    return columns
 
 
 def periods(T: Any, rows: NDArray[np.bool_]) -> str:
