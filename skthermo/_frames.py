@@ -1,5 +1,6 @@
 """Tables of records: pandas frames in and out, and checks of rows and columns."""
 
+import re
 from collections.abc import Hashable, Iterable
 from typing import Any
 
@@ -29,6 +30,14 @@ def column_names(X: Any, default: str) -> list[Hashable]:
     if hasattr(X, "columns"):
         return list(X.columns)
     return [f"{default}{i + 1}" for i in range(np.shape(X)[1])]
+
+
+def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
+    """Positions of each sensor's columns: its own, and its lags where `LagFeatures` made columns of them."""
+    columns: dict[Hashable, list[int]] = {}
+    for position, name in enumerate(column_names(T, PREFIXES["temperature"])):
+        columns.setdefault(re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name, []).append(position)
+    return columns
 
 
 def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:

@@ -176,7 +176,9 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
         return frame_like(X, cleaned)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+        n_least = 1 if self.targets is None else 2
+        options = {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan", "ensure_min_features": n_least}
+        return validate_data(self, X, reset=reset, **options)
 
     def _distances(self, X: Any, values: NDArray) -> tuple[Array, Array]:
         """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""

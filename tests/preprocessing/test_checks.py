@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
-from skthermo.preprocessing import check_records, residual_trend
+from skthermo.preprocessing import LagFeatures, check_records, residual_trend
 from skthermo.preprocessing.checks._stuck import stuck_runs
 
 YEAR = make_truss_campaign(random_state=0)
@@ -81,6 +81,15 @@ class TestStuck:
     def test_a_value_at_which_a_sensor_rests_again_and_again_is_not_stuck(self):
         sun = np.maximum(np.sin(2 * np.pi * np.arange(24 * 100) / 24), 0.0) * np.random.default_rng(0).random(2400)
         assert stuck_runs(sun) == []
+
+    @pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
+    def test_lags_of_a_sensor_are_no_sensors(self, kind):
+        lagged = LagFeatures([0, 24]).fit_transform(T)
+        assert check_records(kind(lagged), kind(F)).table.empty
+        stuck = T.copy()
+        stuck.loc["2025-12", "T1"] = 20.0
+        found = check_records(LagFeatures([0, 2]).fit_transform(stuck), F).table
+        assert found["column"].tolist() == ["T1"]
 
 
 class TestTime:

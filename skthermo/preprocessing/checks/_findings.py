@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._frames import MARKERS, check_same_rows, column_names
+from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
 from skthermo._times import row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
@@ -181,7 +181,7 @@ class _Records:
 
     T: Array
     F: Array
-    sensors: list[Hashable]
+    sensors: dict[Hashable, list[int]]
     modes: list[Hashable]
     order: NDArray[np.intp]
     index: Any
@@ -193,7 +193,7 @@ class _Records:
         index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
         T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
         T, F = (np.where(np.isin(table, MARKERS), np.nan, table) for table in (T, F))  # others tell of these
-        return cls(T, F, column_names(temperatures, "T"), column_names(frequencies, "f"), order, index[order])
+        return cls(T, F, columns_by_sensor(temperatures), column_names(frequencies, "f"), order, index[order])
 
     @property
     def n_usable(self) -> int:
@@ -229,10 +229,14 @@ class _Records:
 
 
 def _stuck(records: _Records) -> Iterator[list[Any]]:
-    tables = (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes))
-    for what, table, names in tables:
-        for name, column in zip(names, table.T, strict=True):
+    first = [(name, columns[0]) for name, columns in records.sensors.items()]  # lags repeat what a sensor shows
+    modes = [(name, column) for column, name in enumerate(records.modes)]
+    for what, table, columns in (("stuck sensor", records.T, first), ("stuck mode", records.F, modes)):
+        for name, position in columns:
+            column = table[:, position]
             for rows in stuck_runs(column):
+                if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
+                    continue  # a lag of another column, which begins with copies of its first value
                 detail = f"{name!r} is {column[rows[0]]:.6g} in {len(rows)} rows, {records.period(rows)}"
                 yield records.finding(what, name, rows, detail)
                 column[rows] = np.nan

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._frames import column_names
+from skthermo._frames import column_names, columns_by_sensor
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
@@ -112,7 +111,8 @@ class FitReport(SavesFrames):
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         lines += [
-            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), {when}."
+            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
+            f"{when}."
             for name, rows, deviation, when in self.filled.itertuples()
         ]
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
@@ -166,8 +166,8 @@ class FitReport(SavesFrames):
         for name, rows, deviation, when in mostly.itertuples():
             yield (
                 f"mostly filled {name}",
-                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the "
-                f"others ({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
+                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows ({when}) and was filled from the "
+                f"others (standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
             )
         chain, mean = self.errors.mean()
         if chain > WORSE_THAN_MEAN * mean:
@@ -253,14 +253,6 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     missing["no parameters were found"] = complete_F & without_theta
     counts = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
     return pd.Series(counts, dtype=int)
-
-
-def columns_by_sensor(T: Any) -> dict[Any, list[int]]:
-    """Positions of each sensor's columns: its own, and its lags where `LagFeatures` made columns of them."""
-    columns: dict[Any, list[int]] = {}
-    for position, name in enumerate(column_names(T, "T")):
-        columns.setdefault(re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name, []).append(position)
-    return columns
 
 
 def periods(T: Any, rows: NDArray[np.bool_]) -> str:
