@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._arrays import Array, as_floats
-from skthermo._columns import check_positions_are_names, positions_of
-from skthermo._frames import frame_like
+from skthermo._frames import check_positions_are_names, frame_like, positions_of
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import (
     Estimator,

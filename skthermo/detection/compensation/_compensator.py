@@ -12,11 +12,12 @@ from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._arrays import Array, as_floats
-from skthermo._columns import check_positions_are_names, positions_of
 from skthermo._frames import (
     check_columns,
+    check_positions_are_names,
     check_temperatures,
     frame_like,
+    positions_of,
     warn_of_disorder,
     warn_of_markers,
 )

@@ -166,8 +166,9 @@ class FitReport(SavesFrames):
         for name, rows, deviation, when in mostly.itertuples():
             yield (
                 f"mostly filled {name}",
-                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows ({when}) and was filled from the "
-                f"others (standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
+                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the "
+                f"others ({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it "
+                "out",
             )
         chain, mean = self.errors.mean()
         if chain > WORSE_THAN_MEAN * mean:
