@@ -90,7 +90,8 @@ class RecordFindings:
         kind, text : str
             What the warning is about, and what it says.
         """
-        for kind, rows in self.table.groupby("what", sort=False):
+        for kind in map(str, self.table["what"].unique()):
+            rows = self.table[self.table["what"] == kind]
             details = "; ".join(rows["detail"])
             if kind in ("stuck sensor", "stuck mode"):
                 yield kind, f"values of a sensor or a mode only repeat: {details}; expected NaN where it is stuck"

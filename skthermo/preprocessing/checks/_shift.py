@@ -47,12 +47,12 @@ def best_shift(
         found.append((ratio, Shift(shift, *(float(1 - np.nanmean(part)) for part in (other, own)))))
     if not found:
         return None
-    ratio, shift = min(found)
-    if ratio > BETTER or shift.explained < max(LEAST_EXPLAINED, shift.unshifted + LEAST_GAIN):
+    ratio, best = min(found)
+    if ratio > BETTER or best.explained < max(LEAST_EXPLAINED, best.unshifted + LEAST_GAIN):
         return None
-    rows = np.arange(max(shift.rows, 0), n_rows + min(shift.rows, 0))  # means of the past may follow a season by chance
-    own, other = (explained(lines[part], F[rows], folds[rows]) for part in (rows, rows - shift.rows))
-    return shift if other.sum() > max(own.sum(), len(other) * LEAST_EXPLAINED / 2) else None
+    rows = np.arange(max(best.rows, 0), n_rows + min(best.rows, 0))  # means of the past may follow a season by chance
+    own, other = (explained(lines[part], F[rows], folds[rows]) for part in (rows, rows - best.rows))
+    return best if other.sum() > max(own.sum(), len(other) * LEAST_EXPLAINED / 2) else None
 
 
 def explained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> Array:
