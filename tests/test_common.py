@@ -31,7 +31,7 @@ from skthermo.detection import (
     TemperatureCompensator,
     WindowedAlarm,
 )
-from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
+from skthermo.preprocessing import BiasAligner, HampelFilter, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater
@@ -74,6 +74,8 @@ def expected_failures(estimator):
 
 ESTIMATORS = [
     LagFeatures(),
+    HampelFilter(),
+    HampelFilter(targets=[0]),
     HingeFeatures(),
     KNNGapImputer(),
     BiasAligner(),
@@ -103,6 +105,7 @@ def shown(estimator):
     return " ".join(repr(estimator).split())
 
 
+@pytest.mark.filterwarnings("ignore:lags reach")  # before rows that are not those of fit
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=shown)
 def test_estimator_follows_scikit_learn(estimator):
     results = check_estimator(
@@ -132,6 +135,7 @@ RECORDS = pd.DataFrame(
 )
 TRANSFORMERS_AND_DETECTORS = [
     LagFeatures(),
+    HampelFilter(),
     HingeFeatures(),
     KNNGapImputer(),
     BiasAligner(),

@@ -156,6 +156,21 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/_kw51_truth.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
+    ("preprocessing/checks/_stuck.py", "preprocessing/test_checks.py"): [
+        ("stuck sensors beside rounding", "length >= USUAL * usual", "length >= usual"),
+        ("stuck sensors beside resting values", "length < USUAL * same[USUAL_RANK]", "False"),
+        ("stuck sensors at all", "SHORTEST = 5", "SHORTEST = 500"),
+    ],
+    ("preprocessing/checks/_shift.py", "preprocessing/test_checks.py"): [
+        ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
+        ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
+    ],
+    ("preprocessing/checks/_swaps.py", "preprocessing/test_checks.py"): [
+        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < BETTER:", "        if True:"),
+    ],
+    ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
+        ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
+    ],
     ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),

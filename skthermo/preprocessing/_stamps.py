@@ -53,6 +53,6 @@ def as_duration(value: Any, name: str) -> np.timedelta64:
         duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration of fixed length, such as '1h'") from error
-    if units == [] or not duration >= ZERO or (name == "freq" and duration == ZERO):
+    if units == [] or not duration >= ZERO or (name != "tolerance" and duration == ZERO):
         raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
     return duration

@@ -68,6 +68,7 @@ def test_folds_given_as_an_iterable_serve():
     pd.testing.assert_frame_equal(compensator(cv=folds).fit_transform(X), compensator(cv=4).fit_transform(X))
 
 
+@pytest.mark.filterwarnings("ignore:frequencies are far from their neighbours")
 def test_a_folds_targets_enter_only_their_own_residuals():
     periods = compensator(cv="contiguous")
     before, changed, fold = periods.fit_transform(X), X.copy(), slice(80, 120)

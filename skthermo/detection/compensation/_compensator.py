@@ -12,12 +12,12 @@ from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._arrays import Array, as_floats
-from skthermo._columns import check_positions_are_names, positions_of
 from skthermo._frames import (
     check_columns,
+    check_positions_are_names,
     check_temperatures,
     frame_like,
-    warn_of_absurd,
+    positions_of,
     warn_of_disorder,
     warn_of_markers,
 )
@@ -33,12 +33,13 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
-from skthermo._warnings import warn_user, warnings_once
+from skthermo._warnings import warn_each, warn_user, warnings_once
 from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._gaps import FillError, fill_temperatures
 from skthermo.detection.compensation._whitening import Spread
+from skthermo.preprocessing import check_records
 
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
@@ -209,10 +210,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
-            frequencies absurdly far from the others; if stamps are not in order; if temperatures are missing, with what
-            they were filled with; if a fold has weather that the others do not know; if rows without stamps have lags
-            inside an estimator.
+            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999; for
+            each kind of fault that `~skthermo.preprocessing.check_records` finds; if stamps are not in order; if
+            temperatures are missing, with what they were filled with; if a fold has weather that the others do not
+            know; if rows without stamps have lags inside an estimator.
         """
         self._learn(*self._read_baseline(X))
         return self
@@ -342,7 +343,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
-        warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
+        named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
+        warn_each(check_records(pd.DataFrame(temperatures), named).warnings())
         return temperatures, frequencies
 
     def _learn(self, temperatures: Any, frequencies: Any) -> Array:
