@@ -97,6 +97,20 @@ class SensorRegression:
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
         return values, deviations
 
+    def errors(self, temperatures: Any) -> Iterator[Array]:
+        """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
+
+        There is one for each sensor with gaps; zero where a sensor has a value.
+        """
+        values = as_floats(temperatures)
+        missing = np.isnan(values[:, self.learned])
+        gaps = missing.any(axis=1) & ~missing.all(axis=1)
+        roots, of_row = self.gaussian.error_roots(values[np.ix_(gaps, self.learned)])
+        for sensor in np.flatnonzero(missing[gaps].any(axis=0)):
+            error = np.zeros_like(values)
+            error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
+            yield error
+
 
 def _telling_rows(values: Array) -> Array:
     """Records to learn from: the complete ones where most are, or where gaps would take long; else any."""

@@ -14,14 +14,16 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
-from skthermo._frames import check_same_rows, column_names, frame_like
-from skthermo._regressors import weights_for
+from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
+from skthermo._regressors import check_takes_weights, fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import (
+    CallbackSupport,
     Estimator,
     HasMethods,
     Interval,
+    Stages,
     StrOptions,
     _fit_context,
     check_array,
@@ -36,7 +38,7 @@ from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
-from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, read_records, surrogates_in
+from skthermo.surrogate.chain._parts import clone_parts, default_part, inputs_of_last_step, read_records, surrogates_in
 from skthermo.surrogate.chain._records import TrainingRecords, WeatherResiduals
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
@@ -44,7 +46,7 @@ POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
+class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -57,7 +59,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
         M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets
-        this one.
+        this one. ``set_params(inverse__n_samples=500)`` puts the default inverse in the place of None, with ``reduce``
+        and ``n_jobs`` of the chain, and sets its parameter; so do the names of a grid search, and those of the mapper.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``; with thermal inertia, for example
         ``make_pipeline(LagFeatures(), TemperatureMapper())``.
@@ -76,6 +79,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
         Seed of every part that has no seed of its own.
+    verbose : bool or int, default=0
+        Whether `fit` prints a line with the time of each of its stages.
 
     Attributes
     ----------
@@ -143,6 +148,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
+        "verbose": ["verbose"],
     }
 
     def __init__(
@@ -156,6 +162,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         reduce: bool | float = False,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        verbose: bool | int = 0,
     ):
         self.model = model
         self.inverse = inverse
@@ -165,9 +172,12 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.reduce = reduce
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.verbose = verbose
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None) -> DataInformedFEM:
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None, sample_weight: ArrayLike | None = None
+    ) -> DataInformedFEM:
         """Learn how temperature moves the parameters.
 
         Parameters
@@ -179,6 +189,10 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
             Measured mode shapes, real or complex, of any scale, sign and phase, NaN where a mode is missing; for an
             inverse with ``dofs``, whose order the sensors have.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each record in what M2 learns; those of a series are matched to the rows of a frame by index. They
+            are multiplied with the weights that rows with missing modes have. Records of weight 0 do not train M2 and
+            have no residuals; imputer, aligner and M1 see all records alike.
 
         Returns
         -------
@@ -190,7 +204,9 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         ValueError
             If lengths or indices differ, the number of modes is not the model's, a temperature
             is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
-            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``.
+            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``;
+            if weights are negative, NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose
+            ``fit`` takes none.
 
         Warns
         -----
@@ -207,19 +223,29 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.box_ = None if inverse is None else Box.of(inverse.bounds, self.parameter_names_)
         if shapes is None and shape_inputs_of(self.inverse_) is not None:
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes)")
+        weights = row_weights(sample_weight, X)
+        if weights is not None:
+            check_takes_weights(self.mapper_)
         warn_each(mode_warnings(self.model, F))
-        estimates = self._fit_inverse(T, F, shapes)
-        self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
-        targets = estimates.targets(self.inverse_, self.mapper_)
-        weights = weights_for(self.mapper_, estimates.weights)
+        stages = Stages(self, 4, X, y)
+        with stages.stage("inverse surrogate", self.inverse_):
+            aligned = self._fit_inverse(T, F, shapes)
+        with stages.stage("parameters of the records"):
+            estimates = Estimates.of(self.inverse_, aligned, self.parameter_names_)
+            self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
+            targets = estimates.targets(self.inverse_, self.mapper_)
+            weights = estimates.weighted(weights)
         self.sensors_ = SensorRegression.of(T)
         filled = frame_like(T, self.sensors_.fill(T)[0])
-        self.mapper_.fit(filled, frame_like(T, targets, self.parameter_names_), **weights)
-        inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-        self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, estimates.weights)
-        self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-        self.simulator_ = Simulator.around(self.model, learned, self.reduce)
-        self.report_ = report_of(self, estimates)
+        with stages.stage("temperature mapper", self.mapper_):
+            fit_weighted(self.mapper_, filled, frame_like(T, targets, self.parameter_names_), weights)
+        with stages.stage("report"):
+            inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
+            self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
+            self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
+            self.simulator_ = Simulator.around(self.model, learned, self.reduce)
+            self.report_ = report_of(self, estimates)
+        stages.end()
         warn_each(self.report_.warnings())
         return self
 
@@ -574,6 +600,21 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
 
+    def training_shares(self, X: ArrayLike) -> Array:
+        """Share of each training record in the mean of `expected_residuals` over some rows.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray of shape (n_records, n_modes)
+            For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
+        """
+        return self.residuals_.shares(self._weather(X))
+
     @property
     def training_records_(self) -> tuple[Any, Any]:
         """Temperatures and frequencies that `fit` was given."""
@@ -611,7 +652,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
-    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
 
         Parameters
@@ -620,6 +661,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Temperatures in degrees Celsius.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each record; those of a series are matched to the rows of a frame by index.
 
         Returns
         -------
@@ -637,7 +680,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_floats(y) + as_floats(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
-        return complete_r2(y, predicted)
+        return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -645,8 +688,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         tags.target_tags.single_output = False
         return tags
 
-    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Estimates:
-        """Fill gaps, fit aligner and M1; what they find for the training records."""
+    def _default_part(self, name: str) -> BaseEstimator | None:
+        return default_part(self, name)
+
+    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Any:
+        """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
             F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
@@ -654,7 +700,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.inverse_.fit(aligned)
         if shapes is not None:
             warn_each(shape_warnings(self.inverse_, aligned))
-        return Estimates.of(self.inverse_, aligned, self.parameter_names_)
+        return aligned
 
     def _temperatures(self, X: ArrayLike) -> tuple[Any, Array]:
         """Temperatures, checked and filled, a frame as a frame; standard deviations of what was filled."""

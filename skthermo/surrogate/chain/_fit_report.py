@@ -109,6 +109,12 @@ class FitReport(SavesFrames):
             f"Filled from the other sensors: {rows:.0f} temperatures of {name!r} (standard deviation {deviation:.2g})."
             for name, rows, deviation in self.filled.itertuples()
         ]
+        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        if n_parameters > n_modes:
+            lines.append(
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
+                "apart."
+            )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
@@ -231,6 +237,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
             reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
     reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
+    reasons["their weight is 0"] = int((~records.counted).sum())
     reasons["no parameters were found"] = int((complete_F & without_theta).sum())
     counts = pd.Series(reasons, dtype=int)
     return counts[counts > 0]

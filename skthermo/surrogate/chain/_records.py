@@ -15,7 +15,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._dependence import correlation_time
-from skthermo._regressors import weights_for
+from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
@@ -75,28 +75,29 @@ class WeatherResiduals:
         """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
         return self._where_known(weather, lambda known: self._similar_mean(self.own, known, self._all))
 
+    def shares(self, weather: Array) -> Array:
+        """Share of each record in the mean of the expected residuals over all rows, (n_records, n_modes)."""
+        shares = np.zeros_like(self.values)
+        weather = weather[~np.isnan(weather).any(axis=1)]
+        wanted = self.coordinates.transform(weather) if len(weather) else weather
+        for modes, known in self._present(self.values, self._all, int(MOST_SIMILAR / SIMILAR)):
+            counts = np.zeros(len(known))
+            for _, _, near in nearest_in_parts(self.places[known], wanted, self._n_compared):
+                counts += np.bincount(near.ravel(), minlength=len(known))
+            shares[np.ix_(known, modes)] = (counts / max(counts.sum(), 1))[:, np.newaxis]
+        return shares
+
     def n_expected(self, weather: Array) -> Array:
-        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,)."""
-        return self._n_similar(weather[~np.isnan(weather).any(axis=1)], self._all)
+        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,); 0 without any."""
+        squares = (self.shares(weather) ** 2).sum(axis=0)
+        return np.divide(1.0, squares, out=np.zeros(self.n_modes), where=squares > 0)
 
-    def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
-        """Residuals of each of some periods less those that the other periods have in similar weather.
-
-        With the effective sample size, (n_modes,), of the mean of what is subtracted. The mapper of all records gives
-        both, so that its own error in such weather cancels, unless it follows its own records too closely.
-        """
-        residuals = self.values if self._is_overfitted else self.own
-        parts = []
-        for period in np.array_split(np.arange(len(self.values)), n_periods):
-            others = self._all.copy()
-            others[period] = False
-            weather = self.weather[period]
-            similar = self._similar_mean(residuals, weather, others)
-            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
-        return parts
+    def less_similar(self, values: Array) -> Array:
+        """Values of the records, (n_records, n_columns), less the mean of those in similar weather."""
+        return values - self._similar_mean(values, self.weather, self._all)
 
     @property
-    def _is_overfitted(self) -> bool:
+    def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
         own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
         return bool((own < OVERFITTED * out_of_fold).any())
@@ -163,18 +164,6 @@ class WeatherResiduals:
     def _n_compared(self) -> int:
         return int(np.clip(SIMILAR * len(self.values), COMPARED_WITH, MOST_SIMILAR))
 
-    def _n_similar(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
-        """The reciprocal of the sum of squared weights that records have in the mean over all rows; 0 without any."""
-        numbers = np.zeros(self.n_modes)
-        wanted = self.coordinates.transform(weather) if len(weather) else weather
-        for modes, known in self._present(self.values, rows, int(MOST_SIMILAR / SIMILAR)):
-            counts = np.zeros(len(known))
-            for _, _, near in nearest_in_parts(self.places[known], wanted, self._n_compared):
-                counts += np.bincount(near.ravel(), minlength=len(known))
-            if counts.any():
-                numbers[modes] = counts.sum() ** 2 / (counts**2).sum()
-        return numbers
-
     def _local_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_], number: int, most: int) -> Array:
         """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
         wanted, means = self.coordinates.transform(weather), np.full((len(weather), values.shape[1]), np.nan)
@@ -233,7 +222,14 @@ class TrainingRecords(SavesFrames):
     @property
     def trained(self) -> NDArray[np.bool_]:
         """Which rows trained M2."""
-        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1))
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1)) & self.counted
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which rows have a weight, or had no mode that could give them one."""
+        if self.weights is None:
+            return np.ones(len(self.inputs), dtype=bool)
+        return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
     def out_of_fold(
         self, mapper: Any, frequencies_of: Callable[[Array], Array], folds: BaseCrossValidator | None = None
@@ -245,7 +241,8 @@ class TrainingRecords(SavesFrames):
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
-        order = order[~(np.isnan(self.inputs).any(axis=1) | np.isnan(measured).all(axis=1))[order]]
+        known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
+        order = order[known[order]]
         inputs, theta, measured = self.inputs[order], self.targets[order], measured[order]
         usable = ~np.isnan(theta).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
@@ -260,7 +257,7 @@ class TrainingRecords(SavesFrames):
         for fold, (train, test) in enumerate(folds.split(records)):
             train = train[usable[train]]
             weights = None if self.weights is None else self.weights[order][train]
-            fitted = clone(learner).fit(inputs[train], theta[train], **weights_for(learner, weights))
+            fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
             predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
         warn_of_unseen(inputs, fold_of)
         values = measured / frequencies_of(predicted) - 1
