@@ -223,7 +223,7 @@ def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
     deviations = sensors.fill(T)[1]
     rows = (deviations > 0).sum(axis=0)
     table = {"rows": rows, "standard deviation": np.nansum(deviations, axis=0) / np.maximum(rows, 1)}
-    return pd.DataFrame(table, index=column_names(T, "T"), dtype=float)[rows > 0]
+    return pd.DataFrame(table, index=column_names(T, "T"))[rows > 0]
 
 
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
