@@ -126,16 +126,20 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
         ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
     ],
+    ("surrogate/chain/_data_informed.py", "surrogate/test_uncertainty.py"): [
+        ("cost of filled temperatures", "variances[rows] += (", "variances[rows] += 0 * ("),
+    ],
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
             "self._spread(self.weather[test], test)",
         ),
-        ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
+        ("spread beyond the range", " * (1 + excess)[:, np.newaxis]", ""),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
         ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
+        ("blocks as long as residuals remember", "max(WEEK, least *", "max(WEEK, 0 * least *"),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_weather.py", "surrogate/test_uncertainty.py"): [
