@@ -124,9 +124,10 @@ def identify_damage(
     T = _named_as_in_fit(fem, T)
     with warnings_once():
         theta = as_floats(fem.predict_parameters(T))
-        left_out = left_out_rows(fem, T, theta, frequencies)
-        is_compared = ~np.any(list(left_out.values()), axis=0)
-        frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
+    left_out = left_out_rows(fem, T, theta, frequencies)
+    is_compared = ~np.any(list(left_out.values()), axis=0)
+    frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
+    with warnings_once():
         shift = measured_shift(fem, T, theta, frequencies, noise)
     records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
     incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])

@@ -10,9 +10,9 @@ from scipy import stats
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
+from skthermo._scatter import Scatter
 from skthermo._times import has_stamps, row_times
 from skthermo.studies.identification._frequency_effects import healthy_frequencies
-from skthermo.studies.identification._scatter import PSEUDO_RECORDS, Scatter
 
 WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
 
@@ -59,8 +59,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     parts = new + scatter.of_sums(shares, np.arange(len(shares)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        known_from = freedom + PSEUDO_RECORDS
-        factor = known_from / max(known_from - judged.sum() + 1, 1.0)
+        factor = freedom / max(freedom - judged.sum() + 1, 1.0)
     covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
     return Shift(mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_)
 
@@ -69,7 +68,7 @@ def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Sc
     if isinstance(noise, str):
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        return Scatter.of(fem.residuals_)
+        return fem.residuals_.scatter
     deviations = check_noise(noise, n_modes)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")

@@ -15,6 +15,7 @@ from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._dependence import correlation_time
 from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
+from skthermo._scatter import Scatter
 from skthermo._times import row_times
 from skthermo._validation import last_step
 from skthermo._weather import TrainingRange, nearest, order_statistic, weather_coordinates
@@ -81,6 +82,11 @@ class WeatherResiduals:
     def n_modes(self) -> int:
         """Number of modes."""
         return self.values.shape[1]
+
+    @cached_property
+    def scatter(self) -> Scatter:
+        """How records scatter around what similar weather explains, and how long they remember it."""
+        return Scatter.of(self)
 
     @property
     def is_overfitted(self) -> bool:
