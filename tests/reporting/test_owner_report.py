@@ -28,6 +28,7 @@ from tests.reporting.pages import HOSTILE, MODES, QUOTED, SENSOR, Page, fitted_c
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*baseline records depend on each other")
 ALWAYS = ["answer", "monitored", "model", "found", "settings"]
 
 

@@ -50,7 +50,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
-    shares, judged, factor = fem.training_shares(T), ~np.isnan(mean), 1.0
+    shares, judged, factor = fem.training_shares(T, (~np.isnan(shifts)).any(axis=1)), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
