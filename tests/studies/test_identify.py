@@ -104,9 +104,9 @@ def test_frames_and_arrays_alike_and_rows_in_any_order(fem, fem_of_arrays):
     expected, stated = (identify_damage(fem, T, F, GROUPS, noise=n, random_state=0) for n in ("fitted", 0.01))
     as_arrays = identify_damage(fem_of_arrays, *arrays, GROUPS, noise=0.01, random_state=0)
     shuffled = identify_damage(fem, T.iloc[order], F.iloc[order], GROUPS, random_state=0)
-    for found, expected in ((as_arrays, stated), (shuffled, expected)):
-        np.testing.assert_allclose(found.table.astype(float), expected.table.astype(float), rtol=1e-6, atol=1e-9)
-        np.testing.assert_allclose(found.shifts, expected.shifts, rtol=1e-8)
+    for found, same in ((as_arrays, stated), (shuffled, expected)):
+        np.testing.assert_allclose(found.table.astype(float), same.table.astype(float), rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.shifts, same.shifts, rtol=1e-8)
 
 
 def test_same_seed_same_bits(fem):
