@@ -40,19 +40,18 @@ class Scatter:
     def of(cls, residuals: Any) -> Scatter:
         """Learn from the residuals of a chain what weather similar to theirs does not explain.
 
-        Residuals of records that the mapper has learned are too small, those out of fold too large; products of one
-        with the other are neither. What the comparison with similar weather takes away is known from simulated records.
+        What the comparison with similar weather takes away is known from simulated records. Residuals out of fold are
+        too large where noise lasts, and serve only where the mapper has learned the noise of its own records.
         """
-        of_fold = residuals.less_similar(residuals.values)
-        own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
-        n_records = (~np.isnan(own)).sum(axis=0)
-        found = covariances(own, of_fold, int(np.clip(len(own) // 4, 2, MOST_LAGS)))
+        table = residuals.less_similar(residuals.values if residuals.is_overfitted else residuals.own)
+        n_records = (~np.isnan(table)).sum(axis=0)
+        found = covariances(table, int(np.clip(len(table) // 4, 2, MOST_LAGS)))
         known = np.flatnonzero((n_records >= FEWEST) & (np.diag(found[0]) > 0))
         parts, memory = np.zeros((2, *found[0].shape)), 0.0
         if known.size:
             inside = np.ix_(known, known)
             memory, parts[0][inside], parts[1][inside] = _split(
-                found[:, known][:, :, known], n_records[known], residuals.less_similar, len(own)
+                found[:, known][:, :, known], n_records[known], residuals.less_similar, len(table)
             )
         return cls(parts, memory, n_records)
 
@@ -102,13 +101,12 @@ class Scatter:
         return self.parts * np.array([weights.T @ weights, weights.T @ (before + after - weights)])
 
 
-def covariances(first: Array, second: Array, n_lags: int) -> Array:
+def covariances(table: Array, n_lags: int) -> Array:
     """Mean products of columns 0, 1, ... records apart, (n_lags, n_modes, n_modes), over pairs that are known."""
-    known = [(~np.isnan(table)).astype(float) for table in (first, second)]
-    filled = [np.nan_to_num(table) for table in (first, second)]
-    found = np.empty((n_lags, first.shape[1], first.shape[1]))
+    known, filled = (~np.isnan(table)).astype(float), np.nan_to_num(table)
+    found = np.empty((n_lags, table.shape[1], table.shape[1]))
     for lag in range(n_lags):
-        sums, pairs = (a[lag:].T @ b[: len(b) - lag] + (b[lag:].T @ a[: len(a) - lag]) for a, b in (filled, known))
+        sums, pairs = (values[lag:].T @ values[: len(values) - lag] for values in (filled, known))
         found[lag] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
     return found
 

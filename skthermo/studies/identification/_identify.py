@@ -85,8 +85,9 @@ def identify_damage(
     -----
     UserWarning
         Once for each kind: if records cannot be compared, with their number and the reasons; if the records, or the
-        training records, are worth few independent ones; if temperatures have other names than in fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
-        the shifts.
+        training records, are worth few independent ones; if temperatures have other names than in fit,
+        groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
+        shifts.
 
     Notes
     -----

@@ -59,7 +59,8 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     parts = new + scatter.of_sums(shares, np.arange(len(shares)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        factor = freedom / max(freedom - judged.sum() + 1, 1.0)
+        rest = max(freedom - judged.sum() + 1, 1.0)
+        factor, freedom = freedom / rest, rest
     covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
     return Shift(mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_)
 
