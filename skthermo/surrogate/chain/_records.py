@@ -33,7 +33,7 @@ UNSEEN = 0.1  # share of the records of a fold in unseen weather that gives a wa
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
-OVERFITTED = 0.75  # mean ratio of a mapper's own median residual to that out of fold, below which it has learned noise
+OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
@@ -106,7 +106,7 @@ class WeatherResiduals:
     def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
         own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
-        return bool((own / out_of_fold).mean() < OVERFITTED)
+        return bool(own.mean() < OVERFITTED * out_of_fold.mean())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
