@@ -219,7 +219,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_threads.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
-    ("_scatter.py", "test_scatter.py"): [
+    ("surrogate/chain/_scatter.py", "surrogate/test_scatter.py"): [
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
         ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],

@@ -89,7 +89,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
             element("span", described(scenarios.get(row["scenario"])), class_="text"),
             bar(row["rate"], share_text(row["rate"])),
             bounds_text(row["lowest"], row["highest"]),
-            f"{row['n_records']:,}{_left_out(study, row)}",
+            f"{row['n_records']:,}{_share_not_judged(study, row)}",
             duration_text(row["time_to_detection"]),
         ]
         for _, row in results.iterrows()
@@ -125,7 +125,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     return section("found", "What would be found and what not", *(part for part in parts if part))
 
 
-def _left_out(study: Any, row: pd.Series) -> str:
+def _share_not_judged(study: Any, row: pd.Series) -> str:
     """What share of the records of a scenario was not judged; nothing if all were."""
     share = float(study.indices_[row["scenario"], row["source"]].isna().mean())
     return f" ({share_text(share)} not judged)" if share else ""

@@ -10,7 +10,6 @@ from scipy import stats
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
-from skthermo._scatter import Scatter
 from skthermo._times import has_stamps, row_times
 from skthermo.studies.identification._frequency_effects import healthy_frequencies
 
@@ -59,13 +58,14 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     parts = new + scatter.of_sums(shares, np.arange(len(shares)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        rest = max(freedom - judged.sum() + 1, 1.0)
-        factor, freedom = freedom / rest, rest
+        n_judged, of_correlations = judged.sum(), freedom + scatter.n_pseudo
+        factor = of_correlations / max(of_correlations - n_judged + 1, 1.0)
+        freedom = max(freedom - n_judged + 1, 1.0)
     covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
     return Shift(mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_)
 
 
-def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Scatter:
+def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Any:
     if isinstance(noise, str):
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
@@ -73,7 +73,7 @@ def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Sc
     deviations = check_noise(noise, n_modes)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-    return Scatter.independent(deviations, len(fem.residuals_.values))
+    return fem.residuals_.independent_scatter(deviations)
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:

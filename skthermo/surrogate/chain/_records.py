@@ -17,12 +17,12 @@ from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._dependence import correlation_time
 from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
-from skthermo._scatter import Scatter
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange, nearest_in_parts, one_in_each_part, order_statistic, weather_coordinates
 from skthermo.preprocessing import BlockedKFold
+from skthermo.surrogate.chain._scatter import Scatter
 
 N_FOLDS = 5
 CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
@@ -101,6 +101,10 @@ class WeatherResiduals:
     def scatter(self) -> Scatter:
         """How records scatter around what similar weather explains, and how long they remember it."""
         return Scatter.of(self)
+
+    def independent_scatter(self, deviations: Array) -> Scatter:
+        """The same for independent records and modes of stated relative standard deviations, (n_modes,)."""
+        return Scatter.independent(deviations, len(self.values))
 
     @property
     def is_overfitted(self) -> bool:

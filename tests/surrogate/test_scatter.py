@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from skthermo._scatter import Scatter
+from skthermo.surrogate.chain._scatter import Scatter
 
 ROOT = np.array([[1.0, 0.0], [0.6, 0.8]])  # of the correlations of two modes
 NEAR = 25  # number of neighbours in weather

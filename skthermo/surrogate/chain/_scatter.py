@@ -40,18 +40,19 @@ class Scatter:
     def of(cls, residuals: Any) -> Scatter:
         """Learn from the residuals of a chain what weather similar to theirs does not explain.
 
-        What the comparison with similar weather takes away is known from simulated records. Residuals out of fold are
-        too large where noise lasts, and serve only where the mapper has learned the noise of its own records.
+        Residuals of records that the mapper has learned are too small, those out of fold too large; products of one
+        with the other lie between. What the comparison with similar weather takes away is known from simulated records.
         """
-        table = residuals.less_similar(residuals.values if residuals.is_overfitted else residuals.own)
-        n_records = (~np.isnan(table)).sum(axis=0)
-        found = covariances(table, int(np.clip(len(table) // 4, 2, MOST_LAGS)))
+        of_fold = residuals.less_similar(residuals.values)
+        own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
+        n_records = (~np.isnan(own)).sum(axis=0)
+        found = covariances(own, of_fold, int(np.clip(len(own) // 4, 2, MOST_LAGS)))
         known = np.flatnonzero((n_records >= FEWEST) & (np.diag(found[0]) > 0))
         parts, memory = np.zeros((2, *found[0].shape)), 0.0
         if known.size:
             inside = np.ix_(known, known)
             memory, parts[0][inside], parts[1][inside] = _split(
-                found[:, known][:, :, known], n_records[known], residuals.less_similar, len(table)
+                found[:, known][:, :, known], n_records[known], residuals.less_similar, len(own)
             )
         return cls(parts, memory, n_records)
 
@@ -60,6 +61,11 @@ class Scatter:
         """Independent records and modes of known standard deviations, (n_modes,)."""
         covariance = np.diag(deviations**2)
         return cls(np.array([covariance, 0 * covariance]), 0.0, np.full(len(deviations), n_records))
+
+    @property
+    def n_pseudo(self) -> int:
+        """Weight of the correlations of single records beside those of a part, in independent records."""
+        return PSEUDO_RECORDS
 
     @property
     def variances(self) -> Array:
@@ -101,12 +107,13 @@ class Scatter:
         return self.parts * np.array([weights.T @ weights, weights.T @ (before + after - weights)])
 
 
-def covariances(table: Array, n_lags: int) -> Array:
+def covariances(first: Array, second: Array, n_lags: int) -> Array:
     """Mean products of columns 0, 1, ... records apart, (n_lags, n_modes, n_modes), over pairs that are known."""
-    known, filled = (~np.isnan(table)).astype(float), np.nan_to_num(table)
-    found = np.empty((n_lags, table.shape[1], table.shape[1]))
+    known = [(~np.isnan(table)).astype(float) for table in (first, second)]
+    filled = [np.nan_to_num(table) for table in (first, second)]
+    found = np.empty((n_lags, first.shape[1], first.shape[1]))
     for lag in range(n_lags):
-        sums, pairs = (values[lag:].T @ values[: len(values) - lag] for values in (filled, known))
+        sums, pairs = (a[lag:].T @ b[: len(b) - lag] + b[lag:].T @ a[: len(a) - lag] for a, b in (filled, known))
         found[lag] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
     return found
 
