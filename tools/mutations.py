@@ -238,8 +238,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_threads.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
-    ("studies/identification/_shift.py", "studies/test_identify_parts.py"): [
-        ("pseudo-periods of the shift's correlation", "PSEUDO_PERIODS = 24", "PSEUDO_PERIODS = 0"),
+    ("surrogate/chain/_scatter.py", "surrogate/test_scatter.py"): [
+        ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
+        ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),

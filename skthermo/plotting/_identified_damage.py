@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ NEEDED = {
     "shifts": {"measured", "explained", "standard_error"},
 }
 N_ERRORS = 2  # standard errors on either side of an estimate
+LINE = 120  # number of letters of a line of the heading
 SHORT_NAME = 8  # number of letters up to which names of modes fit beside each other
 
 
@@ -30,7 +32,8 @@ class IdentifiedDamageDisplay:
     identified : IdentifiedDamage
         With the frames ``table`` (groups in rows; severity, standard_error, significant), ``shifts`` (modes in rows;
         measured, explained, standard_error; relative) and ``similarity`` (cosine between groups), and perhaps the names
-        ``unseen`` of groups that are left out.
+        ``unseen`` of groups that are left out. The first sentence of its ``answer()``, if it has one, heads a figure of
+        its own.
 
     Attributes
     ----------
@@ -119,6 +122,9 @@ class IdentifiedDamageDisplay:
         self.axes_[2].set_title("cosine between groups")
         if len(similarity) > 3:
             lean(self.axes_[2])
+        answer = getattr(self.identified, "answer", None)
+        if ax is None and answer is not None:
+            self.figure_.suptitle(textwrap.fill(answer()[0], LINE), fontsize="medium")
         self.figure_.colorbar(self.image_, ax=self.axes_[2], shrink=0.8)
         return self
 

@@ -604,20 +604,23 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
 
-    def training_shares(self, X: ArrayLike) -> Array:
+    def training_shares(self, X: ArrayLike, rows: ArrayLike | None = None) -> Array:
         """Share of each training record in the mean of `expected_residuals` over some rows.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
+        rows : array-like of bool of shape (n_samples,), optional
+            Which rows to average over; all by default. Lags are of all rows.
 
         Returns
         -------
         ndarray of shape (n_records, n_modes)
             For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
         """
-        return self.residuals_.shares(self._weather(X))
+        weather = self._weather(X)
+        return self.residuals_.shares(weather if rows is None else weather[np.asarray(rows)])
 
     @property
     def training_records_(self) -> tuple[Any, Any]:
