@@ -17,13 +17,14 @@ from skthermo.surrogate.inverse import InverseSurrogate
 
 
 def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
-    """Temperatures and frequencies, checked; frames stay frames."""
+    """Copies of temperatures and frequencies, checked; frames stay frames."""
     model = chain.model
     check_model(model)
     if y is None:
         raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-    temperatures = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
-    T, F = frame_like(X, temperatures), frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"))
+    options = {"dtype": np.float64, "ensure_all_finite": "allow-nan", "copy": True}
+    temperatures = validate_data(chain, X, ensure_min_samples=2, **options)
+    T, F = frame_like(X, temperatures), frame_like(y, check_array(y, **options))
     check_same_rows(X, y, ("temperatures", "frequencies"))
     if F.shape[1] != model.n_modes:
         raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
