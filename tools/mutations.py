@@ -112,7 +112,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a user's weights beside those of gaps", "return weights * self.weights", "return weights"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
-        ("residuals of records of weight 0", "& self.counted[order])", ")"),
+        ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
     ],
     ("_frames.py", "surrogate/test_sample_weight.py"): [
         ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
