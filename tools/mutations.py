@@ -108,6 +108,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
+    ("surrogate/chain/_estimates.py", "surrogate/test_sample_weight.py"): [
+        ("a user's weights beside those of gaps", "return weights * self.weights", "return weights"),
+    ],
+    ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
+        ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
+    ],
+    ("_frames.py", "surrogate/test_sample_weight.py"): [
+        ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
+    ],
+    ("_regressors.py", "surrogate/test_sample_weight.py"): [
+        ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
+    ],
     ("surrogate/_standardiser.py", "surrogate/test_coordinates.py"): [
         ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
         ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),

@@ -48,7 +48,8 @@ class Regression:
     def out_of_fold(self, X: Any, y: Any, folds: Folds) -> Any:
         """Predictions by clones of the rest that are fitted on other rows; the first transformers know all rows."""
         partition = [*folds.splits, (folds.untested, folds.untested)] if folds.untested.size else folds.splits
-        predicted = cross_val_predict(clone(self.rest), self._inputs(X), y, cv=partition)
+        # With metadata routing, scikit-learn 1.6 fails where params are None.
+        predicted = cross_val_predict(clone(self.rest), self._inputs(X), y, cv=partition, params={})
         predicted[folds.untested] = np.nan
         return predicted
 
