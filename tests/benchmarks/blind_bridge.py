@@ -388,9 +388,10 @@ def print_unfiltered(name, baseline, years):
     """What outliers in the training records do, if nobody removes them."""
     heard = Heard()
     with heard:
-        single = Detectors(METHODS[name](), baseline).single
-        rates = {damage: Decisions(single, years[damage, "as in training"]).rate for damage in DAMAGES}
-    print(f"  without a filter, records in alarm, %: { {damage: round(rate, 1) for damage, rate in rates.items()} }")
+        detectors = Detectors(METHODS[name](), baseline)
+        rates = {damage: Decisions(detectors.single, years[damage, "as in training"]).rate for damage in DAMAGES}
+    shown = ", ".join(f"{damage} {rate:.1f}" for damage, rate in rates.items())
+    print(f"  without a filter, records in alarm, %: {shown}")
     heard.print("of fit without a filter")
 
 
