@@ -401,7 +401,7 @@ def print_competitors(bridge, years, dirty):
         competitor = kind().fit(bridge.training(dirty))
         for condition in CONDITIONS:
             rows[name, condition] = {d: competitor.rate(years[d, condition]) for d in DAMAGES}
-    print(f"\nSimple competitors, trained on {'records with gaps and outliers' if dirty else 'clean records'}, %")
+    print(f"\nSimple competitors, trained on {'raw records with gaps and outliers' if dirty else 'clean records'}, %")
     print(pd.DataFrame(rows).T.round(1).to_string())
 
 
