@@ -69,6 +69,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
+        ("parameters told apart", "values > np.sqrt(NO_INFORMATION) * values[0]", "values >= 0"),
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
@@ -269,6 +270,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
+    ],
+    ("plotting/_limits.py", "plotting/test_limits.py"): [
+        ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
+        ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
+    ],
+    ("plotting/structures/_view.py", "plotting/test_structures.py"): [
+        ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
 }
 
