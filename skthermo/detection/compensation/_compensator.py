@@ -82,8 +82,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
         their standard deviations.
     spread_ : object
-        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records of
-        similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
+        of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
@@ -116,8 +116,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
     given the others, records fewer than two correlation times of the residuals apart (at least 24 rows) left out; such
-    records are left out too where the baseline itself
-    is scaled. A new record takes S from the baseline record with the most similar weather; without any temperature,
+    records are left out too where the baseline itself is scaled. A new record takes S from the baseline record with the
+    most similar weather; where a lag or another value is missing that no sensor tells,
     from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
     the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
