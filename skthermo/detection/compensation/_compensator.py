@@ -375,6 +375,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
         self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local")
+        if not len(fills.rows):
+            return white
         untaught = np.isnan(taught).all(axis=1)
         return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
 
