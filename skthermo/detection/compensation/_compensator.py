@@ -335,7 +335,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _read_baseline(self, X: Any) -> tuple[Any, Any]:
         if isinstance(self.estimator, type):
             raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
-        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
+        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
         check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
