@@ -131,6 +131,7 @@ def service():
     return detector, later
 
 
+@pytest.mark.filterwarnings("ignore:8 of 480 rows are not judged")
 def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -144,7 +145,7 @@ def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
     assert 100 < n_alarms < 300
 
 
-@pytest.mark.filterwarnings("ignore")
+@pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows are not judged")
 def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -153,3 +154,15 @@ def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
         known = alone.notna()
         assert not known.iloc[:-1].all()
         np.testing.assert_allclose(alone[known], index[batch.index][known], rtol=1e-9)
+
+
+def test_a_day_alone_says_what_lags_lack(service):
+    detector, later = service
+    said = (
+        "8 of 8 rows are not judged: lags reach 1 days 00:00:00 back, to where no record is; the first record given is "
+        "2026-03-04 00:00:00: give the 1 days 00:00:00 before, too"
+    )
+    with pytest.warns(UserWarning, match="not judged") as given:
+        residuals = detector[0].transform(later.loc["2026-03-04"])
+    assert [str(warning.message) for warning in given] == [said]
+    assert residuals.isna().all(axis=None)
