@@ -223,7 +223,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
     ],
     ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
-        ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
+        ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
     ],

@@ -115,6 +115,7 @@ def test_one_target_is_a_vector_for_estimators_that_want_one():
 # What they are for
 
 
+@pytest.mark.filterwarnings("ignore:the 730 baseline records depend on each other")  # raw frequencies follow the season
 def test_out_of_fold_thresholds_keep_their_promise_and_in_sample_ones_do_not():
     healthy, later, damaged = (
         make_truss_campaign(2, random_state=seed, damage=damage)

@@ -128,7 +128,7 @@ def test_a_fold_without_a_temperature_is_missing():
     assert residuals.drop(index=residuals.index[40:80]).notna().all(axis=None)
 
 
-@pytest.mark.filterwarnings("ignore:'T1' is missing in 2 of 200 rows")
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled from the other")
 @pytest.mark.parametrize(
     "estimator",
     [

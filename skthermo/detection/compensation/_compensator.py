@@ -38,6 +38,7 @@ from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._gaps import FillError, fill_temperatures
+from skthermo.detection.compensation._local_covariance import rows_near_in_time
 from skthermo.detection.compensation._whitening import Spread
 from skthermo.preprocessing import check_records
 
@@ -116,9 +117,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
-    given the others, records fewer than two correlation times of the residuals apart (at least 24 rows) left out; such
-    records are left out too where the baseline itself
-    is scaled. A new record takes S from the baseline record with the most similar weather; without any temperature,
+    given the others, records of the same day (at least 24 rows around each) left out; such records are left out too
+    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather;
+    where a value is missing that no sensor tells,
     from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
     the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
@@ -277,7 +278,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            As in `fit`, if temperatures are missing, and if they are far outside those of `fit`.
+            As in `fit`; if temperatures are far outside those of `fit`; if lags find no record.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
@@ -286,7 +287,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
-        residuals = as_floats(frequencies) - self.regression_.predict(filled)
+        predicted = self.regression_.predict(filled)
+        self.regression_.warn_of_lags(filled, predicted)
+        residuals = as_floats(frequencies) - predicted
         residuals[np.isnan(weather).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (
@@ -336,7 +339,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _read_baseline(self, X: Any) -> tuple[Any, Any]:
         if isinstance(self.estimator, type):
             raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
-        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
+        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
         check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
@@ -376,7 +379,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local")
+        near = rows_near_in_time(filled)
+        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local", near=near)
+        if not len(fills.rows):
+            return white
         untaught = np.isnan(taught).all(axis=1)
         return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
 
