@@ -3,14 +3,17 @@
 Each check returns its argument as an array, or raises a ValueError that says what was got and what was expected.
 """
 
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, Bounds, by_parameter, real_array
+from skthermo._arrays import Array, Bounds, real_array
+from skthermo._names import by_name, columns_by_name, is_labelled, rows_by_name
+from skthermo._numbers import is_real
+
+MOST_NOISE = 0.2  # largest relative noise of frequencies: more is meant in percent
 
 
 def check_theta(
@@ -18,9 +21,7 @@ def check_theta(
 ) -> Array:
     """Rows of finite, positive multipliers, one column for each parameter."""
     names = list(parameter_names)
-    if hasattr(theta, "columns") and list(theta.columns) != names:
-        raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
-    values = real_array(theta, "theta")
+    values = real_array(by_name(columns_by_name(theta, names, "theta"), names, "theta"), "theta")
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(
@@ -42,13 +43,14 @@ def check_theta(
 def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     """Lowest and highest multiplier of every parameter."""
     names = list(parameter_names)
-    if isinstance(bounds, Mapping):
-        widths = by_parameter(bounds, names, "bounds")
+    if isinstance(bounds, Mapping) or is_labelled(bounds):
+        widths = by_name(bounds, names, "bounds")
         return np.vstack([check_bounds(_pair(width, name), [name]) for name, width in zip(names, widths, strict=True)])
-    array = real_array(bounds, "bounds")
+    ends = columns_by_name(bounds, ("lowest", "highest"), "bounds", "columns")
+    array = real_array(rows_by_name(ends, names, "bounds"), "bounds")
     if array.ndim == 0:
         if not 0 < array < 1:
-            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3 for 30 %")
         return np.tile([1 - array, 1 + array], (len(names), 1))
     if array.shape != (len(names), 2):
         raise ValueError(
@@ -64,24 +66,51 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
 def check_prior(prior: ArrayLike | Mapping[str, float], parameter_names: Sequence[str]) -> Array:
     """Standard deviation of the prior of every parameter."""
     names = list(parameter_names)
-    given = by_parameter(prior, names, "prior") if isinstance(prior, Mapping) else prior
-    deviations = real_array(given, "prior")
-    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & np.isfinite(deviations)).all():
+    deviations = real_array(by_name(prior, names, "prior"), "prior")
+    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & (deviations <= 1)).all():
         raise ValueError(
-            f"prior is {deviations}; expected relative standard deviations above 0, a number or one for each of {names}"
+            f"prior is {deviations}; expected relative standard deviations above 0 and at most 1 (0.3 means 30 %), "
+            f"a number or one for each of {names}"
         )
     return np.broadcast_to(deviations, (len(names),))
 
 
-def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
+def check_noise(
+    noise: ArrayLike,
+    n_modes: int,
+    mode_names: Sequence[Any] | None = None,
+    *,
+    what: str = "noise",
+    most: float = MOST_NOISE,
+) -> NDArray[np.float64]:
     """Relative standard deviation of every mode."""
-    array = real_array(noise, "noise")
-    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
+    array = real_array(by_mode(noise, n_modes, mode_names, what), what)
+    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array <= most)).all():
         raise ValueError(
-            f"noise is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
+            f"{what} is {array}; expected a relative standard deviation from 0 to {most:g} (0.01 means 1 %), "
             f"a number or one for each of the {n_modes} modes"
         )
     return np.broadcast_to(array, (n_modes,))
+
+
+def by_mode(values: Any, n_modes: int, mode_names: Sequence[Any] | None, what: str) -> Any:
+    """Values of a Series or mapping by mode in the order of the modes, which are named f1, f2, ... by default."""
+    names = [f"f{i + 1}" for i in range(n_modes)] if mode_names is None else list(mode_names)[:n_modes]
+    return by_name(values, names, what, "modes")
+
+
+def check_flag(flag: Any, what: str) -> bool:
+    """Whether a flag is set; anything but a boolean is an error."""
+    if not isinstance(flag, bool | np.bool_):
+        raise ValueError(f"{what} is {flag!r:.100}; expected True or False")
+    return bool(flag)
+
+
+def check_names(names: Any, what: str) -> list[str]:
+    """Names as a list; one text in place of several is an error."""
+    if isinstance(names, str | bytes) or not isinstance(names, Iterable):
+        raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
+    return list(names)
 
 
 def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
@@ -110,7 +139,7 @@ def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:
 def _pair(width: Any, name: str) -> Any:
     """A half-width, or lowest and highest as the only row."""
     if np.ndim(width) == 0:
-        if not (isinstance(width, Real) and 0 < float(width) < 1):
+        if not (is_real(width) and 0 < float(width) < 1):
             raise ValueError(
                 f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
                 "highest)"

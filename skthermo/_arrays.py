@@ -1,12 +1,14 @@
 """Arrays, matrices and seeds, without scikit-learn or pandas."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from numbers import Integral
 from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
+
+from skthermo._numbers import refuse_huge, refuse_no_numbers
 
 Array: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
@@ -15,33 +17,29 @@ Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
 RandomState: TypeAlias = int | np.random.RandomState | None
 
 
-def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
-    """Values of a mapping in the order of the parameters; its keys must be exactly the parameters."""
-    unknown = [name for name in values if name not in parameter_names]
-    missing = [name for name in parameter_names if name not in values]
-    if unknown or missing:
-        problem = f"{unknown} are unknown" if unknown else f"{missing} are missing"
-        raise ValueError(f"{what}: {problem}; expected each of the parameters {list(parameter_names)}")
-    return [values[name] for name in parameter_names]
-
-
-def real_array(values: Any, what: str) -> Array:
-    """An array of floats; complex numbers, sparse matrices and values that are not numbers are errors."""
+def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
+    """An array of floats; complex numbers, sparse matrices and what is no number or, without ``any_size``, too
+    large to be squared, are errors."""
     if values is None:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
     try:
         if not np.iscomplexobj(values):
-            return as_floats(values)
+            array = as_floats(values)
+            if not any_size:
+                refuse_huge(array, what)
+            return array
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
+        reason = str(error).partition(";")[0]
+        raise ValueError(f"{what} is {values!r:.200}; expected numbers ({reason})") from error
     raise ValueError(f"{what} is complex; expected real numbers")
 
 
 def as_floats(values: Any) -> Array:
-    """An array of floats; values that are masked or missing become NaN."""
+    """An array of floats; values that are masked or missing become NaN, and what is no number is an error."""
     values = without_mask(values)
+    refuse_no_numbers(values)
     is_pandas = hasattr(values, "iloc")
     array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy.special import ndtri
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_random_state, positive_integer
+from skthermo._numbers import is_real
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors
 from skthermo.datasets._kw51_truth import (
@@ -102,7 +102,7 @@ def _by_group(values: Mapping[str, float] | None, what: str) -> Mapping[str, flo
     if not isinstance(values, Mapping) or not set(values) <= set(groups):
         raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
     for group, value in values.items():
-        if not isinstance(value, Real) or not np.isfinite(value):
+        if not is_real(value) or not np.isfinite(value):
             raise ValueError(f"{what} of group {group!r} is {value!r}; expected a finite number")
     return values
 

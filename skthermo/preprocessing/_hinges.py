@@ -15,9 +15,9 @@ from skthermo._validation import (
     Interval,
     TransformerMixin,
     _check_feature_names_in,
-    _check_sample_weight,
     _fit_context,
     check_is_fitted,
+    check_sample_weight,
     validate_data,
 )
 
@@ -96,7 +96,7 @@ class HingeFeatures(TransformerMixin, Estimator):
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
         weights = None
         if sample_weight is not None:
-            weights = _check_sample_weight(sample_weight, values, ensure_non_negative=True)
+            weights = check_sample_weight(sample_weight, X, len(values))
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
         empty = np.isnan(values).all(axis=0)
         if empty.any():

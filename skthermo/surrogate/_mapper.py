@@ -8,7 +8,7 @@ from sklearn.base import BaseEstimator
 
 from skthermo._arrays import Array
 from skthermo._frames import check_columns, check_temperatures, frame_like
-from skthermo._validation import HasMethods, _check_sample_weight, _fit_context, check_is_fitted, seeded, validate_data
+from skthermo._validation import HasMethods, _fit_context, check_is_fitted, check_sample_weight, seeded, validate_data
 from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._standardiser import FrequencyCoordinates
@@ -123,7 +123,7 @@ class TemperatureMapper(MultiplierRegressor):
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)
-        weights = None if sample_weight is None else _check_sample_weight(sample_weight, T, ensure_non_negative=True)
+        weights = None if sample_weight is None else check_sample_weight(sample_weight, X, len(T))
         self._learn(
             T, theta, seeded(self.random_state), log_inputs=False, coordinates=self.coordinates, sample_weight=weights
         )

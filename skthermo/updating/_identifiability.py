@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
-
 import numpy as np
 import pandas as pd
 import scipy.linalg
@@ -14,6 +12,7 @@ from sklearn.utils import Bunch
 
 from skthermo._arguments import check_model, check_noise
 from skthermo._arrays import Array, real_array
+from skthermo._numbers import is_real
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
@@ -191,7 +190,7 @@ def cramer_rao(information: ArrayLike) -> Array:
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
-    if not isinstance(shape_noise, Real) or not 0 < shape_noise < np.inf:
+    if not is_real(shape_noise) or not 0 < shape_noise < np.inf:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arguments import check_dofs
 from skthermo._arrays import Array, real_array
+from skthermo._names import by_name
 from skthermo._warnings import warn_user
 
 
@@ -59,7 +60,7 @@ def read_measured(
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
     places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
-    weights = _per_mode(shape_weight, n_modes, "shape_weight")
+    weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
     if not places.size and weights.any():
@@ -127,7 +128,7 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
     """Standard deviations in Hz; without any, the frequencies themselves, for a weight of 1."""
     if frequency_std is None:
         return means
-    deviations = _per_mode(frequency_std, len(means), "frequency_std")
+    deviations = _per_mode(frequency_std, names, "frequency_std")
     wrong = np.flatnonzero(np.isfinite(means) & ~((deviations > 0) & np.isfinite(deviations)))
     if wrong.size:
         raise ValueError(
@@ -136,8 +137,9 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
     return deviations
 
 
-def _per_mode(values: ArrayLike, n_modes: int, what: str) -> Array:
-    array = real_array(values, what)
+def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
+    n_modes = len(names)
+    array = real_array(by_name(values, names, what, "modes"), what)
     if array.shape not in ((), (n_modes,)):
         raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
     return np.broadcast_to(array, (n_modes,)).copy()

@@ -1,13 +1,14 @@
 """Reads and checks the arguments of an affine model."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Matrix, positive_integer, real_array
+from skthermo._names import as_mapping
+from skthermo._numbers import is_real
 
 Key = tuple[str, ...]
 
@@ -123,12 +124,13 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
 
 def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
     """Checks that groups are known and that severities leave some stiffness."""
+    damage = as_mapping(damage)
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (isinstance(severity, Real) and LOWEST_SEVERITY <= float(severity) < 1):
+        if not (is_real(severity) and LOWEST_SEVERITY <= float(severity) < 1):
             raise ValueError(
                 f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
                 f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"

@@ -6,12 +6,12 @@ a parameter.
 
 from collections.abc import Hashable, Iterator, Mapping
 from math import isfinite
-from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
 
 from skthermo._arrays import Array
+from skthermo._numbers import is_real
 
 Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]
@@ -168,5 +168,5 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         )
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
-        if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):
+        if not (is_real(value) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):
             raise ValueError(f"member {name!r} has {symbol} = {value!r}; expected {expected}")

@@ -49,7 +49,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:
-    array = np.asarray(phi, dtype=complex) if np.iscomplexobj(phi) else real_array(phi, name)
+    array = np.asarray(phi, dtype=complex) if np.iscomplexobj(phi) else real_array(phi, name, any_size=True)
     array = array[:, np.newaxis] if array.ndim == 1 else array
     if array.ndim != 2:
         raise ValueError(f"{name} has shape {array.shape}; expected (n_dof, n_modes)")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, central_differences
+from skthermo._numbers import is_real
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
@@ -153,5 +153,5 @@ def _linearised_modes(model: Any, theta: Array, dofs: ArrayLike) -> tuple[Array,
 
 
 def _check_step(step: float) -> None:
-    if not isinstance(step, Real) or not 0 < step < 1:
+    if not is_real(step) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")

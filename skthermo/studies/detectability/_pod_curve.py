@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
 from skthermo._arrays import Array, real_array
+from skthermo._numbers import is_real
 from skthermo._warnings import warn_user
 from skthermo.studies.detectability._intervals import clopper_pearson
 
@@ -251,7 +251,7 @@ def pod_curve(
 
 def check_probability(value: Any, what: str) -> float:
     """A probability strictly between 0 and 1, or an error."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not 0 < float(value) < 1:
+    if not is_real(value) or not 0 < float(value) < 1:
         raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
     return float(value)
 

@@ -145,7 +145,15 @@ def what_to_add(
     candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
     candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
-    simulator = CampaignSimulator(fem, T, changes, study.noise, longest, ranks, check_noise(scatter, len(ranks)))
+    simulator = CampaignSimulator(
+        fem,
+        T,
+        changes,
+        study.noise,
+        longest,
+        ranks,
+        check_noise(scatter, len(ranks), [mode_name(rank) for rank in ranks]),
+    )
     n_repeats = positive_integer(study.n_repeats, "n_repeats")
     seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
@@ -228,7 +236,7 @@ def _scatter(study: DetectabilityStudy) -> float:
     """Median relative scatter of the measured modes."""
     if isinstance(study.noise, str):
         return float(np.median(np.sqrt(np.nanmean(study.fem.residuals_.values**2, axis=0))))
-    return float(np.median(check_noise(study.noise, len(study.fem.mode_names_))))
+    return float(np.median(check_noise(study.noise, len(study.fem.mode_names_), study.fem.mode_names_)))
 
 
 def _with_sensors(

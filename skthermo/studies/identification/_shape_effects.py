@@ -74,7 +74,7 @@ class ShapeEffects:
                 mode = int((array == 0).all(axis=0).argmax())
                 raise ValueError(f"the {which} shape of mode {mode} is zero; expected NaN where it was not measured")
             pair.append(self.scaled(array))
-        relative = check_noise(noise, self.reference.shape[1])
+        relative = check_noise(noise, self.reference.shape[1], what="shape_noise", most=1)
         if (relative == 0).any():
             raise ValueError(f"shape_noise is {noise!r}; expected standard deviations above 0")
         largest = np.abs(self.reference).max(axis=0)

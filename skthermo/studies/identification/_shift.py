@@ -38,7 +38,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     scale = np.sqrt(1 / np.maximum(n_records, 1) + 1 / np.maximum(number, 1))
     trained = fem.residuals_.values
     if not isinstance(noise, str):
-        deviations = check_noise(noise, len(mean))
+        deviations = check_noise(noise, len(mean), fem.mode_names_)
         if (deviations == 0).any():
             raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
         return Shift(mean, np.diag((deviations * scale) ** 2), n_records, len(trained), fem.mode_names_)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import real_array
+from skthermo._names import as_mapping
 from skthermo._validation import check_is_fitted
 
 
@@ -83,6 +84,7 @@ def check_name(name: Any) -> None:
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
     """Severity by group as floats."""
+    damage = as_mapping(damage)
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage of scenario {name!r} is {damage!r:.200}; expected {{group: severity}}")
     for group, severity in damage.items():

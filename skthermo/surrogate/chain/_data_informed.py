@@ -14,6 +14,8 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
 from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._names import as_mapping
+from skthermo._numbers import is_real
 from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
@@ -356,7 +358,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         True
         """
         check_is_fitted(self)
-        if not isinstance(confidence, Real) or isinstance(confidence, bool) or not 0 < confidence < 1:
+        if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         frequencies = self._simulate(X)
         margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
@@ -485,7 +487,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             weather, order = self._weather(X), np.argsort(row_times(X), kind="stable")
             return self.residuals_.draw(weather[order], random)[np.argsort(order)]
         shape = (np.shape(X)[0], len(self.mode_names_))
-        return check_noise(noise, shape[1]) * random.standard_normal(shape)
+        return check_noise(noise, shape[1], self.mode_names_) * random.standard_normal(shape)
 
     def simulate_modes(
         self,
@@ -711,7 +713,7 @@ def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> 
     for name, factor in (parameters or {}).items():
         if name not in factors:
             raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
-        if not isinstance(factor, Real) or not 0 < factor < np.inf:
+        if not is_real(factor) or not 0 < factor < np.inf:
             raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
         if factor > LARGE_FACTOR:
             warn_user(
@@ -727,6 +729,7 @@ def split_damage(
     damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
 ) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
     """Severities that are the same in all rows, and those with a value for each row."""
+    damage = as_mapping(damage)
     if damage is not None and not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     fixed: dict[str, Any] = {}
