@@ -28,6 +28,8 @@ def refuse_no_numbers(values: Any) -> None:
 
     NumPy and pandas would read "1.0" and True as 1, and a date as nanoseconds.
     """
+    if isinstance(values, type) or callable(values):
+        raise ValueError(f"the input is {values!r:.100}; expected numbers")
     for name, part in _parts(values):
         what, example = _no_number(part)
         if what:
@@ -61,6 +63,8 @@ def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
 def _no_number(values: Any) -> tuple[str, Any]:
     """What kind of values are no numbers, and the first of them; an empty text if all are numbers."""
     if isinstance(values, list | tuple):
+        if len({len(row) for row in values if isinstance(row, list | tuple)}) > 1:
+            return "rows of different lengths", values
         return next((found for found in map(_no_number, values) if found[0]), ("", None))
     dtype = getattr(values, "dtype", None)
     if dtype is None:
