@@ -4,6 +4,9 @@ Each check returns its argument as an array, or raises a ValueError that says wh
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, Bounds, real_array
 from skthermo._names import by_name, columns_by_name, is_labelled, rows_by_name
-from skthermo._numbers import is_real
+from skthermo._numbers import is_real, refuse_no_numbers
 
 MOST_NOISE = 0.2  # largest relative noise of frequencies: more is meant in percent
 
@@ -85,10 +88,15 @@ def check_noise(
 ) -> NDArray[np.float64]:
     """Relative standard deviation of every mode."""
     array = real_array(by_mode(noise, n_modes, mode_names, what), what)
-    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array <= most)).all():
+    if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
         raise ValueError(
-            f"{what} is {array}; expected a relative standard deviation from 0 to {most:g} (0.01 means 1 %), "
+            f"{what} is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
             f"a number or one for each of the {n_modes} modes"
+        )
+    if (array > most).all():  # a single mode may be unknown
+        raise ValueError(
+            f"{what} is {array}, which means {np.min(array):.0%} or more in every mode: percent? expected at most "
+            f"{most:g} in some mode, and {np.min(array) / 100:g} where {np.min(array):g} % is meant"
         )
     return np.broadcast_to(array, (n_modes,))
 
@@ -106,21 +114,52 @@ def check_flag(flag: Any, what: str) -> bool:
     return bool(flag)
 
 
+def check_jobs(n_jobs: Any) -> None:
+    """Raise an error for what is no number of joblib's jobs."""
+    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
+        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+
+
 def check_names(names: Any, what: str) -> list[str]:
-    """Names as a list; one text in place of several is an error."""
-    if isinstance(names, str | bytes) or not isinstance(names, Iterable):
+    """Different names as a list; one text in place of several is an error."""
+    given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
+    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
-    return list(names)
+    if len(set(given)) < len(given):
+        raise ValueError(f"{what} are {given!r:.200}; expected each name once")
+    return given
+
+
+def check_size(value: Any, what: str, lowest: float, highest: float, expected: str) -> float:
+    """A real number strictly between two others."""
+    if not is_real(value) or not lowest < float(value) < highest:
+        raise ValueError(f"{what} is {value!r:.100}; expected {expected}")
+    return float(value)
+
+
+def integer_row(values: Any, what: str) -> NDArray[np.integer]:
+    """One or more integers; anything else, also True and False among them, is an error."""
+    try:
+        refuse_no_numbers(values, what)
+        array = np.asarray(values)
+    except ValueError as error:
+        kind = f", of type {np.asarray(values).dtype}" if hasattr(values, "dtype") else ""
+        raise ValueError(f"{what} is {values!r:.200}{kind}; expected integers in one row") from error
+    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"{what} has shape {array.shape} and type {array.dtype}; expected integers in one row")
+    return array
+
+
+def check_path(path: Any, what: str = "path") -> Path:
+    """A path, given as text or as a path."""
+    if not isinstance(path, str | PathLike) or not str(path):
+        raise ValueError(f"{what} is {path!r:.200}; expected a path, as text or a pathlib.Path")
+    return Path(path)
 
 
 def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     """Different degrees of freedom of a model."""
-    try:
-        array = np.asarray(dofs)
-    except ValueError as error:  # rows of different length
-        raise ValueError(f"dofs is {dofs!r:.200}; expected integers in one row") from error
-    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
+    array = integer_row(dofs, "dofs")
     outside = array[(array < 0) | (array >= n_dof)]
     if outside.size:
         raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")

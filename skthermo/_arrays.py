@@ -36,9 +36,20 @@ def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
     raise ValueError(f"{what} is complex; expected real numbers")
 
 
+def shape_array(values: Any, what: str, *, any_size: bool = False) -> NDArray:
+    """An array of floats or, where some are complex, of complex numbers: mode shapes."""
+    try:
+        is_complex = np.iscomplexobj(values)
+    except ValueError as error:  # rows of different length
+        raise ValueError(f"{what} is {values!r:.200}; expected rows of one length") from error
+    return np.asarray(values, dtype=complex) if is_complex else real_array(values, what, any_size=any_size)
+
+
 def as_floats(values: Any) -> Array:
     """An array of floats; values that are masked or missing become NaN, and what is no number is an error."""
     values = without_mask(values)
+    if scipy.sparse.issparse(values):
+        raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
     refuse_no_numbers(values)
     is_pandas = hasattr(values, "iloc")
     array: Any = values if is_pandas else np.asarray(values)
@@ -91,6 +102,8 @@ def as_random_state(seed: Any) -> np.random.RandomState:
     from sklearn.utils import check_random_state
 
     try:
+        if isinstance(seed, bool):
+            raise ValueError
         return check_random_state(seed)
     except ValueError as error:
         raise ValueError(

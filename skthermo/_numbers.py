@@ -23,17 +23,17 @@ def is_real(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def refuse_no_numbers(values: Any) -> None:
+def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     """Raise an error for an array, a table or nested lists with values that are no numbers.
 
     NumPy and pandas would read "1.0" and True as 1, and a date as nanoseconds.
     """
     if isinstance(values, type) or callable(values):
-        raise ValueError(f"the input is {values!r:.100}; expected numbers")
+        raise ValueError(f"{what} is {values!r:.100}; expected numbers")
     for name, part in _parts(values):
         what, example = _no_number(part)
         if what:
-            where = f"column {name!r}" if name is not None else "the input"
+            where = f"column {name!r}" if name is not None else what
             hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
             raise ValueError(
                 f"{where} holds {what}, such as {example!r:.60}; expected numbers"

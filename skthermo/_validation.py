@@ -21,7 +21,7 @@ from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _check_sample_weight, _num_samples, check_is_fitted
 
 from skthermo._arguments import is_model
-from skthermo._arrays import as_floats, without_mask, without_missing
+from skthermo._arrays import real_array, without_mask, without_missing
 from skthermo._names import is_labelled, is_numbered
 from skthermo._numbers import refuse_huge, refuse_no_numbers
 
@@ -69,6 +69,14 @@ __all__ = [
 class Estimator(BaseEstimator):
     """Base of estimators that accept NaN in X, and of which clones share FE models."""
 
+    def _validate_params(self) -> None:
+        if isinstance(getattr(self, "random_state", None), bool):
+            raise InvalidParameterError(
+                f"The 'random_state' parameter of {type(self).__name__} is {self.random_state!r}; expected an integer, "
+                "a RandomState or None"
+            )
+        super()._validate_params()
+
     def __sklearn_clone__(self) -> Self:
         parameters = self.get_params(deep=False)
         twin = type(self)(**{k: v if is_model(v) else clone(v, safe=False) for k, v in parameters.items()})
@@ -103,6 +111,8 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
 def check_array(values: Any, **options: Any) -> Any:
     """scikit-learn's `check_array`; masked or missing values become NaN, and what is no number is an error."""
+    if isinstance(values, pd.DataFrame) and values.columns.has_duplicates:
+        raise ValueError(f"y has the columns {list(values.columns)}; expected each name once")
     array = sklearn.utils.check_array(with_nan(values), **options)
     refuse_huge(array, options.get("input_name") or "y")
     return array
@@ -116,7 +126,7 @@ def check_sample_weight(sample_weight: ArrayLike, X: Any, n_rows: int) -> NDArra
             if not given.index.is_unique or set(given.index) != set(X.index):
                 raise ValueError("sample_weight has another index than X; expected a weight for each of its rows")
             sample_weight = given.loc[X.index]
-    weights = as_floats(sample_weight)
+    weights = real_array(sample_weight, "sample_weight")
     return _check_sample_weight(weights, np.empty((n_rows, 1)), ensure_non_negative=True)
 
 

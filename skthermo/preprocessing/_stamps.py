@@ -1,6 +1,7 @@
 """Stamps and durations as users give them."""
 
 import re
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -49,10 +50,12 @@ def as_duration(value: Any, name: str) -> np.timedelta64:
             f"{name} is {value!r}; expected a duration of fixed length with its unit, such as '10min', '1h' or '30D'"
         )
     try:
+        if isinstance(value, Real):  # nanoseconds for pandas
+            raise TypeError
         numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
         duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration of fixed length, such as '1h'") from error
-    if units == [] or not duration >= ZERO or (name == "freq" and duration == ZERO):
+    if units == [] or not duration >= ZERO or (name != "tolerance" and duration == ZERO):
         raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
     return duration

@@ -11,8 +11,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
+from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like
+from skthermo._names import columns_by_name
 from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Estimator, check_array, seed_parts, validate_data
@@ -61,7 +63,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         ValueError
             If ``return_std`` is set and the regressor gives no standard deviations.
         """
-        theta, std = self._predict_arrays(X, return_std)
+        theta, std = self._predict_arrays(X, check_flag(return_std, "return_std"))
         return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
@@ -79,7 +81,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         float
             NaN if fewer than two rows are complete.
         """
-        return complete_r2(as_columns(y), as_columns(self.predict(X)))
+        predicted = self.predict(X)
+        targets = y if self.parameter_names_ is None else columns_by_name(y, self.parameter_names_, "y")
+        return complete_r2(as_columns(targets), as_columns(predicted))
 
     def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""

@@ -168,6 +168,8 @@ def cramer_rao(information: ArrayLike) -> Array:
            [ nan,  inf]])
     """
     information = real_array(information, "information")
+    if not np.isfinite(information).all():
+        raise ValueError("information holds values that are not finite; expected finite ones")
     if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
         raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
     if not np.isfinite(information).all():
@@ -190,7 +192,7 @@ def cramer_rao(information: ArrayLike) -> Array:
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
-    if not is_real(shape_noise) or not 0 < shape_noise < np.inf:
+    if not is_real(shape_noise) or not 0 < shape_noise < 1:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arguments import check_dofs
-from skthermo._arrays import Array, real_array
+from skthermo._arrays import Array, real_array, shape_array
 from skthermo._names import by_name
 from skthermo._warnings import warn_user
 
@@ -108,13 +108,13 @@ def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tu
     if shapes is None:
         return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
     places = check_dofs(dofs, n_dof)
-    array = np.asarray(shapes)
+    array = shape_array(shapes, "shapes")
     if array.shape != (len(places), n_modes):
         raise ValueError(
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = _real_shapes(array) if np.iscomplexobj(array) else real_array(shapes, "shapes")
+    array = _real_shapes(array) if np.iscomplexobj(array) else array
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_model, check_theta
 from skthermo._arrays import Array, central_differences, real_array
-from skthermo._numbers import is_real
+from skthermo._numbers import HUGE, is_real
 from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
@@ -128,7 +128,12 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
     if not isinstance(S, pd.DataFrame):
         raise ValueError(f"S is a {type(S).__name__}; expected a DataFrame whose columns are parameters")
     values = real_array(S, "S")
-    if not is_real(threshold) or not 0 <= threshold < np.inf:
+    if not values.size or not np.isfinite(values).all() or S.columns.has_duplicates:
+        raise ValueError(
+            f"S has shape {values.shape} and the columns {list(S.columns)}; expected finite sensitivities of different "
+            "parameters"
+        )
+    if not is_real(threshold) or not 0 <= threshold < HUGE:
         raise ValueError(f"threshold is {threshold!r}; expected a number of zero or more, such as 0.1")
     return [*S.columns[(np.abs(values) >= threshold).any(axis=0)]]
 

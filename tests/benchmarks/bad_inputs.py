@@ -2,10 +2,10 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/bad_inputs.py
 
-A bad value is refused by an error that names it, warned of, silent (accepted as if it were good), or unclear (any other
-error, or more than 20 s). Values that happen to be legal are left out: where they are the default, where the result is
-that of the good value because names were read, and those in ``LEGAL``. The exit code is 1 if more than 1 % are silent or
-unclear, or if a public argument has no example. ``--of`` chooses some callables, ``--all`` shows every answer.
+A bad value is refused by an error that names it, warned of, silent (accepted as if it were good), or unclear (any
+other error, or more than 20 s). Values that happen to be legal are left out: where they are the default, where the
+result is that of the good value because names were read, and those in ``LEGAL``. The exit code is 1 if more than 1 %
+are silent or unclear, or if a public argument has no example. ``--of`` chooses callables, ``--all`` shows all answers.
 """
 
 import argparse
@@ -37,6 +37,12 @@ FROM_THE_DEPTHS = re.compile(
     "|unexpected keyword|positional argument|not understood|could not be resolved|inhomogeneous"
 )
 """Messages of NumPy, SciPy, pandas and Python about what a wrong input led to."""
+
+SAYS_WHAT = re.compile(
+    "[Ee]xpected|must be|[Gg]ot |required|should match|not supported|contains (infinity|NaN)"
+    "|expecting|should provide|not fitted|is none of these|not readable as|; found"
+)
+"""What says what was got and what was expected, also in scikit-learn's words."""
 
 
 class TooLong(BaseException):
@@ -77,7 +83,7 @@ def is_clear(error, argument):
         return False
     if not traceback.extract_tb(error.__traceback__)[-1].filename.startswith(CHECKED_BY):
         return False
-    return bool(re.search(rf"\b{re.escape(argument)}\b", text) or re.search("[Ee]xpected|must be|[Gg]ot |required by|should match|not supported", text))
+    return bool(re.search(rf"\b{re.escape(argument)}\b", text) or SAYS_WHAT.search(text))
 
 
 def arrays(result):

@@ -45,6 +45,8 @@ def add_noise(
     array([0.  , 0.04])
     """
     clean, names = real_array(frequencies, "frequencies"), getattr(frequencies, "columns", None)
+    if np.isinf(clean).any():
+        raise ValueError("frequencies hold infinite values; expected finite ones, or NaN")
     if clean.ndim != 2:
         raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
     deviation = check_noise(noise, clean.shape[1], names)

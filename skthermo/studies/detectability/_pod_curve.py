@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
+from skthermo._arguments import check_flag
 from skthermo._arrays import Array, real_array
 from skthermo._numbers import is_real
 from skthermo._warnings import warn_user
@@ -111,8 +112,10 @@ class PODCurve:
             If a severity is not a number of this sign.
         """
         magnitudes = real_array(severity, "severity") * np.sign(self.severities[0])
-        if not (magnitudes >= 0).all():
-            raise ValueError(f"severity is {severity!r:.200}; expected the sign of those tested, {self.severities}")
+        if not ((magnitudes >= 0) & np.isfinite(magnitudes)).all() or (real_array(severity, "severity") >= 1).any():
+            raise ValueError(
+                f"severity is {severity!r:.200}; expected shares below 1 of the sign of those tested, {self.severities}"
+            )
         places = np.log(magnitudes) if self.log else magnitudes
         centre = self.intercept + self.slope * places
         deviation = np.sqrt(
@@ -212,6 +215,7 @@ def pod_curve(
     >>> print(f"{curve.a50:.2f} {curve.a90:.2f} {curve.a90_95:.2f}")
     0.18 0.27 0.33
     """
+    check_flag(log, "log")
     s, k, n = checked_counts(severities, n_detected, n_records)
     check_probability(confidence, "confidence")
     x, bracket = np.log(np.abs(s)) if log else np.abs(s), bracket_of(s, k / n, 0.9)

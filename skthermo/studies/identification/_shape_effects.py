@@ -70,6 +70,8 @@ class ShapeEffects:
                     f"the {which} shapes have shape {array.shape}; expected a row for each of {len(self.dofs)} sensors "
                     f"and a column for each of {self.reference.shape[1]} modes"
                 )
+            if np.isinf(array).any():
+                raise ValueError(f"the {which} shapes hold infinite values; expected NaN where not measured")
             if (array == 0).all(axis=0).any():
                 mode = int((array == 0).all(axis=0).argmax())
                 raise ValueError(f"the {which} shape of mode {mode} is zero; expected NaN where it was not measured")

@@ -11,11 +11,11 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arguments import check_noise
+from skthermo._arguments import check_flag, check_noise, integer_row
 from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
 from skthermo._frames import check_same_rows, column_names, frame_like
 from skthermo._names import as_mapping
-from skthermo._numbers import is_real
+from skthermo._numbers import HUGE, is_real
 from skthermo._regressors import weights_for
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
@@ -299,6 +299,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
             weather, out of fold, in Hz. They contain the scatter of the measurement.
         """
+        check_flag(return_std, "return_std")
         frequencies = self._simulate(X)
         predicted = frame_like(X, frequencies, self.mode_names_)
         if not return_std:
@@ -486,7 +487,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
                 raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
             weather, order = self._weather(X), np.argsort(row_times(X), kind="stable")
             return self.residuals_.draw(weather[order], random)[np.argsort(order)]
-        shape = (np.shape(X)[0], len(self.mode_names_))
+        shape = (len(self._temperatures(X)), len(self.mode_names_))
         return check_noise(noise, shape[1], self.mode_names_) * random.standard_normal(shape)
 
     def simulate_modes(
@@ -525,6 +526,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             As in `simulate`; if the model has no such modes.
         """
         check_is_fitted(self)
+        integer_row(modes, "modes")
         return self._simulate(X, modes, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
 
     @overload
@@ -556,6 +558,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Only with ``return_number``: effective sample size of the mean of ``expected`` over the rows, lower than the
             number of training records if the rows have little variety of weather.
         """
+        check_flag(return_number, "return_number")
         weather = self._weather(X)
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
@@ -710,10 +713,13 @@ def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
 def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
     """The factor of every parameter, 1 where none is given."""
     factors = dict.fromkeys(names, 1.0)
-    for name, factor in (parameters or {}).items():
+    parameters = {} if parameters is None else as_mapping(parameters)
+    if not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    for name, factor in parameters.items():
         if name not in factors:
             raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
-        if not is_real(factor) or not 0 < factor < np.inf:
+        if not is_real(factor) or not 0 < factor < HUGE:
             raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
         if factor > LARGE_FACTOR:
             warn_user(
