@@ -102,8 +102,6 @@ class Interval(sklearn.utils._param_validation.Interval):
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
     """scikit-learn's `validate_data`; masked or missing values in X become NaN, and repeated column names and what is
     no number are errors."""
-    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
-        raise ValueError(f"X has the columns {list(X.columns)}; expected each name once")
     values = sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
     refuse_huge(values, "X")
     return values
@@ -111,8 +109,6 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
 def check_array(values: Any, **options: Any) -> Any:
     """scikit-learn's `check_array`; masked or missing values become NaN, and what is no number is an error."""
-    if isinstance(values, pd.DataFrame) and values.columns.has_duplicates:
-        raise ValueError(f"y has the columns {list(values.columns)}; expected each name once")
     array = sklearn.utils.check_array(with_nan(values), **options)
     refuse_huge(array, options.get("input_name") or "y")
     return array
@@ -133,8 +129,10 @@ def check_sample_weight(sample_weight: ArrayLike, X: Any, n_rows: int) -> NDArra
 def with_nan(X: Any) -> Any:
     """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
 
-    Times, text, booleans and bytes are errors.
+    Times, text, booleans, bytes and repeated column names are errors.
     """
+    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
+        raise ValueError(f"the input has the columns {list(X.columns)}; expected each name once")
     refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from skthermo._arguments import check_noise
+from skthermo._arguments import check_flag, check_noise
 from skthermo._arrays import Array, as_random_state, positive_integer
 from skthermo._numbers import is_real
 from skthermo.datasets._kw51_file import state_of
@@ -290,6 +290,8 @@ def make_kw51_campaign(
     """
     n_hours = positive_integer(n_hours, "n_hours")
     deviations = check_noise(noise, 6)
+    for what, flag in (("gaps", gaps), ("retrofit", retrofit), ("shapes", shapes)):
+        check_flag(flag, what)
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 

@@ -135,6 +135,10 @@ class KNNGapImputer(KNNImputer):
         UserWarning
             If there are numbers that stand for a missing value, such as -999, while ``missing_values`` is NaN.
         """
+        if isinstance(self.n_neighbors, bool):
+            raise ValueError(f"n_neighbors is {self.n_neighbors}; expected an integer")
+        if isinstance(self.weights, type) or isinstance(self.metric, type):
+            raise ValueError(f"weights is {self.weights!r} and metric {self.metric!r}; expected no class")
         X = with_nan(X)
         super().fit(X, y)
         kept = set(super().get_feature_names_out())

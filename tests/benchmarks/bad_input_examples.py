@@ -1793,6 +1793,7 @@ LEGAL: dict[str, dict[tuple[str, str], str]] = {
     "phi_a": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
+    "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
     "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
     "X": {
         ("kelvin", "surrogate.DataInformedFEM.applicability"): "the answer says how far outside",
