@@ -95,7 +95,7 @@ def check_noise(
         )
     if (array > most).all():  # a single mode may be unknown
         raise ValueError(
-            f"{what} is {array}, which means {np.min(array):.0%} or more in every mode: percent? expected at most "
+            f"{what} is {array}, which means {100 * np.min(array):.0f} % or more in every mode: percent? expected at most "
             f"{most:g} in some mode, and {np.min(array) / 100:g} where {np.min(array):g} % is meant"
         )
     return np.broadcast_to(array, (n_modes,))
@@ -137,16 +137,18 @@ def check_size(value: Any, what: str, lowest: float, highest: float, expected: s
     return float(value)
 
 
-def integer_row(values: Any, what: str) -> NDArray[np.integer]:
+def integer_row(values: Any, what: str, expected: str = "integers in one row") -> NDArray[np.integer]:
     """One or more integers; anything else, also True and False among them, is an error."""
     try:
-        refuse_no_numbers(values, what)
         array = np.asarray(values)
-    except ValueError as error:
-        kind = f", of type {np.asarray(values).dtype}" if hasattr(values, "dtype") else ""
-        raise ValueError(f"{what} is {values!r:.200}{kind}; expected integers in one row") from error
-    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"{what} has shape {array.shape} and type {array.dtype}; expected integers in one row")
+        is_row = array.ndim == 1 and array.size and np.issubdtype(array.dtype, np.integer)
+        refuse_no_numbers(values, what)
+    except ValueError as error:  # also rows of different length
+        raise ValueError(f"{what} is {values!r:.200}; expected {expected}") from error
+    if not is_row:
+        raise ValueError(
+            f"{what} is {values!r:.100}, of shape {array.shape} and type {array.dtype}; expected {expected}"
+        )
     return array
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._numbers import refuse_huge, refuse_no_numbers
+from skthermo._numbers import is_real, refuse_huge, refuse_no_numbers
 
 Array: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
@@ -25,15 +25,15 @@ def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
     try:
-        if not np.iscomplexobj(values):
-            array = as_floats(values)
-            if not any_size:
-                refuse_huge(array, what)
-            return array
+        array = None if np.iscomplexobj(values) else as_floats(values)
     except (TypeError, ValueError) as error:
         reason = str(error).partition(";")[0]
         raise ValueError(f"{what} is {values!r:.200}; expected numbers ({reason})") from error
-    raise ValueError(f"{what} is complex; expected real numbers")
+    if array is None:
+        raise ValueError(f"{what} is complex; expected real numbers")
+    if not any_size:
+        refuse_huge(array, what)
+    return array
 
 
 def shape_array(values: Any, what: str, *, any_size: bool = False) -> NDArray:
@@ -92,7 +92,7 @@ def positive_integer(value: Any, what: str) -> int:
 
     NumPy's small integer types would overflow in products.
     """
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+    if not isinstance(value, Integral) or not is_real(value) or value < 1:
         raise ValueError(f"{what} is {value!r}; expected a positive integer")
     return int(value)
 

@@ -19,8 +19,8 @@ HUGE = 1e150  # squares of larger numbers are infinite
 
 
 def is_real(value: Any) -> bool:
-    """Whether a value is a real number; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+    """Whether a value is a real number; True, False and durations are none."""
+    return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
 
 
 def refuse_no_numbers(values: Any, what: str = "the input") -> None:

@@ -21,7 +21,7 @@ from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _check_sample_weight, _num_samples, check_is_fitted
 
 from skthermo._arguments import is_model
-from skthermo._arrays import real_array, without_mask, without_missing
+from skthermo._arrays import without_mask, without_missing
 from skthermo._names import is_labelled, is_numbered
 from skthermo._numbers import refuse_huge, refuse_no_numbers
 
@@ -96,7 +96,7 @@ class Interval(sklearn.utils._param_validation.Interval):
 
     def is_satisfied_by(self, val: Any) -> bool:
         """Whether a value is a number within the interval."""
-        return not isinstance(val, bool) and super().is_satisfied_by(val)
+        return not isinstance(val, bool | np.timedelta64) and super().is_satisfied_by(val)
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
@@ -122,8 +122,10 @@ def check_sample_weight(sample_weight: ArrayLike, X: Any, n_rows: int) -> NDArra
             if not given.index.is_unique or set(given.index) != set(X.index):
                 raise ValueError("sample_weight has another index than X; expected a weight for each of its rows")
             sample_weight = given.loc[X.index]
-    weights = real_array(sample_weight, "sample_weight")
-    return _check_sample_weight(weights, np.empty((n_rows, 1)), ensure_non_negative=True)
+    refuse_no_numbers(sample_weight, "sample_weight")
+    weights = _check_sample_weight(sample_weight, np.empty((n_rows, 1)), ensure_non_negative=True)
+    refuse_huge(weights, "sample_weight")
+    return weights
 
 
 def with_nan(X: Any) -> Any:

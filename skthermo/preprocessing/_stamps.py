@@ -1,11 +1,12 @@
 """Stamps and durations as users give them."""
 
 import re
-from numbers import Real
 from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from skthermo._numbers import is_real
 
 LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
 ZERO = np.timedelta64(0, "ns")
@@ -50,7 +51,7 @@ def as_duration(value: Any, name: str) -> np.timedelta64:
             f"{name} is {value!r}; expected a duration of fixed length with its unit, such as '10min', '1h' or '30D'"
         )
     try:
-        if isinstance(value, Real):  # nanoseconds for pandas
+        if is_real(value) or isinstance(value, bool):  # nanoseconds for pandas
             raise TypeError
         numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
         duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()

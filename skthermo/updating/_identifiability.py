@@ -12,7 +12,7 @@ from sklearn.utils import Bunch
 
 from skthermo._arguments import check_model, check_noise
 from skthermo._arrays import Array, real_array
-from skthermo._numbers import is_real
+from skthermo._numbers import HUGE, is_real
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
@@ -168,8 +168,8 @@ def cramer_rao(information: ArrayLike) -> Array:
            [ nan,  inf]])
     """
     information = real_array(information, "information")
-    if not np.isfinite(information).all():
-        raise ValueError("information holds values that are not finite; expected finite ones")
+    if np.isinf(information).any():
+        raise ValueError("information holds infinite values; expected finite ones")
     if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
         raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
     if not np.isfinite(information).all():
@@ -192,7 +192,7 @@ def cramer_rao(information: ArrayLike) -> Array:
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
-    if not is_real(shape_noise) or not 0 < shape_noise < 1:
+    if not is_real(shape_noise) or not 0 < shape_noise < HUGE:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)

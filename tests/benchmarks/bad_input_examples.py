@@ -1793,6 +1793,10 @@ LEGAL: dict[str, dict[tuple[str, str], str]] = {
     "phi_a": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
+    "severities": {("empty", "studies.sweep"): "the healthy structure alone"},
+    "information": {("NaN inside", "updating.cramer_rao"): "NaN stays NaN"},
+    "modes": {("empty", "studies.what_to_add"): "no further modes are asked for"},
+    "baseline_factors": {("empty", "studies.what_to_add"): "no longer baselines are asked for"},
     "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
     "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
     "X": {

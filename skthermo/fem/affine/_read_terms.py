@@ -58,7 +58,7 @@ def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
         raise ValueError(f"{what} has shape {array.shape}; expected ({n_dof}, {n_dof}) like the first term")
     array = array.astype(float)
     if not np.isfinite(array.data if scipy.sparse.issparse(array) else array).all():
-        raise ValueError(f"{what} holds values that are not finite; expected finite ones")
+        raise ValueError(f"{what} holds values that are not finite")
     skew = abs(array - array.T)
     if skew.max() > 1e-8 * abs(array).max():
         row, column = np.unravel_index(int(skew.argmax()), array.shape)
@@ -150,7 +150,7 @@ def check_n_modes(n_modes: int) -> int:
 
 def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:
     """Checks that ranks of modes are different integers from 0 to below the number available."""
-    ranks = integer_row(modes, "modes")
+    ranks = integer_row(modes, "modes", "ranks of modes, such as [0, 1, 3, 2], the lowest being 0")
     outside = ranks[(ranks < 0) | (ranks >= available)]
     if outside.size:
         raise ValueError(f"mode {outside[0]} is none of the model's; expected 0 to {available - 1}")

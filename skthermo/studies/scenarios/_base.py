@@ -109,7 +109,7 @@ def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
     if wrong.size:
         raise ValueError(
             f"scenario {name!r} has severities of {group!r} such as {wrong[0]:g}; expected finite shares of the "
-            f"stiffness below 1 and not below {LOWEST_SEVERITY:g}, not percent: 0.2 means 20 %"
+            f"stiffness below 1, not percent (0.2 means 20 %), and not below {LOWEST_SEVERITY:g}"
         )
 
 

@@ -74,7 +74,7 @@ class Scenario(BaseScenario):
         wrong = [f for f in given.values() if not is_real(f) or not 0 < f < HUGE]
         if wrong:
             raise ValueError(
-                f"scenario {self.name!r} has the factor {wrong[0]!r:.100} in its parameters; expected positive numbers"
+                f"scenario {self.name!r} has the factor {wrong[0]!r:.99}; expected finite and positive ones"
             )
         factors = {name: float(factor) for name, factor in given.items()}
         if self.family is not None and (not isinstance(self.family, str) or not self.family):
@@ -161,15 +161,15 @@ def sweep(
     chosen = list(known) if groups is None else check_names(groups, "groups")
     check_groups(chosen, known)
     shares = real_array(severities, "severities")
-    if shares.ndim != 1 or not shares.size or not chosen or len(np.unique(shares)) < shares.size:
+    if shares.ndim != 1 or not chosen or len(np.unique(shares)) < shares.size:
         raise ValueError(
-            f"severities is {severities!r:.200} and groups {groups!r:.200}; expected several different severities, "
-            "such as (0.1, 0.2), and groups"
+            f"severities is {severities!r:.200} and groups {groups!r:.200}; expected different severities, such as "
+            "(0.1, 0.2), and groups"
         )
     if (shares == 0).any():
         raise ValueError(f"severities is {severities!r:.200}; expected none of 0, which is the healthy structure")
     severities = shares.tolist()
-    has_both = min(severities) < 0 < max(severities)
+    has_both = min(severities, default=0) < 0 < max(severities, default=0)
 
     def scenario(group: str, severity: float) -> Scenario:
         family = f"{group} strengthened" if has_both and severity < 0 else None
