@@ -1285,10 +1285,7 @@ BY_NAME = {  # values with names, and a call that reads them
     "severities of a scenario": (SHARES, lambda damage: CHAIN.simulate(T[:2], damage=Scenario("a", damage).damage)),
     "noise": (STEPS, lambda noise: add_noise(F, noise, random_state=0)),
     "noise of a chain": (STEPS, lambda noise: CHAIN.simulate(T[:5], noise=noise, random_state=0)),
-    "noise of an inverse": (
-        STEPS,
-        lambda noise: InverseSurrogate(TRUSS, Ridge(), noise=noise, **SEEDED).fit().transform(F),
-    ),
+    "noise of an inverse": (STEPS, lambda noise: trained(noise=noise).transform(NOMINAL)),
     "noise of a campaign": (STEPS, lambda noise: make_truss_campaign(noise=noise, random_state=0).frequencies),
     "noise of what is identified": (STEPS, lambda noise: identifiability(TRUSS, noise=noise).deviations),
     "deviations": (100 * STEPS, lambda std: updater().fit(F[:9], frequency_std=std).theta_),
