@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import as_floats
+from skthermo._arrays import Array, as_floats, real_array
 from skthermo._validation import _num_samples
 from skthermo._warnings import warn_user
 
@@ -135,3 +135,36 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
             raise ValueError(
                 f"{names[0]} and {names[1]} have different indices (row {row}: {left} and {right}); expected the same"
             )
+
+
+def row_weights(sample_weight: Any, X: Any) -> Array | None:
+    """A weight for each row of X, or None; those of a series are matched to the rows of a frame by index."""
+    if sample_weight is None:
+        return None
+    n_rows = _num_samples(X)
+    if isinstance(sample_weight, pd.Series) and isinstance(X, pd.DataFrame | pd.Series):
+        unknown, missing = (
+            a.difference(b) for a, b in ((sample_weight.index, X.index), (X.index, sample_weight.index))
+        )
+        repeats = not sample_weight.index.equals(X.index) and not sample_weight.index.is_unique
+        if len(unknown) or len(missing) or repeats:
+            raise ValueError(
+                f"sample_weight has {len(sample_weight)} rows, {len(unknown)} of them unknown to X, and lacks "
+                f"{len(missing)} of its {n_rows}{', and labels repeat' if repeats else ''}; expected the index of X"
+            )
+        sample_weight = sample_weight if sample_weight.index.equals(X.index) else sample_weight.reindex(X.index)
+    given = sample_weight if hasattr(sample_weight, "dtype") else np.asarray(sample_weight)
+    is_mask = getattr(given.dtype, "kind", "") == "b"  # which rows count
+    weights = real_array(given.astype(float) if is_mask else given, "sample_weight")
+    weights = np.full(n_rows, weights) if weights.ndim == 0 else weights
+    if weights.shape != (n_rows,):
+        raise ValueError(f"sample_weight has shape {weights.shape}; expected ({n_rows},), a weight for each row of X")
+    wrong = np.flatnonzero(~np.isfinite(weights) | (weights < 0))
+    if wrong.size:
+        raise ValueError(
+            f"sample_weight is {weights[wrong[0]]:g} in row {wrong[0]}, and negative, NaN or infinite in {wrong.size} "
+            f"of {n_rows} rows; expected numbers from 0"
+        )
+    if not weights.any():
+        raise ValueError(f"sample_weight is zero in all {n_rows} rows; expected a positive weight in some")
+    return weights

@@ -69,6 +69,13 @@ class Gaussian:
         filled = np.where(np.isnan(rows), np.where(empty, np.nan, expected), rows)
         return filled, np.where(np.isnan(rows), np.where(empty, np.nan, deviations), 0.0)
 
+    def error_roots(self, rows: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Cholesky roots of the covariance of what `completed` fills in, and which of them is that of each row."""
+        masks, of_row = patterns(~np.isnan(rows))
+        rest = _conditionals(self.covariance, masks)[1]
+        missing = ~masks[:, :, np.newaxis] & ~masks[:, np.newaxis, :]
+        return np.where(missing, np.linalg.cholesky(_alone(rest, ~masks, missing)), 0.0), of_row
+
     def second_moments(self, rows: Array) -> Array:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
         masks, of_row = patterns(~np.isnan(rows))

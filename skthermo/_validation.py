@@ -1,7 +1,9 @@
-"""Wrappers of scikit-learn's private functions, which are imported only here, and types of its public ones; FE models
-and seeds inside estimators."""
+"""Wrappers of scikit-learn's private functions, which are imported only here, and types of its public ones; FE models,
+seeds and default parts inside estimators; stages of a fit."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 import numpy as np
@@ -16,14 +18,15 @@ from sklearn.model_selection._search import BaseSearchCV
 from sklearn.neighbors._base import _get_weights
 from sklearn.pipeline import Pipeline
 from sklearn.utils import check_random_state
+from sklearn.utils._metadata_requests import _routing_enabled
 from sklearn.utils._param_validation import HasMethods, InvalidParameterError, StrOptions
+from sklearn.utils._user_interface import _print_elapsed_time
+from sklearn.utils.metadata_routing import get_routing_for_object
 from sklearn.utils.metaestimators import _BaseComposition
-from sklearn.utils.validation import _check_feature_names_in, _check_sample_weight, _num_samples, check_is_fitted
+from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted
 
 from skthermo._arguments import is_model
-from skthermo._arrays import without_mask, without_missing
-from skthermo._names import is_labelled, is_numbered
-from skthermo._numbers import refuse_huge, refuse_no_numbers
+from skthermo._arrays import refuse_huge, refuse_no_numbers, without_mask, without_missing
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
     Method = TypeVar("Method", bound=Callable[..., Any])
@@ -42,12 +45,22 @@ if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit a
 else:
     from sklearn.base import TransformerMixin, _fit_context
 
+try:  # scikit-learn from 1.9
+    from sklearn.callback import CallbackSupportMixin as CallbackSupport
+except ImportError:
+
+    class CallbackSupport:  # type: ignore[no-redef]
+        """Stands for scikit-learn's mixin where there are no callbacks yet."""
+
+
 __all__ = [
     "BaseSearchCV",
+    "CallbackSupport",
     "Estimator",
     "HasMethods",
     "Interval",
     "InvalidParameterError",
+    "Stages",
     "StrOptions",
     "TransformerMixin",
     "_BaseComposition",
@@ -56,9 +69,10 @@ __all__ = [
     "_fit_context",
     "_get_weights",
     "_num_samples",
+    "_routing_enabled",
     "check_array",
     "check_is_fitted",
-    "check_sample_weight",
+    "routes_weights",
     "seed_parts",
     "seeded",
     "validate_data",
@@ -83,7 +97,53 @@ class Estimator(BaseEstimator):
         for name in ("_metadata_request", "_sklearn_output_config"):
             if hasattr(self, name):
                 setattr(twin, name, clone(getattr(self, name), safe=False))
+        if hasattr(self, "_skl_callbacks"):
+            twin._skl_callbacks = self._skl_callbacks  # as scikit-learn does: clones share callbacks
         return twin
+
+    def _default_part(self, name: str) -> BaseEstimator | None:
+        """Hook: the estimator that a parameter stands for where it is None; None where there is no such part."""
+        return None
+
+    def set_params(self, **params: Any) -> Self:
+        """Set parameters, also of parts, as in ``set_params(part__parameter=value)``.
+
+        Where a part is None and stands for a default, that default takes its place and gets the parameters.
+
+        Parameters
+        ----------
+        **params : dict
+            Names and values.
+
+        Returns
+        -------
+        object
+            This estimator.
+
+        Raises
+        ------
+        ValueError
+            If there is no such parameter, or it has no parameters of its own.
+        """
+        own = {name: value for name, value in params.items() if "__" not in name}
+        nested: dict[str, dict[str, Any]] = {}
+        for name, value in params.items():
+            part, parts, parameter = name.partition("__")
+            if parts:
+                nested.setdefault(part, {})[parameter] = value
+        super().set_params(**own)
+        for name, values in nested.items():
+            part = self.get_params(deep=False).get(name, self)
+            default = self._default_part(name) if part is None else None
+            if default is not None:
+                super().set_params(**{name: default.set_params(**values)})
+            elif hasattr(part, "set_params"):  # of an unknown part, scikit-learn says so
+                super().set_params(**{f"{name}__{parameter}": value for parameter, value in values.items()})
+            else:
+                raise ValueError(
+                    f"{name} is {part!r:.100}, without parameters such as {min(values)!r}; expected an estimator"
+                )
+        return self
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -112,20 +172,6 @@ def check_array(values: Any, **options: Any) -> Any:
     array = sklearn.utils.check_array(with_nan(values), **options)
     refuse_huge(array, options.get("input_name") or "y")
     return array
-
-
-def check_sample_weight(sample_weight: ArrayLike, X: Any, n_rows: int) -> NDArray[np.float64]:
-    """Weights of the rows of X, none negative; a Series with labels is read by those of a frame's rows."""
-    if isinstance(X, pd.DataFrame) and is_labelled(sample_weight) and not is_numbered(X.index):
-        given: Any = sample_weight
-        if not given.index.equals(X.index):
-            if not given.index.is_unique or set(given.index) != set(X.index):
-                raise ValueError("sample_weight has another index than X; expected a weight for each of its rows")
-            sample_weight = given.loc[X.index]
-    refuse_no_numbers(sample_weight, "sample_weight")
-    weights = _check_sample_weight(sample_weight, np.empty((n_rows, 1)), ensure_non_negative=True)
-    refuse_huge(weights, "sample_weight")
-    return weights
 
 
 def with_nan(X: Any) -> Any:
@@ -177,3 +223,53 @@ def last_step(estimator: Any) -> Any:
     if isinstance(estimator, BaseSearchCV):
         return last_step(getattr(estimator, "best_estimator_", estimator.estimator))
     return estimator
+
+
+class Stages:
+    """Announces one after the other of an estimator's stages.
+
+    If the estimator is ``verbose``, a line with the elapsed time follows each of them. The callbacks of
+    scikit-learn 1.9 and later, where the estimator supports them, see each stage as a task; those that are meant for
+    parts reach them.
+    """
+
+    def __init__(self, estimator: Any, number: int, X: Any = None, y: Any = None):
+        if not isinstance(estimator.verbose, Integral) or estimator.verbose < 0:
+            raise ValueError(f"verbose is {estimator.verbose!r}; expected a boolean or an integer from 0")
+        self._estimator, self._number, self._begun = estimator, number, 0
+        begin = getattr(estimator, "_init_callback_context", None)
+        self._task = None if begin is None else begin(max_subtasks=number)
+        if self._task is not None:
+            self._task.call_on_fit_task_begin(estimator=estimator, X=X, y=y)
+
+    @contextmanager
+    def stage(self, name: str, part: Any = None) -> Iterator[None]:
+        """What runs inside is one stage, in which the part, if there is one, is fitted."""
+        self._begun += 1
+        line = f"({self._begun} of {self._number}) {name}" if self._estimator.verbose else None
+        with ExitStack() as within:
+            within.enter_context(_print_elapsed_time(type(self._estimator).__name__, line))
+            if self._task is None:
+                yield
+                return
+            task = self._task.subcontext(task_name=name)
+            if hasattr(part, "set_callbacks"):
+                within.enter_context(task.propagate_callback_context(part))
+            task.call_on_fit_task_begin(estimator=self._estimator)
+            yield
+            task.call_on_fit_task_end(estimator=self._estimator)
+
+    def end(self) -> None:
+        """Say that all stages are done."""
+        if self._task is not None:
+            self._task.call_on_fit_task_end(estimator=self._estimator)
+
+
+def routes_weights(estimator: Any) -> bool | None:
+    """Whether a user has asked by metadata routing that ``fit`` hands on weights; None if routing is off or unasked."""
+    parts = (estimator, *estimator.get_params().values())
+    if not _routing_enabled() or not any(hasattr(part, "_metadata_request") for part in parts):
+        return None
+    router = get_routing_for_object(estimator)
+    names = router._get_param_names(method="fit", return_alias=True, ignore_self_request=False)
+    return "sample_weight" in names

@@ -1,6 +1,6 @@
 """Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,10 @@ from skthermo._gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
+MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
+LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
+NUMBERS_AT_ONCE = 4_000_000  # held in memory
+JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class TrainingRange:
         values = as_floats(inputs)
         known = ~np.isnan(values).any(axis=1)
         if not known.any():
-            return f"none of {len(values)} rows can be predicted: each lacks a temperature or a lagged one"
+            return ""
         limits = np.array([np.fmin.reduce(values), np.fmax.reduce(values)])
         if (np.nan_to_num(self.excess(limits)) <= FAR_OUTSIDE).all():
             return ""
@@ -73,9 +77,12 @@ class SensorRegression:
     @classmethod
     def of(cls, temperatures: Any) -> "SensorRegression":
         """Learn from records; a sensor without any value is not learned."""
-        values = as_floats(temperatures)
+        values = _telling_rows(as_floats(temperatures))
         learned = ~np.isnan(values).all(axis=0)
-        return cls(Gaussian.of(values[:, learned]), learned)
+        found = Gaussian.of(values[:, learned])
+        variances = np.diag(found.covariance)
+        own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
+        return cls(Gaussian(found.mean, found.covariance + own), learned)
 
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
@@ -84,11 +91,35 @@ class SensorRegression:
         """
         values = as_floats(temperatures).copy()
         deviations = np.where(np.isnan(values), np.nan, 0.0)
-        gaps = np.isnan(values[:, self.learned]).any(axis=1)
-        if gaps.any():
-            rows = np.ix_(gaps, self.learned)
+        gaps = np.flatnonzero(np.isnan(values[:, self.learned]).any(axis=1))
+        for part in parts(len(gaps), self.learned.sum() ** 2):
+            rows = np.ix_(gaps[part], self.learned)
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
         return values, deviations
+
+    def errors(self, temperatures: Any) -> Iterator[Array]:
+        """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
+
+        There is one for each sensor with gaps; zero where a sensor has a value.
+        """
+        values = as_floats(temperatures)
+        missing = np.isnan(values[:, self.learned])
+        gaps = missing.any(axis=1) & ~missing.all(axis=1)
+        roots, of_row = self.gaussian.error_roots(values[np.ix_(gaps, self.learned)])
+        for sensor in np.flatnonzero(missing[gaps].any(axis=0)):
+            error = np.zeros_like(values)
+            error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
+            yield error
+
+
+def _telling_rows(values: Array) -> Array:
+    """Records to learn from: the complete ones where most are, or where gaps would take long; else any."""
+    n_rows, n_sensors = values.shape
+    complete = np.flatnonzero(~np.isnan(values).any(axis=1))
+    most = int(np.clip(LONGEST_STEP / n_sensors**3, 3 * n_sensors, MOST_LEARNED))
+    if 2 * len(complete) >= n_rows or (most < n_rows and len(complete) >= 10 * n_sensors):
+        return values[complete[one_in_each_part(len(complete), MOST_LEARNED)]]
+    return values[one_in_each_part(n_rows, most)]
 
 
 def weather_coordinates(weather: Array) -> Pipeline:
@@ -99,6 +130,31 @@ def weather_coordinates(weather: Array) -> Pipeline:
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
     """Distances and positions of the places nearest to each wanted one."""
     return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
+
+
+def nearest_in_parts(places: Array, wanted: Array, number: int) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
+    """Distances and positions of the nearest places for some of the wanted ones after others: memory is bounded."""
+    number = min(number, len(places))
+    tree = NearestNeighbors(n_neighbors=number).fit(places)
+    for part in parts(len(wanted), number):
+        yield part, *tree.kneighbors(wanted[part])
+
+
+def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:
+    """Slices of rows of which all numbers together need little memory."""
+    step = max(NUMBERS_AT_ONCE // int(numbers_per_row), 1)
+    return (slice(first, first + step) for first in range(0, n_rows, step))
+
+
+def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
+    """Positions of all records or, if there are more, of one by chance in each of that many equal parts of them.
+
+    Every so-manieth record could always be that of the same hour.
+    """
+    if n_records <= most:
+        return np.arange(n_records)
+    shares = np.arange(most) + np.random.RandomState(0).uniform(size=most)
+    return (shares * n_records / most).astype(np.intp)
 
 
 def order_statistic(scores: Array, confidence: float) -> float:

@@ -41,6 +41,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.refinement": set(),
     "surrogate.inverse": {"surrogate.refinement"},
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
+    "plotting.structures": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
     "studies.extension": {"studies.detectability", "studies.scenarios"},

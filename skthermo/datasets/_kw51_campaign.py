@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from skthermo._arguments import check_flag, check_noise
-from skthermo._arrays import Array, as_random_state, positive_integer
-from skthermo._numbers import is_real
+from skthermo._arrays import Array, as_random_state, is_real, positive_integer
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors
 from skthermo.datasets._kw51_truth import (

@@ -13,6 +13,7 @@ from sklearn.base import OutlierMixin
 
 from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
+from skthermo._times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import warn_user
 
@@ -21,7 +22,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
     A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes
-    may be missing, and `_limit`.
+    may be missing, `_limit` and `_cause`.
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
@@ -31,8 +32,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         return F
 
     @abstractmethod
-    def _learn(self, F: Any) -> Array:
-        """Fit; return calibration scores."""
+    def _learn(self, F: Any, times: Array) -> Array:
+        """Fit on records at some times; return calibration scores."""
 
     @abstractmethod
     def _limit(self, index: Array) -> float:
@@ -41,6 +42,10 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     @abstractmethod
     def _index(self, F: Any) -> Array:
         """Damage index of rows; higher is more damaged, NaN where there is none."""
+
+    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
+        """Why some rows have no damage index."""
+        return "no column has a value there, or what the steps before need for it is missing"
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> Self:
@@ -75,7 +80,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
-        self.baseline_index_ = self._learn(self._records(X, F))
+        self.baseline_index_ = self._learn(self._records(X, F), row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
         return self
@@ -95,11 +100,18 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Returns
         -------
         ndarray or Series of shape (n_samples,)
-            Dimensionless; NaN where it cannot be computed. A frame gives a series on its index.
+            Dimensionless; NaN where nothing can be judged. A frame gives a series on its index.
+
+        Warns
+        -----
+        UserWarning
+            If no record at all can be judged.
         """
         check_is_fitted(self)
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
         index = self._index(self._records(X, F))
+        if np.isnan(index).all():
+            self._warn_of_not_judged(X, np.isnan(index))
         return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
@@ -133,7 +145,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         return self.score_samples(X) - self.offset_
 
     def predict(self, X: ArrayLike) -> NDArray[np.int64]:
-        """Whether each record raises an alarm.
+        """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not judged.
 
         Parameters
         ----------
@@ -143,14 +155,25 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Returns
         -------
         ndarray of shape (n_samples,)
-            -1 (alarm) where the damage index exceeds the threshold, else +1. Rows without a damage index get +1, and
-            one warning counts them.
+            -1 (alarm) where the damage index exceeds the threshold, +1 where it does not, and 0 where there is none:
+            such a row is neither healthy nor damaged.
+
+        Warns
+        -----
+        UserWarning
+            If some rows cannot be judged: how many, the first of them, and what they lack.
         """
         decision = self.decision_function(X)
-        unknown = int(np.isnan(decision).sum())
-        if unknown:
-            warn_user(
-                f"{unknown} of {len(decision)} rows lack values and have no damage index: no alarm is raised there",
-                "missing values",
-            )
-        return np.where(decision < 0, -1, 1)
+        unknown = np.isnan(decision)
+        if unknown.any() and not unknown.all():  # where all are, `damage_index` has said so
+            self._warn_of_not_judged(X, unknown)
+        return np.where(unknown, 0, np.where(decision < 0, -1, 1))
+
+    def _warn_of_not_judged(self, X: Any, rows: NDArray[np.bool_]) -> None:
+        first = int(rows.argmax())
+        stamp = f" ({X.index[first]})" if isinstance(X, pd.DataFrame) else ""
+        warn_user(
+            f"{rows.sum()} of {len(rows)} rows are not judged (predict gives 0), the first row {first}{stamp}: "
+            f"{self._cause(X, rows)}",
+            "rows not judged",
+        )

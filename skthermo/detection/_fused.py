@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 
 from skthermo._arrays import Array
 from skthermo._validation import _BaseComposition, last_step
+from skthermo._warnings import warnings_once
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
 
@@ -51,7 +52,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
 
     Notes
     -----
-    A record that some of the detectors cannot judge gets the mean of the others.
+    A record that some of the detectors cannot judge gets the mean of the others; one that none can judge is not judged:
+    its damage index is NaN, and ``predict`` gives 0.
 
     Examples
     --------
@@ -110,7 +112,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
     def _records(self, X: ArrayLike, F: Array) -> ArrayLike:
         return X
 
-    def _learn(self, X: ArrayLike) -> Array:
+    def _learn(self, X: ArrayLike, times: Array) -> Array:
         if not self.detectors:
             raise ValueError("detectors is an empty list; expected one or more (name, detector)")
         pairs = [pair for pair in self.detectors if isinstance(pair, tuple) and len(pair) == 2]
@@ -120,7 +122,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
                 f"detectors is {self.detectors!r:.200}; expected pairs (name, detector) with names of their own"
             )
         self._validate_names([name for name, _ in self.detectors])
-        self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]
+        with warnings_once("for other detectors"):
+            self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]
         lasts = [last_step(detector) for detector in self.detectors_]
         for (name, _), last in zip(self.detectors, lasts, strict=True):
             if not isinstance(last, DamageDetector) or last.threshold_ <= 0:
@@ -135,6 +138,9 @@ class FusedDetector(DamageDetector, _BaseComposition):
 
     def _index(self, X: ArrayLike) -> Array:
         return _mean([-fitted.score_samples(X) / last_step(fitted).threshold_ for fitted in self.detectors_])
+
+    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
+        return f"none of the {len(self.detectors_)} detectors can judge them"
 
 
 def _mean(indices: list[Array]) -> Array:

@@ -8,18 +8,18 @@ import numpy as np
 from scipy.stats import chi2
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
-from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
 from skthermo._gaussian import Gaussian, check_invertible, check_not_empty
 from skthermo._validation import HasMethods, StrOptions
-from skthermo._warnings import warn_user
+from skthermo._warnings import warn_user, without_warnings
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
 ROWS_AT_ONCE = 20_000  # whose distances are computed, which bounds memory
-N_PERIODS = 10  # of the baseline, whose distances are computed with a covariance of the others if it has no closed form
+N_FOLDS = 10  # of the baseline, whose distances come from the others where there is no closed form
 
 
 class MahalanobisDetector(DamageDetector):
@@ -40,8 +40,9 @@ class MahalanobisDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances that each of the n
-          baseline records has from all others. New records that are as the baseline's (exchangeable: neither season
-          nor trend, nor dependence in time) exceed it at the rate asked for or less, however they are distributed.
+          baseline records has from the others, those left out that are within two correlation times of it. New
+          records that are as the baseline's (neither season nor trend) exceed it at about the rate asked for or less,
+          however they are distributed, and also where records depend on those just before them.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5.6 % false alarms
           where 2 % are asked for.
@@ -55,7 +56,9 @@ class MahalanobisDetector(DamageDetector):
     pattern_scale_ : object
         Factors for patterns of missing modes.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline; with the conformal threshold, each record's distance from all others.
+        Damage index of the baseline; with the conformal threshold, each record's distance from the others.
+    n_independent_ : float
+        How many independent records the baseline counts as: its number of records over their correlation time.
     threshold_ : float
         A damage index above it is an alarm.
     offset_ : float
@@ -75,15 +78,23 @@ class MahalanobisDetector(DamageDetector):
     `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode, or a mode that is a
     combination of others. The units of the modes do not matter, unless ``covariance`` depends on them.
 
+    The correlation time of the baseline is 1 + 2 times the sum of the autocorrelations up to the first that is not
+    clearly above zero, on the mean over the modes. Records are neighbours in the order of the rows or, on the
+    ``DatetimeIndex`` of a frame, in time. From the mean and the covariance of all records, the sums over a record's
+    neighbours are taken away, in closed form; half of the records stay at least. Where modes are missing, or with a
+    ``covariance`` of your own, it is learned ten times more, each time without a tenth of the blocks of time and
+    without their neighbours; blocks last five correlation times at least. Where the baseline counts as fewer than 50
+    independent records, a warning says so.
+
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty. Where the baseline
     shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than others,
     a factor corrects it, shrunk to 1 as far as chance may explain the difference. An alarm then means the same
-    whichever modes are missing. Complete rows have the plain distance; rows without any mode have NaN, and
-    ``predict`` raises no alarm there.
+    whichever modes are missing. Complete rows have the plain distance. Rows without any mode cannot be judged: their
+    index is NaN, and ``predict`` gives 0.
 
-    The promise of "conformal" is exact for thresholds that are computed anew with each new record; this one is fixed,
-    and keeps the rate nearly: of 100 baseline records with 6 modes, 1.8 % of new records exceed it where 2 % are asked.
+    The promise of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
+    this one is fixed, and keeps the rate nearly. RATES
     Rows with gaps under a ``covariance`` of your own keep the distances of the fit.
 
     References
@@ -123,12 +134,11 @@ class MahalanobisDetector(DamageDetector):
         self.covariance = covariance
         self.threshold = threshold
 
-    def _learn(self, F: Array) -> Array:
-        present = ~np.isnan(F)
+    def _learn(self, F: Array, times: Array) -> Array:
+        present, baseline = ~np.isnan(F), Neighbourhoods(times, F)
         self.covariance_ = _most_likely(F) if self.covariance is None else _fit_complete(self.covariance, F)
-        distances = self._distances(F)
-        if self.threshold == "conformal":
-            distances = self._left_out(F, distances)
+        self.n_independent_ = baseline.n_independent
+        distances = self._left_out(baseline) if self.threshold == "conformal" else self._distances(F)
         index = as_if_complete(distances, present.sum(axis=1), F.shape[1])
         self.pattern_scale_ = PatternScale.of(index, present, self.contamination)
         return index * self.pattern_scale_(present)
@@ -136,8 +146,9 @@ class MahalanobisDetector(DamageDetector):
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":
             return float(np.sqrt(chi2.isf(self.contamination, self.n_features_in_)))
-        choose = quantile_threshold if self.threshold == "quantile" else conformal_threshold
-        return choose(index, self.contamination)
+        if self.threshold == "quantile":
+            return quantile_threshold(index, self.contamination)
+        return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
 
     def _index(self, F: Array) -> Array:
         return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
@@ -154,19 +165,21 @@ class MahalanobisDetector(DamageDetector):
             return np.sqrt(self.covariance_.mahalanobis(F))
         return Gaussian(self.covariance_.location_, self.covariance_.covariance_).distances(F)
 
-    def _left_out(self, F: Array, distances: Array) -> Array:
-        """Distances of baseline rows from the other rows."""
-        if self.covariance is None:
-            present = ~np.isnan(F)
-            n_rows = np.where(present, present.sum(axis=0), len(F)).min(axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                left_out = np.sqrt(n_rows * distances**2 / (n_rows - 1 - distances**2))
-            return np.where(distances**2 < n_rows - 1, left_out, np.where(np.isnan(distances), np.nan, np.inf))
-        complete, left_out = np.flatnonzero(~np.isnan(F).any(axis=1)), distances.copy()
-        for rest, fold in KFold(min(N_PERIODS, len(complete))).split(complete):
-            others = clone(self.covariance).fit(F[complete[rest]])
-            left_out[complete[fold]] = np.sqrt(others.mahalanobis(F[complete[fold]]))
-        return left_out
+    def _left_out(self, baseline: Neighbourhoods) -> Array:
+        """Distances of baseline rows from the others."""
+        distances, complete = self._distances(baseline.records), ~np.isnan(baseline.records).any(axis=1)
+        if self.covariance is not None:
+            others = Neighbourhoods(baseline.times[complete], baseline.records[complete])
+            distances[complete] = others.out_of_fold(N_FOLDS, self._distances_from)
+            return distances
+        if complete.all():
+            return baseline.distances(Gaussian(self.covariance_.location_, self.covariance_.covariance_))
+        with without_warnings():  # which the fit on all rows has given
+            return baseline.out_of_fold(N_FOLDS, _distances_from)
+
+    def _distances_from(self, others: Array, rows: Array) -> Array:
+        """Distances of complete rows from others, by a covariance estimator."""
+        return np.sqrt(clone(self.covariance).fit(others).mahalanobis(rows))
 
 
 def _most_likely(F: Array) -> EmpiricalCovariance:
@@ -186,6 +199,18 @@ def _most_likely(F: Array) -> EmpiricalCovariance:
     fitted.location_, fitted.covariance_, fitted.n_features_in_ = learned.mean, learned.covariance, F.shape[1]
     fitted.precision_ = np.linalg.inv(learned.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
     return fitted
+
+
+def _distances_from(others: Array, rows: Array) -> Array:
+    """Distances of rows from others, in the modes that they have; infinite if the others do not determine them."""
+    if np.isnan(others).all(axis=0).any():
+        return np.full(len(rows), np.inf)
+    learned = Gaussian.of(others)
+    try:
+        check_invertible(learned.covariance, others)
+    except ValueError:
+        return np.full(len(rows), np.inf)
+    return learned.distances(rows)
 
 
 def _fit_complete(covariance: BaseEstimator, F: Array) -> BaseEstimator:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._arrays import Array
-from skthermo._validation import HasMethods
+from skthermo._arrays import Array, as_floats
+from skthermo._formatting import listed
+from skthermo._frames import column_names
+from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._thresholds import quantile_threshold
+from skthermo.detection._neighbourhoods import Neighbourhoods
+from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+
+N_FOLDS = 5  # of the baseline, each judged by a clone that was fitted on the others
 
 
 class OutlierDetector(DamageDetector):
     """Alarm where an outlier detector scores frequencies lower than nearly all of a healthy baseline.
 
     The damage index is minus the estimator's ``score_samples`` (or the ``decision_function`` of PyOD's detectors,
-    where higher is more abnormal), and the threshold a quantile of the baseline's damage index.
+    where higher is more abnormal).
 
     Parameters
     ----------
@@ -26,16 +32,28 @@ class OutlierDetector(DamageDetector):
         ``LocalOutlierFactor(novelty=True)`` or ``EllipticEnvelope()``, a pipeline that ends
         with one, or a detector of PyOD. Its own threshold and ``contamination`` are not used.
     contamination : float, default=0.02
-        Share of the baseline above the threshold: 0.02 puts it at the 98th percentile.
+        Share of healthy records above the threshold.
+    threshold : {"conformal", "quantile"}, default="conformal"
+        How the threshold is set:
+
+        - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the indices that the n baseline records
+          have by clones fitted on others: five more fits, each without a fifth of the blocks of time, and without the
+          records within two correlation times of them.
+        - ``"quantile"``: the (1 - contamination) quantile of the indices of the records that the estimator was fitted
+          on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
+          raise more false alarms than asked for.
 
     Attributes
     ----------
     estimator_ : outlier detector
         Fitted clone.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline; NaN where a mode is missing.
+        Damage index of the baseline, with the conformal threshold by clones that were not fitted on the record; NaN
+        where a mode is missing.
+    n_independent_ : float
+        How many independent records the baseline counts as: its number of complete records over their correlation time.
     threshold_ : float
-        The (1 - contamination) quantile of the baseline's damage index.
+        A damage index above it is an alarm.
     offset_ : float
         ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
     n_features_in_ : int
@@ -54,10 +72,12 @@ class OutlierDetector(DamageDetector):
     alarms can. Estimators that measure distances, such as ``OneClassSVM``, give high modes more weight, because these
     vary more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
 
-    The threshold comes from rows on which the estimator was fitted. Estimators that score such rows better than new
-    ones, as ``LocalOutlierFactor`` does, set it too low: check the rate of false alarms on healthy records that `fit`
-    has not seen. Rows with a missing mode are left out of the baseline; their damage index is NaN, and ``predict``
-    raises no alarm there.
+    The correlation time, and the neighbours that are left out, are those of `MahalanobisDetector`; blocks last five
+    correlation times at least. The promise is also the same: about the rate asked for or less, on the mean over
+    baselines that are like the records to come. RATES
+
+    Rows with a missing mode are left out of the baseline and cannot be judged: their damage index is NaN, and
+    ``predict`` gives 0.
 
     Examples
     --------
@@ -79,34 +99,65 @@ class OutlierDetector(DamageDetector):
     that scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)
     """
 
-    _parameter_constraints: dict = {**DamageDetector._parameter_constraints, "estimator": [HasMethods("fit")]}
+    _parameter_constraints: dict = {
+        **DamageDetector._parameter_constraints,
+        "estimator": [HasMethods("fit")],
+        "threshold": [StrOptions({"conformal", "quantile"})],
+    }
 
-    def __init__(self, estimator: BaseEstimator, contamination: float = 0.02):
+    def __init__(
+        self,
+        estimator: BaseEstimator,
+        contamination: float = 0.02,
+        *,
+        threshold: Literal["conformal", "quantile"] = "conformal",
+    ):
         self.estimator = estimator
         self.contamination = contamination
+        self.threshold = threshold
 
-    def _learn(self, F: Array) -> Array:
-        complete = F[~np.isnan(F).any(axis=1)]
-        if len(complete) < 2:
-            raise ValueError(f"{len(complete)} of {len(F)} rows have every mode; expected at least 2")
+    def _learn(self, F: Array, times: Array) -> Array:
+        complete = ~np.isnan(F).any(axis=1)
+        baseline = Neighbourhoods(times[complete], F[complete])
+        if complete.sum() < 2:
+            raise ValueError(f"{complete.sum()} of {len(F)} rows have every mode; expected at least 2")
         scores = hasattr(self.estimator, "score_samples") or hasattr(self.estimator, "decision_function")
-        self.estimator_ = clone(self.estimator).fit(complete) if scores else None
+        self.estimator_ = clone(self.estimator).fit(baseline.records) if scores else None
         if not hasattr(self.estimator_, "score_samples") and not _is_pyod(self.estimator_):
             raise ValueError(
                 f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "
                 "scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)"
             )
-        return self._index(F)
+        self.n_independent_ = baseline.n_independent
+        if self.threshold == "quantile":
+            return self._index(F)
+        index = np.full(len(F), np.nan)
+        index[complete] = baseline.out_of_fold(N_FOLDS, self._index_from)
+        return index
 
     def _limit(self, index: Array) -> float:
-        return quantile_threshold(index, self.contamination)
+        if self.threshold == "quantile":
+            return quantile_threshold(index, self.contamination)
+        return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
 
     def _index(self, F: Array) -> Array:
         index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)
         if complete.any():
-            fitted, rows = self.estimator_, F[complete]
-            index[complete] = fitted.decision_function(rows) if _is_pyod(fitted) else -fitted.score_samples(rows)
+            index[complete] = _index_of(self.estimator_, F[complete])
         return index
+
+    def _index_from(self, others: Array, rows: Array) -> Array:
+        return _index_of(clone(self.estimator).fit(others), rows)
+
+    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
+        lacking = np.isnan(as_floats(X)[rows]).sum(axis=0)
+        modes = [f"{name} in {n}" for name, n in zip(column_names(X, "x"), lacking, strict=True) if n]
+        return f"this detector needs every column, and {listed(modes)} of them are missing"
+
+
+def _index_of(fitted: Any, rows: Array) -> Array:
+    """Damage index of complete rows by a fitted outlier detector."""
+    return fitted.decision_function(rows) if _is_pyod(fitted) else -fitted.score_samples(rows)
 
 
 def _is_pyod(estimator: Any) -> bool:

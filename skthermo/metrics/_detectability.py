@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import is_labelled
 from skthermo._arrays import real_array
 from skthermo._frames import check_same_rows
-from skthermo._names import is_labelled
 from skthermo._times import row_times, time_of
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
 from skthermo._arrays import as_columns, real_array
-from skthermo._frames import MARKERS, check_same_rows, column_names
+from skthermo._frames import MARKERS, check_same_rows, column_names, row_weights
 
 AVERAGE = "Average"
 
@@ -102,7 +102,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     return table
 
 
-def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
+def complete_r2(y_true: ArrayLike, y_pred: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
     """Coefficient of determination R2 over complete rows, averaged over columns.
 
     Parameters
@@ -112,6 +112,8 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
     y_pred : array-like or DataFrame of shape (n_samples, n_columns)
         Predicted values. Rows in which either holds NaN are ignored. Columns of two frames are paired by their
         names.
+    sample_weight : array-like of shape (n_samples,), optional
+        Weight of each row; those of a series are matched to the rows of a frame by index.
 
     Returns
     -------
@@ -121,7 +123,8 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
     Raises
     ------
     ValueError
-        If the shapes, the indices or the names of the columns differ, or a value is infinite.
+        If the shapes, the indices or the names of the columns differ, or a value is infinite; if weights are
+        negative, NaN or infinite, all 0, or not one for each row.
 
     Examples
     --------
@@ -130,8 +133,13 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike) -> float:
     1.0
     """
     measured, predicted = _paired(y_true, y_pred)
-    complete = _complete(measured, predicted)
-    return float(r2_score(measured[complete], predicted[complete])) if complete.sum() > 1 else float("nan")
+    complete, weights = _complete(measured, predicted), row_weights(sample_weight, y_true)
+    if weights is not None:
+        complete &= weights > 0
+        weights = weights[complete]
+    if complete.sum() < 2:
+        return float("nan")
+    return float(r2_score(measured[complete], predicted[complete], sample_weight=weights))
 
 
 def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, float]:

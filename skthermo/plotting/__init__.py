@@ -5,11 +5,10 @@ from skthermo.plotting._fit_report import FitReportDisplay
 from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
 from skthermo.plotting._history import HistoryDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
-from skthermo.plotting._mode_shapes import ModeShapesDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
-from skthermo.plotting._structure_display import StructureDisplay
+from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
 
 __all__ = [
     "DamageIndexDisplay",

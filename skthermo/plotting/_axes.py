@@ -61,8 +61,12 @@ def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
 
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
-    """One legend above all panels of a new figure, or within the first of given axes."""
-    handles, labels = axes[0].get_legend_handles_labels()
+    """One legend of all panels' labels above those of a new figure, or within the first of given axes."""
+    by_label: dict[str, Any] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            by_label.setdefault(label, handle)
+    handles, labels = list(by_label.values()), list(by_label)
     scale = 2.0 if any(getattr(h, "get_markersize", lambda: 9)() < 4 for h in handles) else 1.0
     if not handles:
         return

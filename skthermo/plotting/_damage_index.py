@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
+from skthermo.plotting._limits import hold_outliers, mark_unjudged
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
 from skthermo.plotting._tables import as_tables, in_time
 
@@ -19,6 +21,9 @@ from skthermo.plotting._tables import as_tables, in_time
 @dataclass(eq=False, repr=False)
 class DamageIndexDisplay:
     """Damage index of every record, the threshold above which it is an alarm, and the onset of damage.
+
+    Records without an index, which are not judged, are grey ticks at the bottom, with their number. A few indices far
+    above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
     It is best made by `from_estimator`, `from_predictions` or, with a panel for each scenario, `from_scenarios`.
 
@@ -231,6 +236,8 @@ class DamageIndexDisplay:
         self.points_, self.threshold_lines_ = {}, []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
             self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
+            unjudged = {label: unjudged_places(table) for label, table in self.scenarios[title].items()}
+            mark_unjudged(one, {shortened(label): x for label, x in unjudged.items()})
             style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": plain(threshold_label)}
             self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
             if self.onset is not None:
@@ -243,6 +250,7 @@ class DamageIndexDisplay:
                 one.set_yscale("log")
             else:
                 one.set_ylim(bottom=0)
+                hold_outliers(one, keep=(0.0, self.thresholds[title]))
             if ax is not None or number % n_columns == 0:
                 one.set_ylabel(plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
         for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
@@ -250,15 +258,21 @@ class DamageIndexDisplay:
         figure_legend(self.axes_, ax is None, n_columns=5)
         return self
 
-    @staticmethod
-    def _draw_points(ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Any]:
-        drawn = []
-        for number, (label, table) in enumerate(tables.items()):
+    def _draw_points(self, ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Any]:
+        """Points in the colour and marker that their label has in every panel."""
+        drawn, labels = [], list(dict.fromkeys(label for by_label in self.scenarios.values() for label in by_label))
+        for label, table in tables.items():
             x, values = in_time(table)
-            style = marker_style(number, len(x))
+            style = marker_style(labels.index(label), len(x))
             style |= {"color": colours.get(label, style["color"]), "label": shortened(label)}
             drawn += ax.plot(x, values[:, 0], **style)
         return drawn
+
+
+def unjudged_places(table: pd.DataFrame) -> NDArray:
+    """Places on the horizontal axis of the records that have no damage index."""
+    x, values = in_time(table)
+    return x[np.isnan(values[:, 0])]
 
 
 def index_of(estimator: Any, records: ArrayLike) -> Any:

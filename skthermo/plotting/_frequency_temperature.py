@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._frames import check_same_rows, column_names
 from skthermo.plotting._axes import Axes, figure_legend, panel_names, panels
+from skthermo.plotting._limits import hold_outliers
 from skthermo.plotting._style import label_of, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like
 
@@ -19,6 +20,8 @@ from skthermo.plotting._tables import as_table, check_like
 @dataclass(eq=False, repr=False)
 class FrequencyTemperatureDisplay:
     """Frequencies over the temperature of one sensor, a panel for each mode, measured and predicted.
+
+    A few values far from the others do not stretch the axes: triangles at the edge and a number stand for them.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -184,6 +187,8 @@ class FrequencyTemperatureDisplay:
         sensor = "temperature" if self.temperature.name is None else label_of(self.temperature.name)
         for number, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
             one.set(title=name, xlabel=with_unit(sensor, "°C"))
+            hold_outliers(one, direction="x")
+            hold_outliers(one)
             if number % n_columns == 0:
                 one.set_ylabel(with_unit(self.quantity, self.unit))
         if self.predicted is not None:

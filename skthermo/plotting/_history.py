@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
+from skthermo.plotting._limits import hold_outliers
 from skthermo.plotting._style import line_style, marker_style, shortened, with_unit
 from skthermo.plotting._tables import as_tables, in_time, with_breaks
 
@@ -17,6 +18,8 @@ from skthermo.plotting._tables import as_tables, in_time, with_breaks
 @dataclass(eq=False, repr=False)
 class HistoryDisplay:
     """Histories of frequencies or parameters, one panel for each column.
+
+    A few values far from the others do not stretch the axes: triangles at the edge and a number stand for them.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -186,6 +189,7 @@ class HistoryDisplay:
             ]
         for one, name in zip(self.axes_, names, strict=True):
             one.set_ylabel(with_unit(f"{name}\n{self.quantity}" if self.quantity else name, self.unit))
+            hold_outliers(one)
         for one in self.axes_[-n_columns:] if ax is None else self.axes_:
             date_axis(one, first.index)
         draw_marks(self.axes_, marks, first.index)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from skthermo._frames import check_same_rows
 from skthermo._warnings import warnings_once
 from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
+from skthermo.plotting._limits import hold_outliers
 from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, plain, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
@@ -20,6 +21,8 @@ from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 @dataclass(eq=False, repr=False)
 class PredictionDisplay:
     """Measured and predicted frequencies or parameters, in time with intervals, or one over the other.
+
+    A few values far from the others do not stretch the axes: triangles at the edge and a number stand for them.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -219,6 +222,9 @@ class PredictionDisplay:
         self._draw_time()
         for one, name in zip(self.axes_, names, strict=True):
             one.set_ylabel(with_unit(name, self.unit))
+        bands = [table.to_numpy() for table in (self.lowest, self.highest) if table is not None]
+        for column, one in enumerate(self.axes_):
+            hold_outliers(one, also=[band[:, column] for band in bands])
         for one in self.axes_[-n_columns:] if ax is None else self.axes_:
             date_axis(one, self.measured.index)
         draw_marks(self.axes_, marks, self.measured.index)
@@ -253,3 +259,5 @@ class PredictionDisplay:
             one.set(title=name)
             one.set_xlabel(with_unit(self.labels[0], self.unit))
             one.set_ylabel(with_unit(self.labels[1], self.unit))
+            for direction in "xy":
+                hold_outliers(one, direction=direction)

@@ -1,10 +1,23 @@
-"""Preparing temperatures and frequencies: lags, gaps, broken lines, offsets, tracked modes, folds in time."""
+"""Preparing temperatures and frequencies: faults, outliers, lags, gaps, broken lines, offsets, tracked modes, folds."""
 
 from skthermo.preprocessing._bias import BiasAligner
 from skthermo.preprocessing._folds import BlockedKFold
+from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._hinges import HingeFeatures
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._lags import LagFeatures
+from skthermo.preprocessing.checks import RecordFindings, check_records, residual_trend
 from skthermo.preprocessing.tracking import ModeTracker
 
-__all__ = ["BiasAligner", "BlockedKFold", "HingeFeatures", "KNNGapImputer", "LagFeatures", "ModeTracker"]
+__all__ = [
+    "BiasAligner",
+    "BlockedKFold",
+    "HampelFilter",
+    "HingeFeatures",
+    "KNNGapImputer",
+    "LagFeatures",
+    "ModeTracker",
+    "RecordFindings",
+    "check_records",
+    "residual_trend",
+]

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._frames import frame_like
+from skthermo._frames import frame_like, row_weights
 from skthermo._validation import (
     Estimator,
     Interval,
@@ -17,7 +17,6 @@ from skthermo._validation import (
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
-    check_sample_weight,
     validate_data,
 )
 
@@ -81,7 +80,8 @@ class HingeFeatures(TransformerMixin, Estimator):
         y : None
             Ignored.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row: how often its values count.
+            Weight of each row: how often its values count. Those of a series are matched to the rows of a frame by
+            index.
 
         Returns
         -------
@@ -91,12 +91,12 @@ class HingeFeatures(TransformerMixin, Estimator):
         Raises
         ------
         ValueError
-            If a column is NaN in every row, or in every row that has a weight.
+            If a column is NaN in every row, or in every row that has a weight; if weights are negative, NaN or
+            infinite, all 0, or not one for each row.
         """
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
-        weights = None
-        if sample_weight is not None:
-            weights = check_sample_weight(sample_weight, X, len(values))
+        weights = row_weights(sample_weight, X)
+        if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
         empty = np.isnan(values).all(axis=0)
         if empty.any():

@@ -5,24 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from skthermo._formatting import listed, percent, probability_text
+from skthermo._formatting import percent, probability_text
 from skthermo.reporting._figures import draw_identified_damage
 from skthermo.reporting._html import Html, bullets, element, figure, paragraphs, section, table
-
-YES, NO, DOUBTFUL, ALONE = "yes", "no", "doubtful", "yes, if nothing else has changed"
-SENTENCES = {
-    YES: "{} has lost {} of its stiffness (± {}).",
-    ALONE: "{} has lost {} of its stiffness (± {}), if nothing else has changed.",
-    DOUBTFUL: "It is doubtful whether {} is damaged: a loss of {} (± {}) may come from what else has changed.",
-}
-"""What is said of a damaged group, its severity and two standard errors."""
 
 
 def identified_damage(identified: Any) -> Html:
     """Where damage is, how severe, what it explains, and what cannot be said."""
-    found, answers = identified.table, _answers(identified)
+    found, answers = identified.table, identified.damaged
     rows = [
         [
             group,
@@ -46,7 +37,8 @@ def identified_damage(identified: Any) -> Html:
             "Records of the structure as it is now were compared with what the healthy structure would do in the same "
             "weather. The severities below explain how the frequencies have shifted."
         ),
-        bullets(identified_sentences(identified)),
+        bullets(identified.answer()),
+        paragraphs(*identified.records.sentences()),
         table(
             "Identified damage: share of the stiffness that is lost, and its uncertainty (two standard errors). The "
             "probability is that of such a severity, or a larger one, by chance in a healthy structure.",
@@ -59,7 +51,7 @@ def identified_damage(identified: Any) -> Html:
             shifts,
         ),
         element("h3", "What cannot be said"),
-        bullets(_limits(identified)) or paragraphs("All groups can be seen and told apart by the measured modes."),
+        bullets(identified.limits()) or paragraphs("All groups can be seen and told apart by the measured modes."),
         figure(
             "Severity of each group; shift of each natural frequency, measured and explained; and how similar "
             "the effects of the groups are: 1 means that two groups change all modes alike and cannot be told apart.",
@@ -67,56 +59,3 @@ def identified_damage(identified: Any) -> Html:
         ),
     ]
     return section("identified", "Identified damage", *parts)
-
-
-def identified_sentences(identified: Any) -> list[str]:
-    """Which groups are damaged, and how surely."""
-    answers = _answers(identified)
-    found = identified.table[answers != NO]
-    sentences = [
-        SENTENCES[answers[group]].format(
-            group, percent(row["severity"], ".1f"), percent(2 * row["standard_error"], ".1f")
-        )
-        for group, row in found.iterrows()
-    ]
-    sentences = sentences or ["No group is clearly damaged."]
-    if identified.is_unexplained:
-        sentences.insert(0, _misfit(identified))
-    if np.isfinite(identified.p_value):
-        chance = probability_text(identified.p_value)
-        sentences.append(f"The probability that a healthy structure shows such shifts is {chance}.")
-    return sentences
-
-
-def _limits(identified: Any) -> list[str]:
-    sentences = [f"{listed(groups)} cannot be told apart by these modes." for groups in identified.confused]
-    if len(identified.unseen):
-        sentences.append(f"Damage in {listed(identified.unseen)} cannot be seen in these modes.")
-    if np.isnan(identified.misfit_p_value):
-        sentences.append("There are no more modes than groups, so that any shift can be explained: it proves little.")
-    elif identified.is_unexplained:
-        sentences.append(_misfit(identified))
-    return sentences
-
-
-def _misfit(identified: Any) -> str:
-    return (
-        "Damage of these groups does not explain all shifts of the frequencies, so that something else has changed "
-        "too, or the model is wrong; severities may be wrong by more than their uncertainties (the probability of such "
-        f"a misfit by chance is {probability_text(identified.misfit_p_value)})."
-    )
-
-
-def _answers(identified: Any) -> pd.Series:
-    """Whether each group is damaged.
-
-    Where damage does not explain the shifts, standard errors are multiplied by the largest unexplained shift of a mode
-    in standard errors, and a severity within two of them is doubtful.
-    """
-    table = identified.table
-    answers = pd.Series(NO, table.index).mask(table["significant"].eq(True), YES)  # missing where a group is not seen
-    if not identified.is_unexplained:
-        return answers
-    factor = max(np.nanmax(np.abs(identified.unexplained), initial=1.0), 1.0)
-    small = table["severity"] < 2 * factor * table["standard_error"]
-    return answers.mask(answers == YES, small.map({True: DOUBTFUL, False: ALONE}))

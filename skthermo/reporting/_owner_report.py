@@ -19,7 +19,7 @@ from skthermo.fem import Structure
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._findings import findings_of
 from skthermo.reporting._html import Html, bullets, element, page, paragraphs, section, table
-from skthermo.reporting._identified import identified_damage, identified_sentences
+from skthermo.reporting._identified import identified_damage
 from skthermo.reporting._model import monitored, quality
 from skthermo.studies import IdentifiedDamage
 
@@ -111,7 +111,7 @@ def owner_report(
 
 def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[str, Html]]:
     findings = findings_of(study)
-    now = [] if identified is None else identified_sentences(identified)
+    now = [] if identified is None else identified.answer()
     sections = {
         "answer": ("The answer", answer(study, findings, now)),
         "monitored": ("What was monitored", monitored(study, structure, [found.family for found in findings])),

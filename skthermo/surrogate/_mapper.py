@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from skthermo._arrays import Array
-from skthermo._frames import check_columns, check_temperatures, frame_like
-from skthermo._validation import HasMethods, _fit_context, check_is_fitted, check_sample_weight, seeded, validate_data
+from skthermo._frames import check_columns, check_temperatures, frame_like, row_weights
+from skthermo._regressors import check_takes_weights
+from skthermo._validation import HasMethods, _fit_context, check_is_fitted, seeded, validate_data
 from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._standardiser import FrequencyCoordinates
@@ -102,8 +103,9 @@ class TemperatureMapper(MultiplierRegressor):
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; a regressor whose ``fit`` takes no weights ignores them, and so do steps before it, as
-            that which places the knots of broken lines.
+            Weight of each row; those of a series are matched to the rows of a frame by index. A row of weight 0 counts
+            as left out. Of a pipeline as the regressor, the last step gets the weights; with metadata routing, those
+            steps that request them.
 
         Returns
         -------
@@ -114,8 +116,9 @@ class TemperatureMapper(MultiplierRegressor):
         ------
         ValueError
             If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
-            that stands for a missing value, such as -999, or fewer than two rows are complete; if the ``coordinates``
-            are of another number of parameters, or a multiplier is not positive there.
+            that stands for a missing value, such as -999, or fewer than two rows are complete and have a weight; if the
+            ``coordinates`` are of another number of parameters, or a multiplier is not positive there; if weights are
+            negative, NaN or infinite, not one for each row, or of no use to the regressor, whose ``fit`` takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
         if self.coordinates is not None:
@@ -123,7 +126,9 @@ class TemperatureMapper(MultiplierRegressor):
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)
-        weights = None if sample_weight is None else check_sample_weight(sample_weight, X, len(T))
+        weights = row_weights(sample_weight, X)
+        if weights is not None and self.regressor is not None:
+            check_takes_weights(self.regressor)
         self._learn(
             T, theta, seeded(self.random_state), log_inputs=False, coordinates=self.coordinates, sample_weight=weights
         )

@@ -11,10 +11,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
-from skthermo._arguments import check_flag
+from skthermo._arguments import check_flag, columns_by_name
 from skthermo._arrays import Array, as_columns
-from skthermo._frames import check_same_rows, column_names, frame_like
-from skthermo._names import columns_by_name
+from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
 from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Estimator, check_array, seed_parts, validate_data
@@ -66,7 +65,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         theta, std = self._predict_arrays(X, check_flag(return_std, "return_std"))
         return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
 
-    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.
 
         Parameters
@@ -75,6 +74,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
             Inputs.
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row; those of a series are matched to the rows of a frame by index.
 
         Returns
         -------
@@ -83,7 +84,10 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         """
         predicted = self.predict(X)
         targets = y if self.parameter_names_ is None else columns_by_name(y, self.parameter_names_, "y")
-        return complete_r2(as_columns(targets), as_columns(predicted))
+        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
+
+    def _default_part(self, name: str) -> BaseEstimator | None:
+        return self._default_regressor() if name == "regressor" else None
 
     def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""
@@ -112,9 +116,13 @@ class MultiplierRegressor(RegressorMixin, Estimator):
     ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters)."""
         complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
+        if sample_weight is not None:
+            complete &= sample_weight > 0
         if complete.sum() < 2:
+            weighted = "" if sample_weight is None else " with a weight"
             raise ValueError(
-                f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
+                f"{type(self).__name__} got {complete.sum()} complete rows{weighted} of {len(X)} samples; expected at "
+                "least 2"
             )
         X, y = X[complete], y[complete]
         weights = None if sample_weight is None else sample_weight[complete]

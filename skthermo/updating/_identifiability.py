@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pandas as pd
 import scipy.linalg
@@ -11,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
 from skthermo._arguments import check_model, check_noise
-from skthermo._arrays import Array, real_array
-from skthermo._numbers import HUGE, is_real
+from skthermo._arrays import HUGE, Array, is_real, real_array
+from skthermo._formatting import SPACE, counted, listed
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
@@ -28,12 +30,51 @@ NO_INFORMATION = 1e-12
 class Identifiability(Bunch):
     """What `identifiability` returns."""
 
+    rank: int
+    n_modes: int
+    n_dofs: int
     sensitivity: pd.DataFrame
     singular_values: Array
     condition_number: float
     deviations: pd.Series
     collinear: list[list[str]]
     recommended: list[str]
+
+    def summary(self) -> str:
+        """How many parameters the modes can tell apart, and which, in a few sentences.
+
+        Returns
+        -------
+        str
+            One line for each sentence.
+        """
+        return "\n".join(self._sentences()).replace(SPACE, " ")
+
+    def __repr__(self) -> str:
+        percent = (100 * self.deviations).round(2).rename("smallest deviation (%)")
+        return f"{self.summary()}\n\n{percent.to_frame().to_string()}"
+
+    def _sentences(self) -> Iterator[str]:
+        names = list(self.deviations.index)
+        shapes = f" with their shapes at {counted(self.n_dofs, 'degree')} of freedom" if self.n_dofs else ""
+        yield f"{counted(len(names), 'parameter')}, {counted(self.n_modes, 'mode')}{shapes}."
+        if self.rank < len(names):
+            yield (
+                f"At most {self.rank} of the {len(names)} parameters can be found together. Records in other weather "
+                f"do not help, since weather changes the parameters: expected {self._remedies()}."
+            )
+        for group in self.collinear:
+            yield f"Cannot be told apart: {listed(group)}."
+        within = f"within {100 * ACCURATE:g} % with this noise"
+        if self.recommended:
+            others = ", the others being known" if len(self.recommended) < len(names) else ""
+            yield f"Can be found together {within}{others}: {listed(self.recommended)}."
+        else:
+            yield f"No parameter can be found {within}."
+
+    def _remedies(self) -> str:
+        more = "more degrees of freedom" if self.n_dofs else "shapes"
+        return f"fewer parameters, more modes, {more}, or a prior"
 
 
 def identifiability(
@@ -64,8 +105,10 @@ def identifiability(
     Returns
     -------
     Bunch
-        With the attributes
+        With the method ``summary()``, which says the same in sentences, and the attributes
 
+        - ``rank``: number of parameters that can be found together, at most that of modes where no shapes are measured;
+        - ``n_modes``, ``n_dofs``: number of modes, and of degrees of freedom where their shapes are measured;
         - ``sensitivity``: d ln f / d ln theta, a frame of shape (n_modes, n_parameters);
         - ``singular_values``, ``condition_number``: of the sensitivities, each row multiplied by the root mean square
           noise over its own noise, with rows of shapes below where these are measured. The condition number is
@@ -112,6 +155,14 @@ def identifiability(
     dtype: float64
     >>> known.recommended
     ['diagonal', 'bottom', 'top']
+
+    Four parameters cannot be found from three modes:
+
+    >>> print(identifiability(make_truss(n_modes=3), noise=0.001).summary())
+    4 parameters, 3 modes.
+    At most 3 of the 4 parameters can be found together. Records in other weather do not help, since weather changes the
+    parameters: expected fewer parameters, more modes, shapes, or a prior.
+    Can be found together within 10 % with this noise, the others being known: bottom, diagonal and top.
     """
     check_model(model)
     names = list(model.parameter_names)
@@ -132,6 +183,9 @@ def identifiability(
     smallest = values[-1] if len(values) == len(names) else 0.0
     ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
     return Identifiability(
+        rank=int((values > np.sqrt(NO_INFORMATION) * values[0]).sum()),
+        n_modes=model.n_modes,
+        n_dofs=np.size(dofs) if dofs is not None else 0,
         sensitivity=S,
         singular_values=values,
         condition_number=float(values[0] / smallest) if smallest else np.inf,

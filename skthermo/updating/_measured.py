@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs
+from skthermo._arguments import by_name, check_dofs
 from skthermo._arrays import Array, real_array, shape_array
-from skthermo._names import by_name
 from skthermo._warnings import warn_user
 
 

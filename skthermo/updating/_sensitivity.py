@@ -10,8 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_model, check_theta
-from skthermo._arrays import Array, central_differences, real_array
-from skthermo._numbers import HUGE, is_real
+from skthermo._arrays import HUGE, Array, central_differences, is_real, real_array
 from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))

@@ -7,7 +7,7 @@ import pytest
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from skthermo.datasets import kw51_structure, make_kw51
-from skthermo.fem import Bar, CallableModel, PointMass, Spring, Structure
+from skthermo.fem import Bar, Beam, CallableModel, PointMass, Spring, Structure
 from skthermo.plotting import ModeShapesDisplay, StructureDisplay
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
@@ -63,6 +63,52 @@ def test_supports_are_drawn_where_they_are_and_filled_where_nothing_can_move():
     pinned, roller = (line for line in display.ax_.lines if line.get_linestyle() == "None")
     assert (pinned.get_xydata().tolist(), pinned.get_markerfacecolor()) == ([[0.0, 0.0]], "#000000")
     assert (roller.get_xydata().tolist(), roller.get_markerfacecolor()) == ([[6.0, 0.0]], "white")
+
+
+BEAM = STEEL | {"G": 81e9, "I_yy": 1e-4, "I_zz": 1e-4, "J": 1e-4}
+
+
+def frame_in(plane, **other_supports):
+    """A portal in one plane of space, all nodes held out of plane; its right foot slides."""
+    out = next(axis for axis in "xyz" if axis not in plane)
+    places = {"a": (0, 0), "b": (0, 3), "c": (4, 3), "d": (4, 0)}
+    nodes = {name: np.insert(np.array(place, float), "xyz".index(out), 7.0) for name, place in places.items()}
+    held = f"{out} r{plane[0]} r{plane[1]}"
+    supports = dict.fromkeys(nodes, held) | {"a": "xyz rx ry rz", "d": f"{held} {plane[1]}"} | other_supports
+    members = {pair: Beam(*pair, **BEAM, orientation=(1, 1, 1)) for pair in ("ab", "bc", "cd")}
+    return Structure(nodes, members, supports, {"beams": list(members)})
+
+
+@pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
+def test_a_plane_frame_in_space_is_drawn_in_its_plane_with_its_two_supports(plane):
+    display = StructureDisplay.from_structure(frame_in(plane), {"beams": 1.0})
+    assert not hasattr(display.ax_, "get_zlim")
+    assert colours(display) == {(0.0, 1.5): 1.0, (2.0, 3.0): 1.0, (4.0, 1.5): 1.0}
+    fixed, sliding = (line for line in display.ax_.lines if line.get_linestyle() == "None")
+    assert (fixed.get_xydata().tolist(), fixed.get_markerfacecolor()) == ([[0.0, 0.0]], "#000000")
+    assert (sliding.get_xydata().tolist(), sliding.get_markerfacecolor()) == ([[4.0, 0.0]], "white")
+
+
+def test_modes_of_a_plane_frame_are_drawn_in_its_plane():
+    structure = frame_in("xz")
+    model = structure.assemble(["beams"], n_modes=1)
+    display = ModeShapesDisplay.from_structure(structure, model, amplitude=0.1)
+    moved = np.array(display.lines_[0][0].get_segments())
+    moves = dict(zip("abcd", [*moved[:, 0], moved[-1, 1]] - np.array([[0, 0], [0, 3], [4, 3], [4, 0]]), strict=True))
+    shape = model.modes([[1.0]])[1][0, :, 0]
+    along = {dof: value for dof, value in zip(structure.dofs, shape, strict=True) if dof[1] in "xz"}
+    drawn = np.array([moves[node]["xz".index(direction)] for node, direction in along])
+    np.testing.assert_allclose(drawn / drawn[0], np.array([*along.values()]) / along["b", "x"])
+    assert max(np.linalg.norm(move) for move in moves.values()) == pytest.approx(0.1 * 5)
+
+
+def test_a_frame_that_can_leave_its_plane_is_drawn_in_space_as_is_any_in_axes_of_space():
+    free = StructureDisplay.from_structure(frame_in("xz", c="rx rz"))
+    assert hasattr(free.ax_, "get_zlim")
+    given = plt.figure().add_subplot(projection="3d")
+    assert StructureDisplay.from_structure(frame_in("xz"), ax=given).ax_ is given
+    with pytest.raises(ValueError, match="projection='3d'"):
+        StructureDisplay.from_structure(frame_in("xz", c="rx rz"), ax=plt.figure().add_subplot())
 
 
 def test_groups_get_a_colour_and_a_line_of_the_legend_each():

@@ -63,7 +63,7 @@ def test_a_panel_for_each_scenario():
     assert display.axes_[0].get_ylim()[0] == 0
     for ax in DamageIndexDisplay.from_scenarios(scenarios, 2.0, log=True, colours={"true": "#555555"}).axes_:
         assert ax.get_yscale() == "log"
-        assert ax.lines[0].get_color() in ("#555555", "#0072B2")
+        assert ax.lines[0].get_color() in ("#555555", "#009E73")  # of "true" and, the third label, "records"
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_healthy_campaigns_with_the_right_noise_give_no_warning():
 
 
 def test_negative_weights_are_named():
-    with pytest.raises(ValueError, match="Negative values in data passed to `sample_weight`"):
+    with pytest.raises(ValueError, match="sample_weight is -1 in row 0, and negative, NaN or infinite in 365 of"):
         TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=-np.ones(365))
 
 

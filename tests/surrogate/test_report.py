@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.linear_model import Ridge
+from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
@@ -67,20 +67,40 @@ class TestTheReport:
 
     def test_reasons_for_rows_left_out_are_counted(self):
         air, measured = T.copy(), F.copy()
-        air.iloc[5:8, 1] = np.nan
+        air.iloc[5:8] = np.nan
         measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
         lagged = make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))
         refined = chain(mapper=lagged).fit(air, measured).report_
         assert refined.n_trained == 365 - 3 - 1
-        assert refined.left_out.to_dict() == {"temperature 'T2' is missing": 3, "a lag reaches into a gap": 1}
+        temperatures = {f"temperature {name!r} is missing": 3 for name in T}
+        assert refined.left_out.to_dict() == temperatures | {"a lag reaches into a gap": 1}
         report = chain(inverse=InverseSurrogate(refine=0), mapper=lagged).fit(air, measured).report_
-        assert report.left_out.to_dict() == {
-            "temperature 'T2' is missing": 3,
+        assert report.left_out.to_dict() == temperatures | {
             "frequency 'f4' is missing": 2,
             "frequency 'f5' is missing": 1,
             "a lag reaches into a gap": 1,
         }
         assert report.n_trained == 365 - 3 - 2 - 1
+        assert report.filled.empty
+
+    def test_temperatures_filled_from_other_sensors_are_counted(self):
+        air = T.copy()
+        air.iloc[5:8, 1] = air.iloc[8:13, 0] = np.nan
+        report = chain(mapper=make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))).fit(air, F).report_
+        assert report.n_trained == 365
+        assert report.filled["rows"].to_dict() == {"T1": 5, "T2": 3}
+        others = LinearRegression().fit(T[["T1", "T3"]], T["T2"])
+        scatter = np.std(T["T2"] - others.predict(T[["T1", "T3"]]))
+        assert report.filled.loc["T2", "standard deviation"] == pytest.approx(scatter, rel=0.1)
+        assert f"3 temperatures of 'T2' (standard deviation {scatter:.1f}" in repr(report)
+
+    def test_a_sensor_that_is_mostly_filled_is_named(self):
+        air = T.copy()
+        air.iloc[:200, 1] = np.nan
+        texts = [str(warning.message) for warning in caught(chain(mapper=TemperatureMapper(Ridge())).fit, air, F)]
+        assert any(
+            text.startswith("the temperature 'T2' is missing in 200 of 365 rows and was filled") for text in texts
+        )
 
     def test_it_reads_as_text_and_as_html(self, fitted):
         text, html = repr(fitted.report_), fitted.report_._repr_html_()
@@ -126,14 +146,20 @@ class TestWarningsOfFit:
         assert len(texts) == len(set(texts))
         assert all(warning.filename == __file__ for warning in record)
 
-    def test_gaps_that_lags_multiply_are_counted_with_the_recipe_against_them(self):
-        gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
+    def test_gaps_that_lags_multiply_are_counted(self):
+        gappy = T.mask(np.tile(np.random.default_rng(0).random((365, 1)) < 0.05, 3))
         lagged = chain(mapper=make_pipeline(LagFeatures(24), TemperatureMapper(Ridge())))
         texts = [str(warning.message) for warning in caught(lagged.fit, gappy, F)]
-        message = r"only \d+ of 365 rows trained .*a lag reaches into a gap.*KNNGapImputer"
+        message = r"only \d+ of 365 rows trained .*a lag reaches into a gap"
         assert any(re.match(message, text) for text in texts)
-        complete = KNNGapImputer().set_output(transform="pandas").fit_transform(gappy)
+        complete = KNNGapImputer().set_output(transform="pandas").fit_transform(T.mask(T.quantile(0.98) < T))
         assert not caught(lagged.fit, complete, F)
+
+    def test_gaps_of_single_sensors_do_not_multiply(self):
+        gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
+        fem = chain(mapper=make_pipeline(LagFeatures(24), TemperatureMapper(Ridge())))
+        assert not caught(fem.fit, gappy, F)
+        assert fem.report_.n_trained == 365
 
     def test_absurd_records_are_named(self):
         absurd = F.copy()
@@ -183,8 +209,8 @@ class TestWarningsOfFit:
 
 class TestForeignWeather:
     def test_rows_without_temperatures_are_said_to_have_no_prediction(self, fitted):
-        with pytest.warns(UserWarning, match="none of 365 rows can be predicted: each lacks a temperature"):
-            predicted = fitted.predict(LATER.assign(T2=np.nan))
+        with pytest.warns(UserWarning, match="365 of 365 rows cannot be predicted and are NaN: 365 without any"):
+            predicted = fitted.predict(LATER * np.nan)
         assert predicted.isna().all().all()
 
     @pytest.mark.parametrize(
@@ -213,7 +239,7 @@ class TestForeignWeather:
         weather = LATER.copy()
         weather.index = weather.index + pd.Timedelta(days=365)
         weather.iloc[5, 0] = T["T1"].max() + (T["T1"].max() - T["T1"].min())
-        weather.iloc[9, 1] = np.nan
+        weather.iloc[9] = np.nan
         table = lagged.applicability(weather)
         assert list(table.columns) == [f"T{i}_lag{k}" for i in (1, 2, 3) for k in (0, 2)] + ["outside_bounds"]
         np.testing.assert_allclose([table["T1_lag0"].iloc[5], table["T1_lag2"].iloc[7]], 1)

@@ -1,7 +1,7 @@
 """Laws of what the chain says about its own errors: spread, intervals, realistic noise."""
 
 import pickle
-from dataclasses import replace
+from contextlib import nullcontext
 
 import numpy as np
 import pandas as pd
@@ -16,9 +16,9 @@ from sklearn.pipeline import make_pipeline
 from skthermo._dependence import correlation_time
 from skthermo._weather import order_statistic
 from skthermo.datasets import make_truss_campaign
-from skthermo.preprocessing import LagFeatures
+from skthermo.preprocessing import BlockedKFold, LagFeatures
 from skthermo.surrogate import TemperatureMapper
-from skthermo.surrogate.chain._records import WeatherResiduals
+from skthermo.surrogate.chain._records import WeatherResiduals, as_frame, block_length
 from tests.surrogate.chains import F, T, inverse
 from tests.surrogate.chains import chain as any_chain
 
@@ -127,8 +127,8 @@ def test_quantiles_measure_each_period_by_the_others():
 def drawn_records(found, weather, seed=0):
     """Which record each drawn row is, by the first mode, which has no gaps."""
     values = found.draw(weather, np.random.RandomState(seed))
-    taken = np.array([np.flatnonzero(found.noise[:, 0] == value)[0] for value in values[:, 0]])
-    np.testing.assert_array_equal(values, found.noise[taken])
+    taken = np.array([np.flatnonzero(found.values[:, 0] == value)[0] for value in values[:, 0]])
+    np.testing.assert_array_equal(values, found.values[taken])
     return taken
 
 
@@ -142,20 +142,6 @@ def test_noise_is_whole_records_gaps_included():
     np.testing.assert_array_equal(taken, drawn_records(found, weather))
     assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
     assert len(set(taken)) > 150
-
-
-def test_noise_is_around_what_the_mapper_of_all_records_leaves():
-    """Out of fold, a warm period is predicted too high; the mapper that learned from it does not do so."""
-    rng = np.random.default_rng(0)
-    weather = np.linspace(-10, 30, 500)
-    values = rng.normal(size=500) - 5.0 * (weather > 20)
-    found = residuals(weather, values)
-    found = replace(found, own=values[:, np.newaxis] + 5.0 * (weather > 20)[:, np.newaxis] + 0.3)
-    for place in (0.0, 27.0):
-        drawn = found.draw(np.full((4000, 1), place), np.random.RandomState(0))
-        near = np.abs(weather - place) < 2
-        assert drawn.mean() == pytest.approx(0.3, abs=0.25)
-        assert drawn.std() == pytest.approx(values[near].std(), rel=0.25)
 
 
 def test_noise_comes_from_similar_weather():
@@ -182,7 +168,7 @@ def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.residuals_.noise
+    records = fem.residuals_.values
     for row in (noisy / clean - 1).to_numpy():
         assert np.isclose(records, row, rtol=0, atol=1e-12, equal_nan=True).all(axis=1).any()
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
@@ -208,14 +194,41 @@ def test_noise_is_fitted_or_a_number():
 # Residuals of the chain
 
 
-def test_residuals_are_those_of_mappers_fitted_to_other_periods():
+def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
     fem = any_chain(inverse=inverse(refine=0), mapper=PLAIN).fit(T, F)
-    np.testing.assert_array_equal(np.bincount(fem.residuals_.folds), [73] * 5)
-    for fold, (train, test) in enumerate(KFold(5).split(T)):
+    folds = BlockedKFold(block="7D")
+    np.testing.assert_array_equal(fem.residuals_.folds, folds.fold_of(T))
+    for fold, (train, test) in enumerate(folds.split(T)):
         theta = clone(fem.mapper_).fit(T.iloc[train], fem.parameters_.iloc[train]).predict(T.iloc[test])
         predicted = fem.aligner_.inverse_transform(fem.model.frequencies(theta))
         values = fem.residuals_.values[fem.residuals_.folds == fold]
         np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
+
+
+def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week():
+    hours = pd.date_range("2025", periods=5000, freq="h")
+    for rho, table in (
+        (0.5, pd.DataFrame(index=hours)),
+        (0.99, pd.DataFrame(index=hours)),
+        (0.99, np.empty((5000, 1))),
+    ):
+        time = (1 + rho) / (1 - rho)
+        rows = 5 * residuals(np.random.default_rng(1).uniform(size=5000), autoregressive(5000, rho)).correlation_time
+        assert rows == pytest.approx(5 * time, rel=0.4)
+        block = block_length(as_frame(table), rows)
+        is_timed = isinstance(table, pd.DataFrame)
+        assert block == (max(pd.Timedelta("7D"), rows * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
+
+
+def test_any_folds_may_be_asked_for():
+    kept = FITTED.records_.out_of_fold(FITTED.mapper_, FITTED._frequencies, KFold(5))
+    np.testing.assert_array_equal(kept.folds, np.arange(365) // 73)
+
+
+def test_folds_in_unseen_weather_are_named():
+    short = chain().fit(T[:60], F[:60])
+    with pytest.warns(UserWarning, match=r"\d+% of the records of fold \d of 5 are in weather that the other folds"):
+        short.records_.out_of_fold(short.mapper_, short._frequencies, KFold(5))
 
 
 @pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
@@ -238,7 +251,8 @@ def test_any_mapper_has_residuals(mapper):
     fem = chain(mapper=mapper).fit(T, F)
     lagged = 1 if hasattr(mapper, "steps") else 0
     assert fem.residuals_.values.shape == (365 - lagged, 6)
-    std = fem.predict(T, return_std=True)[1]
+    with pytest.warns(UserWarning, match="1 of 365 rows cannot be predicted") if lagged else nullcontext():
+        std = fem.predict(T, return_std=True)[1]
     np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
 
 
@@ -297,9 +311,10 @@ def test_intervals_are_infinite_where_records_are_too_few():
     assert np.isfinite(fem.predict_interval(T[:3], 0.9)[1]).all(axis=None)
 
 
-def test_rows_without_a_temperature_have_no_interval():
+@pytest.mark.filterwarnings("ignore:1 of 365 rows cannot be predicted")
+def test_rows_without_any_temperature_have_no_interval():
     holed = T.copy()
-    holed.iloc[3, 1] = np.nan
+    holed.iloc[3] = np.nan
     tables = (*FITTED.predict_interval(holed), FITTED.predict(holed, True)[1], FITTED.simulate(holed, noise="fitted"))
     for table in tables:
         np.testing.assert_array_equal(table.isna().all(axis=1), np.arange(365) == 3)
@@ -322,3 +337,74 @@ def test_intervals_widen_beyond_the_training_weather():
     middle, beyond = T.mean().to_frame().T, T.max().to_frame().T + 30
     widths = [(highest / lowest).to_numpy() for lowest, highest in map(FITTED.predict_interval, (middle, beyond))]
     assert (widths[1] > widths[0]).all()
+
+
+# Missing temperatures
+
+
+def without(sensor, weather=LATER.temperatures):
+    return weather.assign(**{sensor: np.nan})
+
+
+def test_a_missing_temperature_is_what_the_other_sensors_foretell():
+    wanted = LinearRegression().fit(T[["T1", "T3"]], T["T2"])
+    complete = LATER.temperatures.assign(T2=wanted.predict(LATER.temperatures[["T1", "T3"]]))
+    with pytest.warns(UserWarning, match=r"the other sensors: 'T2' in 365 of 365 rows \(standard dev"):
+        predicted = FITTED.predict(without("T2"))
+    np.testing.assert_allclose(predicted, FITTED.predict(complete), rtol=1e-6)
+    with pytest.warns(UserWarning, match="filled from the other"):
+        theta = FITTED.predict_parameters(without("T2"))
+    numerical = FITTED.model.frequencies(theta.to_numpy())
+    np.testing.assert_allclose(predicted, FITTED.aligner_.inverse_transform(numerical), rtol=1e-12)
+    assert FITTED.applicability(without("T2")).notna().all(axis=None)
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    """A chain of hardly noisy records, so that what a filled temperature costs counts, and records of a later year."""
+    year, later = (make_truss_campaign(noise=0.001, random_state=seed) for seed in (0, 1))
+    return any_chain(inverse=inverse(noise=0.001), mapper=PLAIN).fit(year.temperatures, year.frequencies), later
+
+
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled")
+@pytest.mark.parametrize("sensor", list(T))
+def test_intervals_hold_their_share_where_a_sensor_died_after_training(quiet, sensor):
+    fem, later = quiet
+    weather = without(sensor, later.temperatures)
+    lowest, highest = fem.predict_interval(weather)
+    held = ((lowest < later.frequencies) & (later.frequencies < highest)).to_numpy().mean()
+    assert held == pytest.approx(0.9, abs=0.06)
+    width = [(highest - lowest).mean() for lowest, highest in map(fem.predict_interval, (later.temperatures, weather))]
+    assert (width[1] > 1.2 * width[0]).any()
+
+
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled")
+def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadrature(quiet):
+    fem, later = quiet
+    weather = without("T2", later.temperatures)
+    filled, deviations = fem.sensors_.fill(weather)
+    moved = fem.predict(pd.DataFrame(filled + deviations, weather.index, weather.columns))
+    predicted, std = fem.predict(weather, return_std=True)
+    spread = predicted * fem.residuals_.spread(filled)
+    np.testing.assert_allclose(std, np.hypot(spread, moved - predicted), rtol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled")
+def test_a_filled_temperature_costs_wherever_a_lag_reaches_it():
+    lagged = chain(mapper=make_pipeline(LagFeatures([0, 2]), PLAIN)).fit(T, F)
+    holed = LATER.temperatures.copy()
+    holed.iloc[100:103, 1] = np.nan
+    std = lagged.predict(holed, True)[1]
+    plain = lagged.predict(holed)
+    inputs = lagged.mapper_[:-1].transform(pd.DataFrame(lagged.sensors_.fill(holed)[0], holed.index, holed.columns))
+    wider = (std > plain * lagged.residuals_.spread(inputs.to_numpy()) * (1 + 1e-9)).any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(wider), np.arange(100, 105))
+
+
+def test_a_day_whose_lags_reach_back_too_far_is_counted():
+    lagged = chain(mapper=make_pipeline(LagFeatures([0, 1, 5], padding="nan"), PLAIN)).fit(T, F)
+    day = LATER.temperatures.set_axis(LATER.temperatures.index + pd.Timedelta("900D"))
+    day.iloc[8] = np.nan
+    message = "8 of 365 rows cannot be predicted and are NaN: 1 without any temperature, 7 with lags that reach"
+    with pytest.warns(UserWarning, match=message):
+        assert lagged.predict(day).isna().any(axis=1).sum() == 8

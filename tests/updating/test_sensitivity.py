@@ -90,6 +90,33 @@ def test_parameters_that_act_alike_are_collinear_and_have_no_deviation():
     assert not {"a", "twin"} <= set(known.recommended)
 
 
+def test_the_summary_counts_parameters_and_modes():
+    springs = identifiability(series_of_springs(), noise=0.001)
+    first, second, third, *_ = springs.summary().split("\n")
+    assert first == "4 parameters, 2 modes."
+    assert second.startswith("At most 2 of the 4 parameters can be found together.")
+    assert third == "Cannot be told apart: a and twin."
+    assert repr(springs).startswith(springs.summary())
+    truss = identifiability(make_truss(), noise=0.001)
+    assert truss.rank == 4
+    assert truss.summary().split("\n") == [
+        "4 parameters, 6 modes.",
+        "Can be found together within 10 % with this noise, the others being known: diagonal, bottom and top.",
+    ]
+
+
+@pytest.mark.parametrize("n_modes", [1, 2, 3])
+def test_shapes_tell_more_parameters_apart_than_there_are_modes(n_modes):
+    model = make_truss(n_modes=n_modes)
+    alone = identifiability(model, noise=0.001)
+    assert alone.rank == n_modes
+    assert "more modes, shapes, or a prior" in alone.summary()
+    with_shapes = identifiability(model, noise=0.001, dofs=[3, 8, 13, 18], shape_noise=0.01)
+    assert with_shapes.rank == 4
+    assert with_shapes.summary().startswith(f"4 parameters, {n_modes} mode{'s' * (n_modes > 1)} with their shapes at 4")
+    assert "can be found together." not in with_shapes.summary()
+
+
 def test_what_only_some_parameters_share_leaves_the_others_known():
     model = AffineModel(
         {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])},

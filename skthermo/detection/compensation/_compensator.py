@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from numbers import Integral
 from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
-from sklearn.model_selection import BaseCrossValidator, check_cv, cross_val_predict
+from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._arrays import Array, as_floats
+from skthermo._columns import check_positions_are_names, positions_of
 from skthermo._frames import (
     check_columns,
     check_temperatures,
@@ -21,6 +21,7 @@ from skthermo._frames import (
     warn_of_disorder,
     warn_of_markers,
 )
+from skthermo._times import has_stamps
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -29,14 +30,16 @@ from skthermo._validation import (
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
+    last_step,
     validate_data,
 )
-from skthermo._warnings import warn_user
-from skthermo._weather import TrainingRange
-from skthermo.detection.compensation._complete_rows import CompleteRowsRegressor
+from skthermo._warnings import warn_user, warnings_once
+from skthermo._weather import SensorRegression, TrainingRange
+from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
+from skthermo.detection.compensation._folds import Folds
+from skthermo.detection.compensation._gaps import FillError, fill_temperatures
 from skthermo.detection.compensation._whitening import Spread
 
-Rows = NDArray[np.intp]
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
 
@@ -51,10 +54,14 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     targets : sequence of str or sequence of int
         Names of the frequency columns in a frame, or their positions counted from 0, in the order of
         the output.
-    cv : int, cross-validation splitter or iterable, default=None
-        Folds of `fit_transform`. An int gives that many folds of consecutive rows, None gives 5. A
-        splitter must put every row into exactly one test fold, or all but the first rows, as ``TimeSeriesSplit``
-        does: the residuals of those are NaN.
+    cv : "contiguous", int, cross-validation splitter or iterable, default=None
+        Folds by which the baseline is predicted:
+
+        - ``None``: blocks of a week (without stamps, of a 52nd of the rows), dealt in turn to five folds, so that each
+          fold sees each season. Blocks are longer where five correlation times of the residuals are.
+        - ``"contiguous"``: five periods of time, each predicted from the others. An int gives that many.
+        - A splitter, or pairs of training and test rows: every row must be in exactly one test fold, or all but the
+          first rows, as with ``TimeSeriesSplit``: the residuals of those are NaN.
     scale : {None, "global", "local"}, default=None
         What the residuals are divided by:
 
@@ -67,9 +74,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     ----------
     estimator_, regression_ : regressor
         Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
+    folds_ : ndarray of int
+        The fold of each row of the baseline, -1 where no fold tests it.
+    block_ : Timedelta, int or None
+        Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
+    sensors_ : object
+        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
+        their standard deviations.
     spread_ : object
-        Covariance of the residuals by weather, if they are scaled. ``spread_.smoothing`` says over how many records of
-        similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
+        of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
@@ -91,31 +105,41 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
     the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
 
-    Rows should be in order of time, so that folds are periods of time: with random folds, a row would be predicted by
-    its neighbours in time, which are nearly the same record. If the baseline holds each season only once, a fold is
-    predicted from other seasons, and its residuals and the threshold become too large.
+    Rows should be in order of time, so that folds are made of periods of time: with random folds, a row would be
+    predicted by its neighbours in time, which are nearly the same record. Blocks are a compromise: as short as needed
+    for each fold to see all seasons, and long beside the memory of the residuals. Contiguous folds of a single year
+    predict each season from the others; residuals and the threshold are then too large, and hide damage. A warning
+    says so where 10 % of a fold's records lie outside the weather of the others.
 
     Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
     each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
-    given the others, records fewer than 24 rows apart left out; such records are left out too where the baseline itself
-    is scaled. A new record takes S from the baseline record with the most similar weather; with a missing temperature,
+    given the others, records fewer than two correlation times of the residuals apart (at least 24 rows) left out; such
+    records are left out too where the baseline itself
+    is scaled. A new record takes S from the baseline record with the most similar weather; without any temperature,
     from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
     the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
     Missing values:
 
-    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) get every row, so that
-      lags and imputers find their neighbours. What follows applies to the rows that they give to the rest.
+    - A missing temperature is filled by a linear regression on the other sensors of its row, learned in `fit`, whatever
+      the estimator would do with NaN; one warning counts what was filled. The deviation by which a residual is divided
+      is widened by what the filling costs: the change of the prediction when what was filled moves by one standard
+      deviation, added in quadrature over the sensors. Residuals in Hz are shrunk by as much, towards their mean, so
+      that a detector behind keeps its rate of false alarms. Records whose prediction hangs on a filled value do not
+      teach the spread, unless they are the half of all. Only a row without any temperature has NaN.
+    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) are fitted to all rows,
+      so that lags are the true ones whatever the folds. What follows is fitted to the rows that they give to the rest.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
       estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
       also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
-    - A row with another missing value, such as a lag that finds no record, is used if the estimator accepts NaN.
-      Otherwise the row does not train, and its residuals are NaN.
-    - On a ``DatetimeIndex``, lags inside the estimator go by time, and a lag whose record is in another fold takes the
-      last record before it, or NaN if that is older than the tolerance of ``LagFeatures``. Without one, the rows of
-      another fold shift the lags.
+    - A row with a value that is still missing, such as a lag that finds no record, is used if the estimator accepts
+      NaN. Otherwise the row does not train, and its residuals are NaN. To judge the records of a day with lags of 24
+      hours, give `transform` the records of the day before as well.
+    - Lags elsewhere, such as in the mapper of a ``DataInformedFEM``, see the rows of their folds only. On a
+      ``DatetimeIndex`` they go by time: a lag whose record is in another fold takes the last record before it, or NaN
+      if that is older than the tolerance of ``LagFeatures``. Without stamps, folds are then contiguous, with a warning.
 
     Examples
     --------
@@ -141,7 +165,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     _parameter_constraints: dict = {
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
-        "cv": ["cv_object"],
+        "cv": ["cv_object", StrOptions({"contiguous"})],
         "scale": [StrOptions({"global", "local"}), None],
     }
 
@@ -150,7 +174,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         estimator: BaseEstimator,
         *,
         targets: Sequence[Hashable],
-        cv: int | BaseCrossValidator | Iterable | None = None,
+        cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
         scale: Literal["global", "local"] | None = None,
     ):
         self.estimator = estimator
@@ -179,19 +203,18 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         ValueError
             If a target is not among the columns or is named twice; if the targets are all of the columns
             or none; if a target is NaN in every row, or in every row that the estimator can learn from; if the
-            residuals that are to be scaled have a singular covariance.
+            residuals that are to be scaled have a singular covariance; if there are fewer rows than folds, or ``cv``
+            does not test every row exactly once.
 
         Warns
         -----
         UserWarning
             If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
-            frequencies absurdly far from the others; if stamps are not in order.
+            frequencies absurdly far from the others; if stamps are not in order; if temperatures are missing, with what
+            they were filled with; if a fold has weather that the others do not know; if rows without stamps have lags
+            inside an estimator.
         """
-        temperatures, frequencies = self._read_baseline(X)
-        if self.scale is None:
-            self._learn(temperatures, frequencies)
-        else:
-            self._out_of_fold(temperatures, frequencies)
+        self._learn(*self._read_baseline(X))
         return self
 
     @overload
@@ -217,7 +240,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Raises
         ------
         ValueError
-            As in `fit`; if there are fewer rows than folds, or ``cv`` does not test every row exactly once.
+            As in `fit`.
 
         Warns
         -----
@@ -225,7 +248,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             As in `fit`.
         """
         temperatures, frequencies = self._read_baseline(X)
-        return frame_like(frequencies, self._out_of_fold(temperatures, frequencies))
+        return frame_like(frequencies, self._learn(temperatures, frequencies))
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -253,16 +276,24 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            As in `fit`, and if temperatures are far outside those of `fit`.
+            As in `fit`, if temperatures are missing, and if they are far outside those of `fit`.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
-        weather = as_floats(temperatures)
+        filled = fill_temperatures(self.sensors_, temperatures)
+        weather = as_floats(filled)
         message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
-        residuals = as_floats(frequencies) - self.regression_.predict(temperatures)
-        return frame_like(frequencies, residuals if self.scale is None else self.spread_.whiten(weather, residuals))
+        residuals = as_floats(frequencies) - self.regression_.predict(filled)
+        residuals[np.isnan(weather).all(axis=1)] = np.nan
+        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        scaled = (
+            self.spread_.shrunk(residuals, fills)
+            if self.scale is None
+            else self.spread_.whiten(weather, residuals, fills)
+        )
+        return frame_like(frequencies, scaled)
 
     @overload
     def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -314,81 +345,50 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
         return temperatures, frequencies
 
-    def _learn(self, temperatures: Any, frequencies: Any) -> None:
-        self.regression_ = CompleteRowsRegressor(self.estimator).fit(temperatures, frequencies)
-        self.estimator_ = self.regression_.estimator_
-        self.training_range_ = TrainingRange.of(temperatures, ~np.isnan(as_floats(frequencies)).all(axis=1))
-
-    def _out_of_fold(self, temperatures: Any, frequencies: Any) -> Array:
+    def _learn(self, temperatures: Any, frequencies: Any) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""
-        folds, untested = folds_of(self.cv, temperatures)
-        self._learn(temperatures, frequencies)
-        partition = [*folds, (untested, untested)] if untested.size else folds
-        predicted = cross_val_predict(CompleteRowsRegressor(self.estimator), temperatures, frequencies, cv=partition)
-        residuals, weather = as_floats(frequencies) - predicted, as_floats(temperatures)
-        residuals[untested] = np.nan
+        self.sensors_ = SensorRegression.of(temperatures)
+        filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
+        folds = Folds.of(self._wanted_folds(filled), filled)
+        self.regression_ = Regression.of(self.estimator, filled, frequencies)
+        self.estimator_ = self.regression_.estimator
+        self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
+        with warnings_once():
+            residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
+            longer = folds.longer(filled, residuals)
+            if longer is not None:
+                folds = longer
+                residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
+        folds.warn_of_unseen(filled)
+        self.folds_, self.block_ = folds.of_row(len(measured)), folds.block
+        residuals[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
+        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        taught = residuals.copy()
+        if len(fills.rows) < len(residuals) / 2:
+            taught[fills.rows] = np.nan
         if self.scale is None:
-            return residuals
-        empty = np.isnan(residuals).all(axis=0)
+            self.spread_ = Spread.of_all(taught)
+            return self.spread_.shrunk(residuals, fills)
+        empty = np.isnan(taught).all(axis=0)
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
-        size = np.fmax.reduce(np.abs(as_floats(frequencies)))
-        self.spread_, white = Spread.of(weather, residuals, size, local=self.scale == "local")
-        return white
+        size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
+        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local")
+        untaught = np.isnan(taught).all(axis=1)
+        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
 
-
-def folds_of(cv: Any, X: Any) -> tuple[list[tuple[Rows, Rows]], Rows]:
-    """Folds that test every row once, and the first rows, which a splitter that goes forward in time does not test."""
-    folds = list(check_cv(cv).split(X))
-    tested = np.bincount(np.concatenate([[], *(test for _, test in folds)]).astype(int), minlength=len(X))
-    untested = np.arange(tested.argmax())
-    wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)
-    if wrong.size:
-        raise ValueError(
-            f"cv is {cv!r}, which tests row {wrong[0]} {tested[wrong[0]]} times ({wrong.size} of {len(X)} "
-            "rows not exactly once); expected a partition of the rows, such as KFold makes, or of all but the "
-            "first, as TimeSeriesSplit does"
+    def _wanted_folds(self, temperatures: Any) -> Any:
+        """The folds that are asked for; rows without stamps stay together where lags need them to."""
+        if self.cv is not None or has_stamps(temperatures) or not has_lags_behind(self.estimator):
+            return self.cv
+        warn_user(
+            f"rows have no stamps, and lags inside {type(last_step(self.estimator)).__name__} would take rows of other "
+            "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
+            "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
+            "lags without stamps",
         )
-    return folds, untested
-
-
-def check_positions_are_names(targets: Any, columns: Any) -> None:
-    """Refuse integer targets where they could be names of columns as well as positions."""
-    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
-    if integers and list(columns) not in ([], list(range(len(columns)))):
-        raise ValueError(
-            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
-            "; expected columns named by text, or 0, 1, 2, ..."
-        )
-
-
-def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
-    """Positions of the targets, which are given by name or by position."""
-    targets = list(targets)
-    if targets and all(isinstance(target, str) for target in targets):
-        if names is None:
-            raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
-        columns = list(names)
-        unknown = [target for target in targets if columns.count(target) != 1]
-        if unknown:
-            raise ValueError(f"targets {unknown} are not columns of X, or more than one; expected some of {columns}")
-        positions = [columns.index(target) for target in targets]
-    elif all(isinstance(target, Integral) and not isinstance(target, bool) for target in targets):
-        positions = [int(target) for target in targets]
-        outside = [position for position in positions if not 0 <= position < n_columns]
-        if outside:
-            raise ValueError(f"targets {outside} are not columns of X; expected indexes from 0 to {n_columns - 1}")
-    else:
-        raise ValueError(f"targets is {targets}; expected names of columns or their indexes, not both")
-    if len(set(positions)) < len(positions):
-        raise ValueError(f"targets {targets} repeat a column; expected each once")
-    if not 0 < len(positions) < n_columns:
-        raise ValueError(
-            f"targets are {len(positions)} of the {n_columns} columns of X; expected at least one, and at least one "
-            "other column to predict them from"
-        )
-    return np.array(positions, dtype=np.intp)
+        return "contiguous"
 
 
 def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.model_selection import cross_val_predict
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
@@ -18,6 +20,40 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
+from skthermo.detection.compensation._folds import Folds
+from skthermo.preprocessing import LagFeatures
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A fitted estimator, of which the first transformers got all rows and the rest those that it accepts."""
+
+    estimator: BaseEstimator
+    head: Pipeline | None
+    rest: CompleteRowsRegressor
+
+    @classmethod
+    def of(cls, estimator: BaseEstimator, X: Any, y: Any) -> Regression:
+        """Fit a clone."""
+        head, rest = split_pipeline(estimator)
+        head = None if head is None else clone(head)
+        fitted = CompleteRowsRegressor(rest).fit(X if head is None else head.fit_transform(X), y)
+        whole = fitted.regressor_ if head is None else joined(estimator, head, fitted.regressor_)
+        return cls(whole, head, fitted)
+
+    def predict(self, X: Any) -> NDArray[np.float64]:
+        """Predictions, NaN for rows that the estimator does not accept."""
+        return self.rest.predict(self._inputs(X))
+
+    def out_of_fold(self, X: Any, y: Any, folds: Folds) -> Any:
+        """Predictions by clones of the rest that are fitted on other rows; the first transformers know all rows."""
+        partition = [*folds.splits, (folds.untested, folds.untested)] if folds.untested.size else folds.splits
+        predicted = cross_val_predict(clone(self.rest), self._inputs(X), y, cv=partition)
+        predicted[folds.untested] = np.nan
+        return predicted
+
+    def _inputs(self, X: Any) -> Any:
+        return X if self.head is None else self.head.transform(X)
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
@@ -27,13 +63,10 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         self.estimator = estimator
 
     def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
-        head, rest = split_pipeline(self.estimator)
-        self.head_ = None if head is None else clone(head)
-        inputs = X if head is None else self.head_.fit_transform(X)
-        self.takes_nan_ = takes_nan(rest)
+        self.takes_nan_ = takes_nan(self.estimator)
         self.n_targets_ = y.shape[1]
-        usable, present = self._predictable(inputs), ~np.isnan(as_floats(y))
-        if takes_missing_targets(rest):
+        usable, present = self._predictable(X), ~np.isnan(as_floats(y))
+        if takes_missing_targets(self.estimator):
             present[:] = True
         in_use = usable[:, np.newaxis] & present
         if not in_use.any(axis=0).all():
@@ -41,25 +74,23 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
             target = column_names(y, "target ")[in_use.any(axis=0).argmin()]
             raise ValueError(
                 f"{target!r} has none of {len(y)} rows to learn from, of all or in a fold; expected rows with {wanted} "
-                f"for {type(rest).__name__}"
+                f"for {type(self.estimator).__name__}"
             )
         if (in_use == usable[:, np.newaxis]).all():
-            self.regressor_ = fit_outputs(rest, inputs[usable], as_target(rest, y[usable]))
+            self.regressor_ = fit_outputs(self.estimator, X[usable], as_target(self.estimator, y[usable]))
         else:
-            self.regressor_ = MultiOutputRegressor(rest)
+            self.regressor_ = MultiOutputRegressor(self.estimator)
             targets = as_floats(y).T
             self.regressor_.estimators_ = [
-                clone(rest).fit(inputs[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
+                clone(self.estimator).fit(X[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
             ]
-        self.estimator_ = self.regressor_ if head is None else joined(self.estimator, self.head_, self.regressor_)
         return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:
-        inputs = X if self.head_ is None else self.head_.transform(X)
-        usable = self._predictable(inputs)
-        predicted = np.full((len(X), self.n_targets_), np.nan)
+        usable = self._predictable(X)
+        predicted = np.full((X.shape[0], self.n_targets_), np.nan)
         if usable.any():
-            values = as_columns(self.regressor_.predict(inputs[usable]))
+            values = as_columns(self.regressor_.predict(X[usable]))
             expected = (int(usable.sum()), self.n_targets_)
             if values.shape != expected:
                 raise ValueError(
@@ -86,6 +117,12 @@ def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstim
     if not n_head:
         return None, estimator
     return estimator[:n_head], steps[-1] if n_head == len(steps) - 1 else estimator[n_head:]
+
+
+def has_lags_behind(estimator: BaseEstimator) -> bool:
+    """Whether lags stand behind the first transformers, where they see the rows of their folds only."""
+    parts = split_pipeline(estimator)[1].get_params(deep=True).values()
+    return any(isinstance(part, LagFeatures) for part in parts)
 
 
 def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:

@@ -7,13 +7,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo._dependence import correlation_time
 from skthermo._gaussian import Gaussian, Mask, whitenings
 from skthermo._weather import nearest
 
-NEAR_IN_TIME = 24  # rows, a day of hourly ones: the covariance of a record is learned from records at least so far away
+CORRELATION_TIMES = 2  # of the residuals: the covariance of a record is learned from records at least so far away
+LEAST_NEAR, MOST_NEAR = 24, 0.05  # records, a day of hourly ones, and share of all of them, between which that is
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 
@@ -36,24 +39,39 @@ class Neighbours:
     rows: NDArray[np.intp]
     counted: Mask
 
+    def weights(self, n_records: int) -> scipy.sparse.csr_array:
+        """A row for each place: 1 at the records that count, else 0."""
+        ends = np.arange(0, self.rows.size + 1, self.rows.shape[1])
+        shape = (len(self.rows), n_records)
+        return scipy.sparse.csr_array((self.counted.ravel().astype(float), self.rows.ravel(), ends), shape)
+
 
 @dataclass(frozen=True)
 class History:
-    """Residuals of records at positions in time and places in weather, and the distribution of all residuals."""
+    """Residuals of records at positions in time and places in weather, and the distribution of all residuals.
+
+    Records fewer than ``near`` positions apart do not tell each other's covariance.
+    """
 
     order: NDArray[np.intp]
     places: Array
     residuals: Array
     overall: Gaussian
+    near: int = LEAST_NEAR
 
     def neighbours(self, size: int, places: Array, order: NDArray[np.intp] | None = None) -> Neighbours:
         """The records nearest to each place, without those near ``order`` in time."""
         if order is None:
             near = nearest(self.places, places, size)[1]
             return Neighbours(near, np.ones(near.shape, dtype=bool))
-        near = nearest(self.places, places, size + 2 * NEAR_IN_TIME - 1)[1]
-        far = np.abs(self.order[near] - order[:, np.newaxis]) >= NEAR_IN_TIME
+        near = nearest(self.places, places, size + self.most_near)[1]
+        far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
         return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+
+    @cached_property
+    def most_near(self) -> int:
+        """The most records that may be near one in time."""
+        return int((np.searchsorted(self.order, self.order + 2 * self.near - 1) - np.arange(len(self.order))).max())
 
     def likeliest(self) -> LocalCovariance | None:
         """The covariance by weather, or none, under which records are likeliest given the others."""
@@ -61,6 +79,12 @@ class History:
         plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
         likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
         return [None, *candidates][int(np.argmax(likelihoods))]
+
+
+def reach_in_time(residuals: Array) -> int:
+    """How many records remember each other."""
+    longest = max(correlation_time(mode) for mode in residuals.T)
+    return int(max(min(np.ceil(CORRELATION_TIMES * longest), MOST_NEAR * len(residuals)), LEAST_NEAR))
 
 
 @dataclass(frozen=True)
@@ -85,6 +109,11 @@ class LocalCovariance:
         """Covariances at some places, without the records near ``order`` in time."""
         return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
 
+    @property
+    def numbers_per_record(self) -> int:
+        """How many numbers `at` holds in memory for each place."""
+        return self.smoothing.n_neighbors + self.history.most_near + self.history.overall.covariance.size
+
     def likelihood(self) -> float:
         """Log-likelihood of the records, each given the others."""
         return whitened(self.history.residuals, self.history.overall, self(self._own))[1]
@@ -106,14 +135,11 @@ class LocalCovariance:
     def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
         """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
         known, filled = ~np.isnan(values), np.nan_to_num(values)
-        means, pseudo = np.empty((len(neighbours.rows), *prior.shape)), self.smoothing.n_pseudo
-        step = max(NUMBERS_AT_ONCE // (neighbours.rows.shape[1] * prior.size), 1)
-        for first in range(0, len(means), step):
-            rows, counted = (part[first : first + step] for part in (neighbours.rows, neighbours.counted))
-            sums = np.einsum("ij,ij...->i...", counted, filled[rows])
-            counts = np.einsum("ij,ij...->i...", counted, known[rows], dtype=float)
-            means[first : first + step] = (sums + pseudo * prior) / (counts + pseudo)
-        return means
+        weights, pseudo = neighbours.weights(len(values)), self.smoothing.n_pseudo
+        shape = (len(neighbours.rows), *prior.shape)
+        sums = (weights @ filled.reshape(len(values), -1)).reshape(shape)
+        counts = (weights @ known.reshape(len(values), -1).astype(float)).reshape(shape)
+        return (sums + pseudo * prior) / (counts + pseudo)
 
 
 def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:

@@ -8,12 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array, spread_evenly
-from skthermo._gaussian import Gaussian, check_invertible, whiten_by
+from skthermo._arrays import Array, patterns, spread_evenly
+from skthermo._gaussian import Gaussian, check_invertible, whiten_by, whitenings
 from skthermo._weather import TrainingRange, nearest, weather_coordinates
-from skthermo.detection.compensation._local_covariance import CANDIDATES, NUMBERS_AT_ONCE, History, Smoothing, whitened
+from skthermo.detection.compensation._gaps import FillError
+from skthermo.detection.compensation._local_covariance import (
+    CANDIDATES,
+    NUMBERS_AT_ONCE,
+    History,
+    Smoothing,
+    reach_in_time,
+    whitened,
+)
 
 MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned
+JITTER = 1e-12  # share of its variance that each mode has of its own, so that covariances have roots
 ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's temperatures that a record is beyond them
 
 
@@ -34,6 +43,12 @@ class Spread:
     places: Array | None = None
 
     @classmethod
+    def of_all(cls, residuals: Array) -> Spread:
+        """That of residuals which are not scaled; a mode without any has no spread."""
+        overall = Gaussian.of(np.where(np.isnan(residuals).all(axis=0), 0.0, residuals))
+        return cls(overall, overall.covariance[np.newaxis], None)
+
+    @classmethod
     def of(cls, weather: Array, residuals: Array, size: Array, *, local: bool) -> tuple[Spread, Array]:
         """Learn from a baseline in order of time; whiten each of its records by others, which are not near in time.
 
@@ -50,10 +65,10 @@ class Spread:
         coordinates = weather_coordinates(weather[usable])
         chosen = spread_evenly(usable, MOST_PLACES)
         places = coordinates.transform(weather[chosen])
-        covariance = History(chosen, places, residuals[chosen], overall).likeliest()
+        covariance = History(chosen, places, residuals[chosen], overall, reach_in_time(residuals)).likeliest()
         if covariance is None:
             return plain, white
-        step = max(NUMBERS_AT_ONCE // covariance.smoothing.n_neighbors, 1)
+        step = max(NUMBERS_AT_ONCE // covariance.numbers_per_record, 1)
         for first in range(0, len(usable), step):
             block = usable[first : first + step]
             by_others = covariance.at(coordinates.transform(weather[block]), order=block)
@@ -66,15 +81,35 @@ class Spread:
         variances = np.einsum("ijj->ij", self.covariances)[self._place(np.asarray(weather, dtype=float))]
         return np.sqrt(variances) * self._widening(weather)[:, np.newaxis]
 
-    def whiten(self, weather: Array, residuals: Array) -> Array:
-        """Residuals of new records in standard deviations and uncorrelated."""
+    def whiten(self, weather: Array, residuals: Array, fills: FillError | None = None) -> Array:
+        """Residuals of new records in standard deviations and uncorrelated, wider where temperatures were filled."""
         white = np.empty_like(residuals)
         step = max(NUMBERS_AT_ONCE // residuals.shape[1] ** 2, 1)
         for first in range(0, len(residuals), step):
             rows = slice(first, first + step)
             by_place = whiten_by(self.covariances, self._place(weather[rows]), residuals[rows] - self.overall.mean)
             white[rows] = by_place / self._widening(weather[rows])[:, np.newaxis]
+        if fills is not None and len(fills.rows):
+            weather, residuals = weather[fills.rows], residuals[fills.rows]
+            wider = self.covariances[self._place(weather)] + fills.covariances
+            by_row = whitened(residuals, self.overall, wider)[0]
+            white[fills.rows] = by_row / self._widening(weather)[:, np.newaxis]
         return white
+
+    def shrunk(self, residuals: Array, fills: FillError) -> Array:
+        """Residuals with the overall covariance also where filled temperatures have widened it; NaN without any."""
+        few, covariance = residuals[fills.rows], self.overall.covariance
+        varied = np.diag(covariance) > 0
+        few = np.where(varied, few, np.nan)
+        covariance = covariance + np.diag(np.where(varied, JITTER * np.diag(covariance), 1.0))
+        white = whitened(few, self.overall, covariance + fills.covariances)[0]
+        masks, of_row = patterns(~np.isnan(few))
+        present = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
+        roots = np.linalg.inv(whitenings(covariance, masks)[0] + np.eye(len(varied)) * ~masks[:, np.newaxis, :])
+        back = np.einsum("ij,ijk->ik", np.nan_to_num(white), np.where(present, roots, 0.0)[of_row])
+        again = residuals.copy()
+        again[fills.rows] = np.where(np.isnan(few), np.nan, back + self.overall.mean)
+        return again
 
     def _widening(self, weather: Array) -> Array:
         """Factor of the deviations where weather is beyond that of the baseline."""

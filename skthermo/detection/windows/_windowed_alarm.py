@@ -14,6 +14,7 @@ from skthermo._dependence import correlation_time
 from skthermo._gaussian import check_not_empty
 from skthermo._validation import Interval, StrOptions
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection.windows._laws import CountLaw, MeanLaw
 from skthermo.detection.windows._windows import Windows
@@ -52,8 +53,11 @@ class WindowedAlarm(DamageDetector):
         Distribution of the records, learned from the baseline, by which windows are judged.
     width_ : int
         Largest number of records in a window.
+    fewest_ : int
+        Fewest records with a value that a window is judged by: half as many as a window of the baseline has (median).
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline's windows, each by a distribution learned from the other periods.
+        Damage index of the baseline's windows, each by a distribution learned from the other periods; NaN where a
+        window has too few records.
     threshold_ : float
         A damage index above it is an alarm.
     offset_ : float
@@ -78,8 +82,9 @@ class WindowedAlarm(DamageDetector):
     compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
 
     Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be
-    as unlikely in a full window of independent records, by the binomial law. The first windows of a series are
-    shorter than the others: a call does not remember the records of the last one.
+    as unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value
+    than ``fewest_`` are not judged: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
+    series: a call does not remember the records of the last one.
 
     Examples
     --------
@@ -117,7 +122,7 @@ class WindowedAlarm(DamageDetector):
             raise ValueError(f"m is {self.m}, but rule is {self.rule!r}; expected m only with the rule 'm-of-n'")
         return Windows.of(X, F, self.window)
 
-    def _learn(self, windows: Windows) -> Array:
+    def _learn(self, windows: Windows, times: Array) -> Array:
         check_not_empty(windows.rows)
         n_rows, width = len(windows.rows), windows.longest
         if n_rows < 2 * width:
@@ -126,10 +131,13 @@ class WindowedAlarm(DamageDetector):
                 "many rows"
             )
         n_periods = int(np.clip(n_rows // (2 * width), 2, MOST_PERIODS))
-        folds = KFold(n_periods).split(windows.rows)
-        index = [_index_of_run(self._law(windows, rest), windows, fold[0], fold[-1] + 1) for rest, fold in folds]
+        baseline, index = Neighbourhoods(times, windows.rows), np.empty(n_rows)
+        for _, fold in KFold(n_periods).split(windows.rows):
+            law = self._law(windows, baseline.away_from(np.isin(np.arange(n_rows), fold)))
+            index[fold] = _index_of_run(law, windows, fold[0], fold[-1] + 1)
         self.law_, self.width_ = self._law(windows, np.arange(n_rows)), width
-        return np.concatenate(index)
+        self.fewest_ = int(np.ceil(np.median(windows.n_known) / 2))
+        return np.where(windows.n_known < self.fewest_, np.nan, index)
 
     def _law(self, windows: Windows, rows: NDArray[np.intp]) -> MeanLaw | CountLaw:
         """The distribution learned from the records in some rows."""
@@ -144,7 +152,14 @@ class WindowedAlarm(DamageDetector):
         return conformal_threshold(index, self.contamination, 1 / time, "windows")
 
     def _index(self, windows: Windows) -> Array:
-        return np.concatenate([_index_of_run(self.law_, windows, *run) for run in windows.runs()])
+        index = np.concatenate([_index_of_run(self.law_, windows, *run) for run in windows.runs()])
+        return np.where(windows.n_known < self.fewest_, np.nan, index)
+
+    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
+        return (
+            f"their windows hold fewer than {self.fewest_} records with a value, half as many as in the baseline; the "
+            "first rows of a call need the records before them too"
+        )
 
 
 def _index_of_run(law: MeanLaw | CountLaw, windows: Windows, start: int, stop: int) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,11 @@ class Windows:
         step = max(NUMBERS_AT_ONCE // self.longest, 1)
         for start in range(0, len(self.rows), step):
             yield start, min(start + step, len(self.rows))
+
+    @cached_property
+    def n_known(self) -> NDArray[np.intp]:
+        """Number of records with a value in every window."""
+        return self.sums((~np.isnan(self.rows)).any(axis=1).astype(np.intp))
 
     @property
     def sizes(self) -> NDArray[np.intp]:

@@ -6,10 +6,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arguments import integer_row
-from skthermo._arrays import Matrix, positive_integer, real_array
-from skthermo._names import as_mapping
-from skthermo._numbers import is_real
+from skthermo._arguments import as_mapping, integer_row
+from skthermo._arrays import Matrix, is_real, positive_integer, real_array
 
 Key = tuple[str, ...]
 

@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import as_floats, real_array, without_mask
+from skthermo._arrays import as_floats, real_array, refuse_no_numbers, without_mask
 from skthermo._frames import check_same_rows
-from skthermo._numbers import refuse_no_numbers
 
 FIELDS = ("frequencies", "damping", "shapes")
 

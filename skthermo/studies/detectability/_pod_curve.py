@@ -11,8 +11,7 @@ from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
 from skthermo._arguments import check_flag
-from skthermo._arrays import Array, real_array
-from skthermo._numbers import is_real
+from skthermo._arrays import Array, is_real, real_array
 from skthermo._warnings import warn_user
 from skthermo.studies.detectability._intervals import clopper_pearson
 

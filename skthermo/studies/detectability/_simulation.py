@@ -68,11 +68,11 @@ class Simulation:
             for scenario, source, table, rows in found
         ]
 
-    def repeat(self, records: Sequence[JudgedRecords], seeds: Any, n_jobs: int | None) -> None:
+    def repeat(self, records: Sequence[JudgedRecords], seeds: Any, n_jobs: int | None, verbose: int = 0) -> None:
         """Add the decisions of later repeats to those of the first, whose warnings are the only ones given."""
         with without_warnings():
             jobs = (delayed(self._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            for decisions in Parallel(n_jobs=n_jobs)(jobs):
+            for decisions in Parallel(n_jobs=n_jobs, verbose=verbose)(jobs):
                 for one in records:
                     one.decisions.extend(decisions.get((one.scenario.name, one.source), []))
 

@@ -15,7 +15,7 @@ from sklearn.exceptions import NotFittedError
 from skthermo._arguments import check_jobs
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
-from skthermo._validation import _num_samples, last_step, seed_parts, seeded
+from skthermo._validation import Stages, _num_samples, last_step, seed_parts, seeded
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._arrangement import Arrangement
@@ -52,6 +52,9 @@ class DetectabilityStudy(BaseEstimator):
         Number of parallel jobs (joblib), which share the repeats.
     random_state : int, RandomState or None, default=None
         Seed of the noise, and of parts of the detector without a seed of their own.
+    verbose : bool or int, default=0
+        Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are
+        done.
 
     Attributes
     ----------
@@ -125,6 +128,7 @@ class DetectabilityStudy(BaseEstimator):
         noise: ArrayLike | Literal["fitted"] = "fitted",
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        verbose: bool | int = 0,
     ):
         self.fem = fem
         self.detector = detector
@@ -133,6 +137,7 @@ class DetectabilityStudy(BaseEstimator):
         self.noise = noise
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.verbose = verbose
 
     def run(
         self,
@@ -200,13 +205,18 @@ class DetectabilityStudy(BaseEstimator):
         seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(n_repeats, 2))
         self.detector_ = clone(self.detector)
         seed_parts(self.detector_, seeded(self.random_state))
-        self.detector_.fit(healthy)
+        stages = Stages(self, 4)
+        with stages.stage("detector"):
+            self.detector_.fit(healthy)
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
-            clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
+            with stages.stage("frequencies"):
+                clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
             simulation = Simulation(self.fem, self.detector_, view, scenarios, T, clean, self.noise, function)
-            records = simulation.first_repeat(measured, seeds[0])
-        simulation.repeat(records, seeds, self.n_jobs)
+            with stages.stage("first repeat"):
+                records = simulation.first_repeat(measured, seeds[0])
+        with stages.stage(f"other {n_repeats - 1} repeats"):
+            simulation.repeat(records, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
         offset = getattr(last_step(self.detector_), "offset_", None)
         self.threshold_ = None if offset is None else -float(np.squeeze(offset))
         self.indices_ = {(one.scenario.name, one.source): one.damage_index for one in records}

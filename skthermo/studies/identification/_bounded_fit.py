@@ -58,9 +58,17 @@ def solve(slopes: Array, target: Array) -> Array:
     return np.minimum(found, HIGHEST_SEVERITY)
 
 
-def redrawn(slopes: Array, around: Array, n_draws: int, random: np.random.RandomState) -> Array:
+def drawn_errors(shape: tuple[int, int], freedom: float, random: np.random.RandomState) -> Array:
+    """Whitened errors by Student's law of several dimensions, one draw a row."""
+    scale = np.sqrt(freedom / random.chisquare(freedom, size=shape[0])) if np.isfinite(freedom) else np.ones(shape[0])
+    return random.standard_normal(shape) * scale[:, np.newaxis]
+
+
+def redrawn(
+    slopes: Array, around: Array, n_draws: int, random: np.random.RandomState, freedom: float = np.inf
+) -> Array:
     """Severities fitted to whitened shifts with redrawn errors, (n_draws, n_groups)."""
-    errors = random.standard_normal((n_draws, len(around)))
+    errors = drawn_errors((n_draws, len(around)), freedom, random)
     return np.array([solve(slopes, around + error) for error in errors]).reshape(n_draws, slopes.shape[1])
 
 
@@ -97,32 +105,33 @@ def likely_range(slopes: Array, target: Array, column: int, found: float, least:
     return end(0.0), end(HIGHEST_SEVERITY)
 
 
-def p_of_damage(fit: BoundedFit, n_periods: int, n_draws: int, random: np.random.RandomState) -> float:
+def two_errors(freedom: float) -> float:
+    """Half of what holds as much of Student's law as two standard deviations hold of the normal law."""
+    return float(stats.t.isf(stats.norm.sf(2.0), freedom)) / 2
+
+
+def p_of_damage(fit: BoundedFit, freedom: float, n_draws: int, random: np.random.RandomState) -> float:
     """Probability that damage explains as much of a healthy structure's shift as of this one."""
     gained = fit.target @ fit.target - _misfit(fit.slopes, fit.target)
-    scale = np.sqrt(n_periods / random.chisquare(n_periods, size=n_draws))
-    targets = random.standard_normal((n_draws, len(fit.target))) * scale[:, np.newaxis]
+    targets = drawn_errors((n_draws, len(fit.target)), freedom, random)
     healthy = np.array([target @ target - _misfit(fit.slopes, target) for target in targets])
     return float((1 + (healthy >= gained).sum()) / (1 + n_draws))
 
 
-def p_of_group(fit: BoundedFit, without: BoundedFit, n_periods: int, column: int, nominal: Array) -> float:
+def p_of_group(fit: BoundedFit, without: BoundedFit, freedom: float, column: int, nominal: Array) -> float:
     """One-sided p-value (Student's t) of the misfit that an undamaged group would remove from a fit by chance.
 
     What the other groups could imitate at the nominal state does not count.
     """
     others = np.delete(nominal, column, axis=1)
     gained = min(without.misfit - fit.misfit, _misfit(others, nominal @ fit.severities))
-    return float(stats.t.sf(np.sqrt(max(gained, 0.0)), n_periods))
+    return float(stats.t.sf(np.sqrt(max(gained, 0.0)), freedom))
 
 
-def p_of_misfit(fit: BoundedFit, n_periods: int) -> float:
-    """p-value of Hotelling's test that only these groups changed; NaN without degrees of freedom."""
-    freedom = len(fit.target) - np.count_nonzero(fit.severities)
-    rest = n_periods - freedom + 1
-    if freedom < 1 or rest < 1:
-        return float("nan")
-    return float(stats.f.sf(fit.misfit * rest / (n_periods * freedom), freedom, rest))
+def p_of_misfit(fit: BoundedFit, freedom: float) -> float:
+    """p-value (F) of the misfit if only these groups changed; NaN without more modes than damaged groups."""
+    rest = len(fit.target) - np.count_nonzero(fit.severities)
+    return float(stats.f.sf(fit.misfit / rest, rest, freedom)) if rest > 0 else float("nan")
 
 
 def _misfit(slopes: Array, target: Array) -> float:

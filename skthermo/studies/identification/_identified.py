@@ -10,8 +10,10 @@ import pandas as pd
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array
-from skthermo._formatting import listed
+from skthermo._formatting import SPACE
+from skthermo.studies.identification import _sentences as sentences
 from skthermo.studies.identification._bounded_fit import HIGHEST_SEVERITY
+from skthermo.studies.identification._compared import ComparedRecords
 from skthermo.studies.scenarios import UncertainDamage
 
 NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
@@ -27,10 +29,11 @@ class IdentifiedDamage:
     table : DataFrame
         One row a damage group: ``severity``; ``standard_error`` of that estimate; ``error_alone``, the standard error
         if no other group could be damaged and strengthening counted too; ``p_value`` and ``significant``, whether the
-        group is damaged.
+        group is clearly damaged, which none is unless there is damage at all (``p_value`` of all groups together).
+        Two standard errors hold 95 % of the errors, also where few independent records determine them.
     shifts : DataFrame
         One row a mode: mean relative shift ``measured`` and ``explained`` by the severities, ``standard_error`` of the
-        measured one, and ``n_records``.
+        measured one, ``n_records``, and ``n_independent``, as many independent records as would determine it as well.
     single : DataFrame
         One row a group, the best first: ``severity`` if it alone were damaged, its ``standard_error``, the ``misfit``
         that remains, and ``misfit_p_value``.
@@ -52,6 +55,9 @@ class IdentifiedDamage:
     misfit, misfit_p_value : float
         Sum of squared differences between measured and explained shifts, in standard errors, and the probability of a
         larger one if these groups are all that changed. A low one says that something else changed too.
+    records : ComparedRecords
+        The records that were compared, those that could not be, by reason, and how many independent ones they are
+        worth.
     significance : float
         Error rate of ``significant`` over all groups together.
     converged : bool
@@ -86,6 +92,7 @@ class IdentifiedDamage:
     p_value: float
     misfit: float
     misfit_p_value: float
+    records: ComparedRecords
     significance: float
     converged: bool
 
@@ -98,6 +105,16 @@ class IdentifiedDamage:
     def standard_errors(self) -> pd.Series:
         """Standard error of each severity."""
         return self.table["standard_error"]
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether there is damage: chance alone would hardly give a healthy structure such shifts."""
+        return bool(self.p_value <= self.significance)
+
+    @property
+    def damaged(self) -> pd.Series:
+        """Whether each group is damaged: yes, no, doubtful, or yes if nothing else has changed."""
+        return sentences.damaged(self)
 
     @property
     def is_unexplained(self) -> bool:
@@ -158,39 +175,38 @@ class IdentifiedDamage:
         """
         return UncertainDamage(name, self.draws)
 
+    def answer(self) -> list[str]:
+        """Whether something has changed, where, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences. The first says whether there is a change, and with which probability it would be chance.
+        """
+        return list(sentences.answer(self))
+
+    def limits(self) -> list[str]:
+        """What cannot be said.
+
+        Returns
+        -------
+        list of str
+            Sentences; none if damage explains all shifts and all groups can be seen and told apart.
+        """
+        return list(sentences.limits(self))
+
     def summary(self) -> str:
-        """What was found, in sentences.
+        """What was found, what cannot be said, and which records were compared.
 
         Returns
         -------
         str
             One sentence a line.
         """
-        evident = "Damage is evident" if self.p_value <= self.significance else "No damage is evident"
-        lines = [f"{evident}: a healthy structure shows such a shift with probability {self.p_value:.2g}."]
-        for group, row in self.table.dropna().iterrows():
-            if row["severity"] > 0:
-                mark = "" if row["significant"] else "not significant, "
-                lines.append(
-                    f"{group}: {row['severity']:.1%} of its stiffness lost ({mark}standard error "
-                    f"{row['standard_error']:.1%})."
-                )
-        lines += [f"{listed(group)} cannot be told apart by these modes." for group in self.confused]
-        if self.unseen:
-            lines.append(f"{listed(self.unseen)} cannot be seen: the standard error would be above 10 %.")
-        rest = self.unexplained
-        if self.is_unexplained and not np.isnan(rest).all():
-            worst = int(np.nanargmax(np.abs(rest)))
-            measured, explained = self.shifts[["measured", "explained"]].to_numpy(dtype=float)[worst]
-            lines.append(
-                f"Damage of these groups does not explain all shifts: mode {self.shifts.index[worst]} moved by "
-                f"{measured:.2%}, explained {explained:.2%}."
-            )
-            if self.likely_cause:
-                lines.append(f"{self.likely_cause[0].upper()}{self.likely_cause[1:]}.")
-        elif np.isnan(self.misfit_p_value):
-            lines.append("There are no more modes than damaged groups, so that any shift can be explained.")
-        return "\n".join(lines)
+        lines = [*self.answer(), *self.limits(), *self.records.sentences()]
+        if any("±" in line for line in lines):
+            lines.append("The sign ± stands before two standard errors.")
+        return "\n".join(lines).replace(SPACE, " ")
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         """What is doubtful.
@@ -202,6 +218,7 @@ class IdentifiedDamage:
         text : str
             Of the warning.
         """
+        yield from self.records.warnings()
         if self.confused:
             sets = "; ".join(" and ".join(group) for group in self.confused)
             yield (

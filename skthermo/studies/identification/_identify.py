@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_flag, check_names
-from skthermo._arrays import Array, as_floats, as_random_state
+from skthermo._arrays import Array, as_floats, as_random_state, is_real
 from skthermo._frames import check_same_rows
-from skthermo._numbers import is_real
 from skthermo._validation import check_array
 from skthermo._warnings import warn_each, warn_user, warnings_once
+from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._frequency_effects import FrequencyEffects
@@ -126,9 +126,11 @@ def identify_damage(
     T = _named_as_in_fit(fem, T)
     with warnings_once():
         theta = as_floats(fem.predict_parameters(T))
+        left_out = left_out_rows(fem, T, theta, frequencies)
+        is_compared = ~np.any(list(left_out.values()), axis=0)
+        frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
         shift = measured_shift(fem, T, theta, frequencies, noise)
-    if not shift.n_records.any():
-        raise ValueError(f"none of {len(frequencies)} records has a frequency and all temperatures; expected some")
+    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
     incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
 
     def compared(effects: FrequencyEffects) -> Comparison:
@@ -150,7 +152,7 @@ def identify_damage(
     joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
     unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
     random = as_random_state(random_state)
-    found = findings(every.of(joined), nominal.of(joined), shift, unseen, significance, random)
+    found = findings(every.of(joined), nominal.of(joined), shift, records, unseen, significance, random)
     warn_each(found.warnings())
     return found
 

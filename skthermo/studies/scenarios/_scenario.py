@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from skthermo._arguments import check_names
-from skthermo._arrays import real_array
-from skthermo._numbers import HUGE, is_real
+from skthermo._arrays import HUGE, is_real, real_array
 from skthermo.studies.scenarios._base import (
     BaseScenario,
     check_groups,

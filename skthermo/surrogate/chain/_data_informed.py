@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arguments import check_flag, check_noise, integer_row
-from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
-from skthermo._frames import check_same_rows, column_names, frame_like
-from skthermo._names import as_mapping
-from skthermo._numbers import HUGE, is_real
-from skthermo._regressors import weights_for
+from skthermo._arguments import as_mapping, check_flag, check_noise, integer_row
+from skthermo._arrays import HUGE, Array, MatrixLike, as_columns, as_floats, as_random_state, is_real, real_array
+from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
+from skthermo._regressors import check_takes_weights, fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import (
+    CallbackSupport,
     Estimator,
     HasMethods,
     Interval,
+    Stages,
     StrOptions,
     _fit_context,
     check_array,
@@ -30,14 +31,14 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
-from skthermo._weather import TrainingRange
+from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
-from skthermo.surrogate.chain._parts import clone_parts, inputs_of_last_step, read_records, surrogates_in
+from skthermo.surrogate.chain._parts import clone_parts, default_part, inputs_of_last_step, read_records, surrogates_in
 from skthermo.surrogate.chain._records import TrainingRecords, WeatherResiduals
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
@@ -45,7 +46,7 @@ POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
-class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
+class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
     The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
@@ -58,7 +59,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
         M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets
-        this one.
+        this one. ``set_params(inverse__n_samples=500)`` puts the default inverse in the place of None, with ``reduce``
+        and ``n_jobs`` of the chain, and sets its parameter; so do the names of a grid search, and those of the mapper.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``; with thermal inertia, for example
         ``make_pipeline(LagFeatures(), TemperatureMapper())``.
@@ -77,6 +79,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
         Seed of every part that has no seed of its own.
+    verbose : bool or int, default=0
+        Whether `fit` prints a line with the time of each of its stages.
 
     Attributes
     ----------
@@ -90,6 +94,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         The training records, what M2 learned from them, and its residuals.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
+    sensors_ : SensorRegression
+        What each temperature sensor shows, given the others: fills missing temperatures.
     training_range_ : TrainingRange
         Lowest and highest value of each input of M2, lags included.
     box_ : Box or None
@@ -110,7 +116,9 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
     learns parameters in coordinates in which their errors count as those of frequencies do, free of the shrinkage that
     the inverse's prior causes, and rows with missing modes count less: by their posterior precision, if ``fit`` of the
     mapper takes ``sample_weight``. If temperatures are a frame, results are frames.
-    A row that cannot be computed is NaN; no row is dropped.
+    A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in the
+    training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as one
+    without any temperature, is NaN; no row is dropped.
 
     References
     ----------
@@ -140,6 +148,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
+        "verbose": ["verbose"],
     }
 
     def __init__(
@@ -153,6 +162,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         reduce: bool | float = False,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        verbose: bool | int = 0,
     ):
         self.model = model
         self.inverse = inverse
@@ -162,20 +172,27 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.reduce = reduce
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.verbose = verbose
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None) -> DataInformedFEM:
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, shapes: ArrayLike | None = None, sample_weight: ArrayLike | None = None
+    ) -> DataInformedFEM:
         """Learn how temperature moves the parameters.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius; NaN is allowed.
+            Temperatures in degrees Celsius; NaN is allowed, and filled from the other sensors.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies of the healthy structure in Hz; NaN is allowed.
         shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
             Measured mode shapes, real or complex, of any scale, sign and phase, NaN where a mode is missing; for an
             inverse with ``dofs``, whose order the sensors have.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each record in what M2 learns; those of a series are matched to the rows of a frame by index. They
+            are multiplied with the weights that rows with missing modes have. Records of weight 0 do not train M2 and
+            have no residuals; imputer, aligner and M1 see all records alike.
 
         Returns
         -------
@@ -187,7 +204,9 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         ValueError
             If lengths or indices differ, the number of modes is not the model's, a temperature
             is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
-            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``.
+            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``;
+            if weights are negative, NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose
+            ``fit`` takes none.
 
         Warns
         -----
@@ -204,18 +223,29 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.box_ = None if inverse is None else Box.of(inverse.bounds, self.parameter_names_)
         if shapes is None and shape_inputs_of(self.inverse_) is not None:
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes)")
+        weights = row_weights(sample_weight, X)
+        if weights is not None:
+            check_takes_weights(self.mapper_)
         warn_each(mode_warnings(self.model, F))
-        estimates = self._fit_inverse(T, F, shapes)
-        self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
-        targets = estimates.targets(self.inverse_, self.mapper_)
-        weights = weights_for(self.mapper_, estimates.weights)
-        self.mapper_.fit(T, frame_like(T, targets, self.parameter_names_), **weights)
-        inputs = inputs_of_last_step(self.mapper_, T)
-        self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, estimates.weights)
-        self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-        learned = possible(self.mapper_.predict(T))[0]
-        self.simulator_ = Simulator.around(self.model, learned, self.reduce)
-        self.report_ = report_of(self, estimates, learned)
+        stages = Stages(self, 4, X, y)
+        with stages.stage("inverse surrogate", self.inverse_):
+            aligned = self._fit_inverse(T, F, shapes)
+        with stages.stage("parameters of the records"):
+            estimates = Estimates.of(self.inverse_, aligned, self.parameter_names_)
+            self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
+            targets = estimates.targets(self.inverse_, self.mapper_)
+            weights = estimates.weighted(weights)
+        self.sensors_ = SensorRegression.of(T)
+        filled = frame_like(T, self.sensors_.fill(T)[0])
+        with stages.stage("temperature mapper", self.mapper_):
+            fit_weighted(self.mapper_, filled, frame_like(T, targets, self.parameter_names_), weights)
+        with stages.stage("report"):
+            inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
+            self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
+            self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
+            self.simulator_ = Simulator.around(self.model, learned, self.reduce)
+            self.report_ = report_of(self, estimates)
+        stages.end()
         warn_each(self.report_.warnings())
         return self
 
@@ -266,8 +296,14 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters; NaN where an input of M2 is missing, and, with a warning, where M2
+            Multipliers of the nominal parameters; with a warning, NaN where an input of M2 is missing, and where M2
             gives a physically impossible multiplier (less than 1e-6 or more than 1e6).
+
+        Warns
+        -----
+        UserWarning
+            If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
+            records; `predict`, `predict_interval` and `simulate` warn of the same.
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
@@ -297,15 +333,16 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             In Hz, in the measured domain.
         std : ndarray or DataFrame of shape (n_samples, n_modes)
             Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
-            weather, out of fold, in Hz. They contain the scatter of the measurement.
+            weather, out of fold, in Hz. They contain the scatter of the measurement, and what a missing temperature
+            costs.
         """
         check_flag(return_std, "return_std")
         frequencies = self._simulate(X)
         predicted = frame_like(X, frequencies, self.mode_names_)
         if not return_std:
             return predicted
-        spread = self.residuals_.spread(self._weather(X))
-        return predicted, frame_like(X, frequencies * spread, self.mode_names_)
+        std = np.hypot(self.residuals_.spread(self._weather(X)), self._cost_of_gaps(X))
+        return predicted, frame_like(X, frequencies * std, self.mode_names_)
 
     @overload
     def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
@@ -335,12 +372,15 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals: the training records are divided into five periods of time, and each is predicted by
-        a mapper fitted on the others. The width is a multiple of the spread of these residuals in similar weather; the
-        multiple is the order statistic that the periods themselves needed. If new records are exchangeable with the
+        Split-conformal intervals: the training records are divided into blocks of a week or more, which are dealt in
+        turn to five folds, and each fold is predicted by a mapper fitted to the others. The width is a multiple of the
+        spread of these residuals in similar weather; the multiple is the order statistic that the folds themselves
+        needed. If new records are exchangeable with the
         training records, the interval holds a mode with about the probability asked. Records of one structure are
         serially correlated, so that the share of a short period that is held varies more. Beyond the training range
-        there are no residuals to learn from, and the interval is widened by the distance (see `applicability`).
+        there are no residuals to learn from, and the interval is widened by the distance (see `applicability`). Where a
+        temperature was filled, it is widened by the change of the prediction when that temperature is wrong by its
+        standard deviation, sensor by sensor in quadrature.
 
         References
         ----------
@@ -363,6 +403,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         frequencies = self._simulate(X)
         margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
+        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self._cost_of_gaps(X))
         bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
         lowest, highest = (frame_like(X, bound, self.mode_names_) for bound in bounds)
         return lowest, highest
@@ -419,10 +460,9 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Mass added to the model's in kg; a vector holds lumped masses.
         noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
             Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals of a whole training record of similar weather: their scatter out of fold, around the mean that
-            the fit leaves in such weather. So modes scatter together, scatter more in frost, and are missing as in the
-            training records. Runs of consecutive records are drawn if residuals are serially correlated; rows of X
-            should then be in order of time.
+            residuals of a whole training record of similar weather, out of fold. So modes scatter together, scatter
+            more in frost, and are missing as in the training records. Runs of consecutive records are drawn if
+            residuals are serially correlated; rows of X should then be in order of time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -563,6 +603,21 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
 
+    def training_shares(self, X: ArrayLike) -> Array:
+        """Share of each training record in the mean of `expected_residuals` over some rows.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray of shape (n_records, n_modes)
+            For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
+        """
+        return self.residuals_.shares(self._weather(X))
+
     @property
     def training_records_(self) -> tuple[Any, Any]:
         """Temperatures and frequencies that `fit` was given."""
@@ -592,7 +647,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
             parameter is outside the bounds of the inverse.
         """
-        T = self._temperatures(X)
+        T = self._temperatures(X)[0]
         inputs = inputs_of_last_step(self.mapper_, T)
         excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
@@ -600,7 +655,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
-    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
 
         Parameters
@@ -609,6 +664,8 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             Temperatures in degrees Celsius.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each record; those of a series are matched to the rows of a frame by index.
 
         Returns
         -------
@@ -626,7 +683,7 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_floats(y) + as_floats(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
-        return complete_r2(y, predicted)
+        return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -634,8 +691,11 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         tags.target_tags.single_output = False
         return tags
 
-    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Estimates:
-        """Fill gaps, fit aligner and M1; what they find for the training records."""
+    def _default_part(self, name: str) -> BaseEstimator | None:
+        return default_part(self, name)
+
+    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Any:
+        """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
             F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
@@ -643,22 +703,39 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
         self.inverse_.fit(aligned)
         if shapes is not None:
             warn_each(shape_warnings(self.inverse_, aligned))
-        return Estimates.of(self.inverse_, aligned, self.parameter_names_)
+        return aligned
 
-    def _temperatures(self, X: ArrayLike) -> Any:
-        """Temperatures, checked; a frame stays a frame."""
+    def _temperatures(self, X: ArrayLike) -> tuple[Any, Array]:
+        """Temperatures, checked and filled, a frame as a frame; standard deviations of what was filled."""
         check_is_fitted(self)
-        return frame_like(X, validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False))
+        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        filled, deviations = self.sensors_.fill(values)
+        return frame_like(X, filled), deviations
 
     def _weather(self, X: ArrayLike) -> Array:
         """Inputs of M2."""
-        T = self._temperatures(X)
-        return as_floats(inputs_of_last_step(self.mapper_, T))
+        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)[0]))
+
+    def _cost_of_gaps(self, X: ArrayLike) -> Array:
+        """Relative standard deviations of predictions because temperatures were filled, (n_samples, n_modes).
+
+        The change of the prediction when those of a sensor are wrong by their standard deviation, in quadrature.
+        """
+        T, deviations = self._temperatures(X)
+        theta, variances = as_columns(self.mapper_.predict(T)), np.zeros((len(T), len(self.mode_names_)))
+        for sensor in np.flatnonzero((deviations > 0).any(axis=0)):
+            errors = np.where(np.arange(deviations.shape[1]) == sensor, np.nan_to_num(deviations), 0.0)
+            moved = as_columns(self.mapper_.predict(T + errors))
+            rows = np.flatnonzero((moved != theta).any(axis=1) & ~np.isnan(theta).any(axis=1))
+            variances[rows] += (self._frequencies(moved[rows]) / self._frequencies(theta[rows]) - 1) ** 2
+        return np.sqrt(variances)
 
     def _predict_theta(self, X: ArrayLike) -> Array:
-        """Parameters at given temperatures; warns of weather outside the training range and impossible parameters."""
-        T = self._temperatures(X)
-        message = self.training_range_.warning(inputs_of_last_step(self.mapper_, T))
+        """Parameters at given temperatures; warns of what was filled, unknown weather and impossible parameters."""
+        T, deviations = self._temperatures(X)
+        inputs = inputs_of_last_step(self.mapper_, T)
+        warn_each(gap_warnings(T, deviations, as_floats(inputs)))
+        message = self.training_range_.warning(inputs)
         if message:
             warn_user(message, "weather outside the training range")
         theta, impossible = possible(self.mapper_.predict(T))
@@ -700,6 +777,32 @@ class DataInformedFEM(SavesFrames, RegressorMixin, Estimator):
             theta = np.hstack([theta, 1 - severities])
         frequencies = simulator.frequencies(theta, self.n_jobs)
         return frequencies if modes is not None else as_floats(self.aligner_.inverse_transform(frequencies))
+
+
+def gap_warnings(T: Any, deviations: Array, inputs: Array) -> Iterator[tuple[str, str]]:
+    """Warnings about temperatures that were filled, and rows that cannot be predicted: kind and text of each."""
+    filled, n_rows = deviations > 0, len(deviations)
+    if filled.any():
+        sensors = [
+            f"{name!r} in {rows.sum()} of {n_rows} rows (standard deviation {sizes[rows].mean():.2g} degrees)"
+            for name, rows, sizes in zip(column_names(T, "T"), filled.T, deviations.T, strict=True)
+            if rows.any()
+        ]
+        yield (
+            "filled temperatures",
+            f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; standard deviations and "
+            "intervals of predictions are widened by what that costs",
+        )
+    unknown = np.isnan(inputs).any(axis=1)
+    if unknown.any():
+        empty = np.isnan(as_floats(T)).any(axis=1)
+        causes = {"without any temperature": unknown & empty, "with lags that reach where none is": unknown & ~empty}
+        counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
+        yield (
+            "rows that cannot be predicted",
+            f"{unknown.sum()} of {n_rows} rows cannot be predicted and are NaN: {counts}; expected the records before "
+            "them, too, and at least one sensor that works",
+        )
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:

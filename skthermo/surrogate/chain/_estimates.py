@@ -62,6 +62,12 @@ class Estimates:
             )
         return cls(as_floats(found.theta), found.residuals, found.weight, int(unconverged(found).sum()))
 
+    def weighted(self, weights: Array | None) -> Array | None:
+        """Weights of rows multiplied with a user's own; None where there are neither."""
+        if weights is None or self.weights is None:
+            return self.weights if weights is None else weights
+        return weights * self.weights
+
     def targets(self, inverse: Any, mapper: Any) -> Array:
         """What M2 learns: theta or, in coordinates of frequencies, theta without the shrinkage of the inverse's prior.
 

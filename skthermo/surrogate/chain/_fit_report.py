@@ -15,6 +15,7 @@ from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names
 from skthermo._saved_frames import SavesFrames
 from skthermo._validation import last_step
+from skthermo._weather import SensorRegression
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.surrogate.chain._estimates import Estimates
@@ -43,6 +44,9 @@ class FitReport(SavesFrames):
         Rows given, and rows that trained the temperature mapper.
     left_out : Series
         Rows that did not train the mapper, by reason; a row may have several reasons.
+    filled : DataFrame
+        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, and the
+        ``standard deviation`` of what was filled, in degrees.
     offsets : Series
         Mean measured frequency against the model's nominal one, by mode, in percent.
     n_outside : int or None
@@ -72,13 +76,14 @@ class FitReport(SavesFrames):
     >>> year = make_truss_campaign(random_state=0)
     >>> year.temperatures.iloc[10:15, 0] = float("nan")
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    >>> fem.report_.n_trained, fem.report_.left_out.to_dict()
-    (360, {"temperature 'T1' is missing": 5})
+    >>> fem.report_.n_trained, fem.report_.filled["rows"].to_dict()
+    (365, {'T1': 5})
     """
 
     n_rows: int
     n_trained: int
     left_out: pd.Series
+    filled: pd.DataFrame
     offsets: pd.Series
     n_outside: int | None
     outside: pd.Series
@@ -100,6 +105,16 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        lines += [
+            f"Filled from the other sensors: {rows:.0f} temperatures of {name!r} (standard deviation {deviation:.2g})."
+            for name, rows, deviation in self.filled.itertuples()
+        ]
+        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        if n_parameters > n_modes:
+            lines.append(
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
+                "apart."
+            )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
@@ -130,15 +145,21 @@ class FitReport(SavesFrames):
             reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
             yield (
                 "half of the rows",
-                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); fill gaps "
-                "first: temperatures by KNNGapImputer().fit_transform(T), frequencies by "
-                "DataInformedFEM(..., imputer=KNNGapImputer())",
+                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected "
+                "records at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
             )
         if self.n_trained < ROWS_PER_PARAMETER * n_parameters:
             yield (
                 "few rows",
                 f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
                 f"{ROWS_PER_PARAMETER} rows for each",
+            )
+        mostly = self.filled[2 * self.filled["rows"] > self.n_rows]
+        for name, rows, deviation in mostly.itertuples():
+            yield (
+                f"mostly filled {name}",
+                f"the temperature {name!r} is missing in {rows:.0f} of {self.n_rows} rows and was filled from the "
+                f"others (standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
             )
         chain, mean = self.errors.mean()
         if chain > WORSE_THAN_MEAN * mean:
@@ -161,12 +182,12 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
-    """The report of a chain that is fitted otherwise, given the parameters learned for the training weather."""
+def report_of(chain: Any, estimates: Estimates) -> FitReport:
+    """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-    measured, predicted = F[rows], chain.simulator_.frequencies(learned[rows], chain.n_jobs, warn=False)
+    measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
     predicted = as_floats(chain.aligner_.inverse_transform(predicted))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
@@ -178,6 +199,7 @@ def report_of(chain: Any, estimates: Estimates, learned: Array) -> FitReport:
         n_rows=len(theta),
         n_trained=int(records.trained.sum()),
         left_out=left_out(records, theta),
+        filled=filled(records.temperatures, chain.sensors_),
         offsets=mode_offsets(chain.model, records.frequencies),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
@@ -196,6 +218,14 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
+def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
+    """How many temperatures were filled, and their standard deviation, by sensor."""
+    deviations = sensors.fill(T)[1]
+    rows = (deviations > 0).sum(axis=0)
+    table = {"rows": rows, "standard deviation": np.nansum(deviations, axis=0) / np.maximum(rows, 1)}
+    return pd.DataFrame(table, index=column_names(T, "T"), dtype=float)[rows > 0]
+
+
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     """Rows that do not train the mapper, by reason."""
     T, F, inputs, trained = records.temperatures, records.frequencies, records.inputs, records.trained
@@ -207,6 +237,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
             reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
     reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
+    reasons["their weight is 0"] = int((~records.counted).sum())
     reasons["no parameters were found"] = int((complete_F & without_theta).sum())
     counts = pd.Series(reasons, dtype=int)
     return counts[counts > 0]

@@ -17,13 +17,14 @@ from skthermo.surrogate.inverse import InverseSurrogate
 
 
 def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
-    """Temperatures and frequencies, checked; frames stay frames."""
+    """Copies of temperatures and frequencies, checked; frames stay frames."""
     model = chain.model
     check_model(model)
     if y is None:
         raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-    temperatures = validate_data(chain, X, dtype=np.float64, ensure_all_finite="allow-nan", ensure_min_samples=2)
-    T, F = frame_like(X, temperatures), frame_like(y, check_array(y, dtype=np.float64, ensure_all_finite="allow-nan"))
+    options = {"dtype": np.float64, "ensure_all_finite": "allow-nan", "copy": True}
+    temperatures = validate_data(chain, X, ensure_min_samples=2, **options)
+    T, F = frame_like(X, temperatures), frame_like(y, check_array(y, **options))
     check_same_rows(X, y, ("temperatures", "frequencies"))
     if F.shape[1] != model.n_modes:
         raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
@@ -41,12 +42,18 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
     return T, F
 
 
+def default_part(chain: Any, name: str) -> Any:
+    """What inverse and mapper are where they are None; None for other parameters."""
+    if name == "inverse":
+        return InverseSurrogate(reduce=chain.reduce, n_jobs=chain.n_jobs)
+    return TemperatureMapper() if name == "mapper" else None
+
+
 def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
     """Clones of inverse, mapper, aligner and imputer, with the chain's model, and seeds where they have none."""
-    default_inverse = InverseSurrogate(reduce=chain.reduce, n_jobs=chain.n_jobs)
     unchanged = FunctionTransformer().set_output(transform="default")
-    inverse = default_inverse if chain.inverse is None else clone(chain.inverse)
-    mapper = TemperatureMapper() if chain.mapper is None else clone(chain.mapper)
+    inverse = default_part(chain, "inverse") if chain.inverse is None else clone(chain.inverse)
+    mapper = default_part(chain, "mapper") if chain.mapper is None else clone(chain.mapper)
     aligner = unchanged if chain.aligner == "passthrough" else clone(chain.aligner)
     imputer = None if chain.imputer == "passthrough" else clone(chain.imputer)
     names = list(chain.model.parameter_names)

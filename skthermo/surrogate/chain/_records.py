@@ -6,25 +6,36 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.base import clone
-from sklearn.model_selection import KFold
+from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._dependence import correlation_time
-from skthermo._regressors import weights_for
+from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
-from skthermo._times import row_times
+from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
-from skthermo._weather import TrainingRange, nearest, order_statistic, weather_coordinates
+from skthermo._warnings import warn_user
+from skthermo._weather import TrainingRange, nearest_in_parts, one_in_each_part, order_statistic, weather_coordinates
+from skthermo.preprocessing import BlockedKFold
 
 N_FOLDS = 5
+CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
+WEEK = pd.Timedelta("7D")
+BLOCKS = 52  # into which records without stamps are divided at most
+BEYOND = 0.1  # share of the range of the other folds outside which weather counts as unseen
+UNSEEN = 0.1  # share of the records of a fold in unseen weather that gives a warning
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
 OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
+MOST_PLACES = 20_000  # number of records among which neighbours are looked for
+MOST_SIMILAR = 500  # number of similar records that stand for all of them
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,7 @@ class WeatherResiduals:
 
     ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
-    mapper that learned from all records. ``folds`` are the periods of time.
+    mapper that learned from all records. ``folds`` tells which records were predicted together.
     """
 
     weather: Array
@@ -51,43 +62,42 @@ class WeatherResiduals:
         """The records in these coordinates."""
         return self.coordinates.transform(self.weather)
 
-    def spread(self, weather: Array) -> Array:
-        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
-        return self._where_known(weather, lambda known: self._spread(known, np.ones(len(self.values), dtype=bool)))
-
-    def expected(self, weather: Array) -> Array:
-        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
-        everywhere = np.ones(len(self.own), dtype=bool)
-        return self._where_known(weather, lambda known: self._similar_mean(self.own, known, everywhere))
-
-    def n_expected(self, weather: Array) -> Array:
-        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,)."""
-        known = weather[~np.isnan(weather).any(axis=1)]
-        return self._n_similar(known, np.ones(len(self.own), dtype=bool)) if len(known) else np.zeros(self.n_modes)
-
     @property
     def n_modes(self) -> int:
         """Number of modes."""
         return self.values.shape[1]
 
-    def by_period(self, n_periods: int) -> list[tuple[Array, Array]]:
-        """Residuals of each of some periods less those that the other periods have in similar weather.
+    def spread(self, weather: Array) -> Array:
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
+        return self._where_known(weather, lambda known: self._spread(known, self._all))
 
-        With the effective sample size, (n_modes,), of the mean of what is subtracted. The mapper of all records gives
-        both, so that its own error in such weather cancels, unless it follows its own records too closely.
-        """
-        residuals = self.values if self._is_overfitted else self.own
-        parts = []
-        for period in np.array_split(np.arange(len(self.values)), n_periods):
-            others = np.ones(len(self.values), dtype=bool)
-            others[period] = False
-            weather = self.weather[period]
-            similar = self._similar_mean(residuals, weather, others)
-            parts.append((residuals[period] - similar, self._n_similar(weather, others)))
-        return parts
+    def expected(self, weather: Array) -> Array:
+        """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
+        return self._where_known(weather, lambda known: self._similar_mean(self.own, known, self._all))
+
+    def shares(self, weather: Array) -> Array:
+        """Share of each record in the mean of the expected residuals over all rows, (n_records, n_modes)."""
+        shares = np.zeros_like(self.values)
+        weather = weather[~np.isnan(weather).any(axis=1)]
+        wanted = self.coordinates.transform(weather) if len(weather) else weather
+        for modes, known in self._present(self.values, self._all, int(MOST_SIMILAR / SIMILAR)):
+            counts = np.zeros(len(known))
+            for _, _, near in nearest_in_parts(self.places[known], wanted, self._n_compared):
+                counts += np.bincount(near.ravel(), minlength=len(known))
+            shares[np.ix_(known, modes)] = (counts / max(counts.sum(), 1))[:, np.newaxis]
+        return shares
+
+    def n_expected(self, weather: Array) -> Array:
+        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,); 0 without any."""
+        squares = (self.shares(weather) ** 2).sum(axis=0)
+        return np.divide(1.0, squares, out=np.zeros(self.n_modes), where=squares > 0)
+
+    def less_similar(self, values: Array) -> Array:
+        """Values of the records, (n_records, n_columns), less the mean of those in similar weather."""
+        return values - self._similar_mean(values, self.weather, self._all)
 
     @property
-    def _is_overfitted(self) -> bool:
+    def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
         own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
         return bool((own < OVERFITTED * out_of_fold).any())
@@ -103,15 +113,21 @@ class WeatherResiduals:
         of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
         Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self.noise[self._drawn(known, random_state)])
+        return self._where_known(weather, lambda known: self.values[self._drawn(known, random_state)])
 
     def _drawn(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records drawn for each row."""
         places, n_records = self.coordinates.transform(weather), len(self.places)
-        near = nearest(self.places, places, DRAWN_FROM)[1]
-        farthest = nearest(self.places, places, max(DRAWN_FROM, int(SIMILAR * n_records)))[0][:, -1]
-        ends = random_state.uniform(size=len(places)) < 1 / self._mean_block_length
-        fresh = near[np.arange(len(places)), random_state.randint(near.shape[1], size=len(places))]
+        mean_length = max(1.0, 2 * self.correlation_time - 1)
+        ends = random_state.uniform(size=len(places)) < 1 / mean_length
+        some, similar = (one_in_each_part(n_records, most) for most in (MOST_PLACES, int(MOST_SIMILAR / SIMILAR)))
+        which = random_state.randint(min(DRAWN_FROM, len(some)), size=len(places))
+        fresh, farthest = np.empty(len(places), dtype=np.intp), np.empty(len(places))
+        for part, _, near in nearest_in_parts(self.places[some], places, DRAWN_FROM):
+            fresh[part] = some[near[np.arange(len(near)), which[part]]]
+        n_similar = max(DRAWN_FROM, int(SIMILAR * len(similar)))
+        for part, distances, _ in nearest_in_parts(self.places[similar], places, n_similar):
+            farthest[part] = distances[:, -1]
         taken = np.empty(len(places), dtype=int)
         record = n_records
         for row in range(len(places)):
@@ -123,13 +139,14 @@ class WeatherResiduals:
         return taken
 
     @cached_property
-    def noise(self) -> Array:
-        """Scatter of the records around what similar weather shows out of fold, and what the mapper leaves there.
+    def correlation_time(self) -> float:
+        """The longest of all modes, in records, of what similar weather does not explain."""
+        means = self._local_mean(self.values, self.weather, self._all, SPREAD_OF, MOST_PLACES)
+        return max(correlation_time(column) for column in (self.values - means).T)
 
-        A fold that must extrapolate has an error that the mapper of all records has not.
-        """
-        similar = self._similar_mean(self.values, self.weather, np.ones(len(self.values), dtype=bool))
-        return self.values - similar + self.expected(self.weather)
+    @property
+    def _all(self) -> NDArray[np.bool_]:
+        return np.ones(len(self.values), dtype=bool)
 
     def _where_known(self, weather: Array, of_known: Callable[[Array], Array]) -> Array:
         """Results for the rows of weather that are complete, NaN for others."""
@@ -141,94 +158,136 @@ class WeatherResiduals:
 
     def _similar_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """Mean of some records' values in weather most like that of each row, mode by mode."""
-        means = np.full((len(weather), values.shape[1]), np.nan)
-        for mode, near in enumerate(self._similar(values, weather, rows)):
-            if near.size:
-                means[:, mode] = values[near, mode].mean(axis=1)
+        return self._local_mean(values, weather, rows, self._n_compared, int(MOST_SIMILAR / SIMILAR))
+
+    @property
+    def _n_compared(self) -> int:
+        return int(np.clip(SIMILAR * len(self.values), COMPARED_WITH, MOST_SIMILAR))
+
+    def _local_mean(self, values: Array, weather: Array, rows: NDArray[np.bool_], number: int, most: int) -> Array:
+        """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
+        wanted, means = self.coordinates.transform(weather), np.full((len(weather), values.shape[1]), np.nan)
+        for modes, known in self._present(values, rows, most):
+            of_known = values[np.ix_(known, modes)]
+            for part, _, near in nearest_in_parts(self.places[known], wanted, number):
+                ends = np.arange(0, near.size + 1, near.shape[1])
+                sums = scipy.sparse.csr_array((np.ones(near.size), near.ravel(), ends), (len(near), len(known)))
+                means[part, modes] = sums @ of_known / near.shape[1]
         return means
 
-    def _n_similar(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
-        """The reciprocal of the sum of squared weights that records have in the mean over all rows; 0 without any."""
-        shares = [np.bincount(near.ravel()) / max(near.size, 1) for near in self._similar(self.values, weather, rows)]
-        return np.array([1 / (share**2).sum() if share.size else 0.0 for share in shares])
-
-    def _similar(self, values: Array, weather: Array, rows: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
-        """For each mode, positions of the records with weather most like that of each row, (n_samples, n_similar)."""
-        wanted, number = self.coordinates.transform(weather), max(COMPARED_WITH, int(SIMILAR * len(values)))
-        found: dict[bytes, NDArray[np.intp]] = {}  # modes that are there in the same records have the same neighbours
-        for column in values.T:
-            known = np.flatnonzero(rows & ~np.isnan(column))
-            if known.tobytes() not in found:
-                near = known[nearest(self.places[known], wanted, number)[1]] if known.size else known
-                found[known.tobytes()] = near
-            yield found[known.tobytes()]
+    def _present(
+        self, values: Array, rows: NDArray[np.bool_], most: int
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Modes that are there in the same records, and positions of these among some rows, or of so many of them."""
+        present = (rows[:, np.newaxis] & ~np.isnan(values)).T
+        masks, of_mode = patterns(present)
+        for pattern, mask in enumerate(masks):
+            known = np.flatnonzero(mask)
+            if known.size:
+                yield np.flatnonzero(of_mode == pattern), known[one_in_each_part(len(known), most)]
 
     def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
         """The spread that some of the records give, the wider the farther weather is beyond their range."""
-        wanted, spread = self.coordinates.transform(weather), np.empty((len(weather), self.values.shape[1]))
-        for mode, values in enumerate(self.values.T):
-            known = np.flatnonzero(rows & ~np.isnan(values))
-            near = known[nearest(self.places[known], wanted, SPREAD_OF)[1]] if known.size else known
-            spread[:, mode] = np.sqrt((values[near] ** 2).mean(axis=1)) if known.size else np.inf
+        squares = self._local_mean(self.values**2, weather, rows, SPREAD_OF, MOST_PLACES)
         excess = TrainingRange.of(self.weather, rows).excess(weather).mean(axis=1)
-        return spread * (1 + excess)[:, np.newaxis]
+        return np.sqrt(np.where(np.isnan(squares), np.inf, squares)) * (1 + excess)[:, np.newaxis]
 
     @cached_property
     def _scores(self) -> Array:
-        """Absolute residuals over the spread that the records of the other periods give for their weather."""
+        """Absolute residuals over the spread that the records of the other folds give for their weather."""
         scores = np.empty_like(self.values)
         for fold in np.unique(self.folds):
             test = self.folds == fold
             scores[test] = np.abs(self.values[test]) / self._spread(self.weather[test], ~test)
         return scores
 
-    @cached_property
-    def _mean_block_length(self) -> float:
-        """Mean length of the runs: twice the correlation time of what similar weather does not explain, minus one."""
-        near = nearest(self.places, self.places, SPREAD_OF)[1]
-        filled = np.where(np.isnan(self.values), 0.0, self.values)
-        means = filled[near].sum(axis=1) / np.maximum((~np.isnan(self.values))[near].sum(axis=1), 1)
-        return max(1.0, 2 * max(correlation_time(column) for column in (self.values - means).T) - 1)
-
 
 @dataclass
 class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
-    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, and ``weights`` those of the
-    rows, or None. ``residuals`` are out of fold, and None until they have been computed.
+    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
+    gives for the inputs, and ``weights`` those of the rows, or None. ``residuals`` are out of fold, and None until they
+    have been computed.
     """
 
     temperatures: Any
     frequencies: Any
     inputs: Array
     targets: Array
+    learned: Array
     weights: Array | None
     residuals: WeatherResiduals | None = None
 
     @property
     def trained(self) -> NDArray[np.bool_]:
         """Which rows trained M2."""
-        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1))
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1)) & self.counted
 
-    def out_of_fold(self, mapper: Any, frequencies_of: Callable[[Array], Array]) -> WeatherResiduals:
-        """Relative residuals of the records, each predicted by a mapper fitted on other periods of time.
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which rows have a weight, or had no mode that could give them one."""
+        if self.weights is None:
+            return np.ones(len(self.inputs), dtype=bool)
+        return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-        Given are the fitted mapper, and the function from parameters to frequencies as they would be measured.
+    def out_of_fold(
+        self, mapper: Any, frequencies_of: Callable[[Array], Array], folds: BaseCrossValidator | None = None
+    ) -> WeatherResiduals:
+        """Relative residuals of the records, each predicted by a mapper fitted to the other folds.
+
+        Given are the fitted mapper, and the function from parameters to frequencies as they would be measured. By
+        default, a fold holds every fifth of blocks of a week, or longer if the residuals remember for longer.
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
-        inputs, theta, measured = self.inputs[order], self.targets[order], as_floats(self.frequencies)[order]
-        rows = np.flatnonzero(~np.isnan(inputs).any(axis=1) & ~np.isnan(measured).all(axis=1))
-        usable = ~np.isnan(theta[rows]).any(axis=1)
+        measured = as_floats(self.frequencies)
+        known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
+        order = order[known[order]]
+        inputs, theta, measured = self.inputs[order], self.targets[order], measured[order]
+        usable = ~np.isnan(theta).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
             raise ValueError(f"{usable.sum()} records have parameters; expected at least {2 * N_FOLDS} for residuals")
-        learner, predicted, folds = last_step(mapper), np.full_like(theta[rows], np.nan), np.empty(len(rows), dtype=int)
-        for fold, (train, test) in enumerate(KFold(N_FOLDS).split(rows)):
+        own = measured / frequencies_of(self.learned[order]) - 1
+        records = as_frame(self.temperatures).iloc[order]
+        if folds is None:
+            known = ~np.isnan(own).all(axis=1)
+            in_sample = WeatherResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
+            folds = BlockedKFold(N_FOLDS, block=block_length(records, CORRELATION_TIMES * in_sample.correlation_time))
+        learner, predicted, fold_of = last_step(mapper), np.full_like(theta, np.nan), np.zeros(len(order), dtype=int)
+        for fold, (train, test) in enumerate(folds.split(records)):
             train = train[usable[train]]
-            weights = None if self.weights is None else self.weights[order][rows][train]
-            fitted = clone(learner).fit(inputs[rows][train], theta[rows][train], **weights_for(learner, weights))
-            predicted[test], folds[test] = as_columns(fitted.predict(inputs[rows][test])), fold
-        own = as_columns(mapper.predict(self.temperatures))[order][rows]
-        values, own = (measured[rows] / frequencies_of(theta) - 1 for theta in (predicted, own))
+            weights = None if self.weights is None else self.weights[order][train]
+            fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
+            predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
+        warn_of_unseen(inputs, fold_of)
+        values = measured / frequencies_of(predicted) - 1
         known = ~np.isnan(values).all(axis=1)
-        return WeatherResiduals(inputs[rows][known], values[known], own[known], folds[known])
+        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known])
+
+
+def as_frame(table: Any) -> pd.DataFrame:
+    """A frame of records, of which the index tells the times."""
+    return table if isinstance(table, pd.DataFrame) else pd.DataFrame(as_floats(table), copy=False)
+
+
+def block_length(records: pd.DataFrame, least: float) -> Any:
+    """Of blocks of records in order of time: a week, or a 52nd of the records, and no fewer records than the least."""
+    if not has_stamps(records):
+        return int(np.ceil(max(len(records) / BLOCKS, least)))
+    return max(WEEK, least * pd.Series(records.index).diff().median())
+
+
+def warn_of_unseen(inputs: Array, folds: NDArray[np.intp]) -> None:
+    """Warn if much of the weather of a fold lies outside that of the others."""
+    shares = []
+    for fold in np.unique(folds):
+        test = folds == fold
+        excess = TrainingRange.of(inputs, ~test).excess(inputs[test])
+        shares.append((excess.max(axis=1) > BEYOND).mean())
+    if max(shares) > UNSEEN:
+        warn_user(
+            f"{max(shares):.0%} of the records of fold {int(np.argmax(shares)) + 1} of {len(shares)} are in weather "
+            "that the other folds have not seen: their residuals, and so standard deviations, intervals and noise, are "
+            "those of guesses; expected records of each season in each fold, as of a whole year or more",
+            "unseen weather in folds",
+        )

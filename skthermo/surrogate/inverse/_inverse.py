@@ -16,7 +16,15 @@ from sklearn.utils import Bunch, check_random_state
 from skthermo._arguments import check_model, check_theta
 from skthermo._arrays import Array, Bounds, as_floats
 from skthermo._frames import frame_like
-from skthermo._validation import HasMethods, Interval, TransformerMixin, _fit_context, check_is_fitted
+from skthermo._validation import (
+    CallbackSupport,
+    HasMethods,
+    Interval,
+    Stages,
+    TransformerMixin,
+    _fit_context,
+    check_is_fitted,
+)
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate
 from skthermo.surrogate._networks import default_network
@@ -30,7 +38,7 @@ DEFAULT_STEPS = 100
 MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given
 
 
-class InverseSurrogate(TransformerMixin, MultiplierRegressor):
+class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
@@ -84,6 +92,8 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
         Seed of the samples, of the noise, and of the regressor unless it has its own seed.
+    verbose : bool or int, default=0
+        Whether `fit` prints a line with the time of each of its stages.
 
     Attributes
     ----------
@@ -171,6 +181,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         "memory": [str, HasMethods(["cache"]), None],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
+        "verbose": ["verbose"],
     }
 
     def __init__(
@@ -190,6 +201,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         memory: str | Memory | None = None,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        verbose: bool | int = 0,
     ):
         self.model = model
         self.regressor = regressor
@@ -205,6 +217,7 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self.memory = memory
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.verbose = verbose
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike | None = None, y: ArrayLike | None = None) -> InverseSurrogate:
@@ -241,14 +254,19 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         self.n_steps_ = self._n_steps()
         self.columns_ = InverseColumns.of(self)
         self.shape_inputs_ = self.columns_.shapes
-        if self.model is None or y is not None:
-            self._learn_pairs(X, y, seed)
+        is_simulated = self.model is not None and y is None
+        n_learned = 1 + bool(self.narrow_bounds)
+        stages = Stages(self, (2 * n_learned if is_simulated else 1) + (self.n_steps_ > 0), X, y)
+        if is_simulated:
+            self._learn_simulations(X, random, seed, stages)
         else:
-            self._learn_simulations(X, random, seed)
+            self._learn_pairs(X, y, seed, stages)
         if self.n_steps_:
-            self.refinement_ = Refinement.of(self)
-            measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
-            self.scatter_ = self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+            with stages.stage("scatter of the records"):
+                self.refinement_ = Refinement.of(self)
+                measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
+                self.scatter_ = self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+        stages.end()
         return self
 
     @overload
@@ -463,7 +481,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             is_differentiable = hasattr(self.model, "linearised_modes")
         return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
 
-    def _learn_pairs(self, X: ArrayLike | None, y: ArrayLike | None, seed: np.random.RandomState | None) -> None:
+    def _learn_pairs(
+        self, X: ArrayLike | None, y: ArrayLike | None, seed: np.random.RandomState | None, stages: Stages
+    ) -> None:
         """Learn from given frequencies and parameters."""
         inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
         if self.model is not None:
@@ -473,22 +493,35 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             if self.shape_inputs_ is not None:
                 self.columns_.check(self, X)
         self.box_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
-        self._learn_inverse(inputs, theta, seed)
+        with stages.stage("regressor"):
+            self._learn_inverse(inputs, theta, seed)
 
     def _learn_simulations(
-        self, X: ArrayLike | None, random: np.random.RandomState, seed: np.random.RandomState | None
+        self,
+        X: ArrayLike | None,
+        random: np.random.RandomState,
+        seed: np.random.RandomState | None,
+        stages: Stages,
     ) -> None:
         """Learn from simulations, and once more from a narrower box if that is asked for."""
         check_model(self.model)
         self.columns_.check(self, X)
         self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
-        training = SimulatedTraining.of(self, random)
-        self._learn_inverse(self.columns_.noisy(training.samples, self.noise, random), training.samples.theta, seed)
+        with stages.stage("simulations"):
+            training = SimulatedTraining.of(self, random)
+        with stages.stage("regressor"):
+            self._learn_samples(training.samples, random, seed)
         if self.narrow_bounds:
-            estimates = np.empty((0, 1)) if X is None else self._estimate(self.columns_.read(self, X))[0]
-            training = training.narrower(self, random, estimates)
-            self._learn_inverse(self.columns_.noisy(training.samples, self.noise, random), training.samples.theta, seed)
+            with stages.stage("narrower simulations"):
+                estimates = np.empty((0, 1)) if X is None else self._estimate(self.columns_.read(self, X))[0]
+                training = training.narrower(self, random, estimates)
+            with stages.stage("regressor again"):
+                self._learn_samples(training.samples, random, seed)
         self.box_, self.samples_, self.simulator_ = training.box, training.samples, training.simulator
+
+    def _learn_samples(self, samples: Bunch, random: np.random.RandomState, seed: np.random.RandomState | None) -> None:
+        """Fit the regressor to simulated samples with noise."""
+        self._learn_inverse(self.columns_.noisy(samples, self.noise, random), samples.theta, seed)
 
     def _learn_inverse(self, inputs: Array, theta: Array, seed: np.random.RandomState | None) -> None:
         """Fit the regressor, which sees scores in place of the components of shapes."""

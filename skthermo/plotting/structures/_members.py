@@ -4,12 +4,12 @@ from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes, one_axes
 from skthermo.plotting._style import BLACK, drawing, pyplot
+from skthermo.plotting.structures._view import View
 
 TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
 ELEVATION, AZIMUTH = 22, -60
@@ -25,17 +25,24 @@ def check_structure(structure: Any, groups: Iterable[str] | None) -> None:
             raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
 
 
-def structure_axes(ax: Axes, structure: Structure, width: float) -> Axes:
-    """Axes of the structure's dimension: those that are given, or those of a new figure."""
+def structure_axes(ax: Axes, view: View, width: float) -> Axes:
+    """Axes of a plane or of space: those that are given, or those of a new figure."""
     if ax is None:
-        height = width * height_of(np.array(list(structure.nodes.values()))) + 0.8
-        if structure.dimension == 2:
+        ratio = height_of(np.array(list(view.nodes.values())))
+        width /= max(ratio, 1.0)  # tall structures are as high as others are wide
+        height = width * ratio + 0.8
+        if not view.is_space:
             return one_axes(None, (width, height))
         return space_axes(pyplot().figure(figsize=(width, height)))
     ax = one_axes(ax, (width, width))
-    if structure.dimension == 3 and not hasattr(ax, "get_zlim"):
-        raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+    check_axes(ax, view)
     return ax
+
+
+def check_axes(ax: Axes, view: View) -> None:
+    """Raise an error for flat axes where a structure needs space."""
+    if view.is_space and not hasattr(ax, "get_zlim"):
+        raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
 
 
 def height_of(points: Array) -> float:
@@ -135,22 +142,15 @@ def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> An
     return collection
 
 
-def draw_supports(ax: Axes, structure: Structure, size: float = 11.0) -> dict[str, Any]:
-    """Triangles below nodes whose translations are fixed: filled where all are, open where some are free."""
-    translations = ("x", "y", "z")[: structure.dimension]
-    places: dict[str, list[NDArray]] = {"fixed in every direction": [], "free in some direction": []}
-    for node, along in structure.supports.items():
-        n_fixed = sum(direction in along for direction in translations)
-        if n_fixed:
-            places["fixed in every direction" if n_fixed == len(translations) else "free in some direction"].append(
-                structure.nodes[node]
-            )
-    drawn = {}
-    for label, nodes in places.items():
-        if nodes:
-            face = BLACK if label.startswith("fixed") else "white"
+def draw_supports(ax: Axes, view: View, size: float = 11.0) -> dict[str, Any]:
+    """Triangles below nodes that are held: filled where they are so in every direction, open where some stay free."""
+    nodes, supports, drawn = view.nodes, view.supports, {}
+    kinds = {True: ("fixed in every direction", BLACK), False: ("free in some direction", "white")}
+    for is_fixed, (label, face) in kinds.items():
+        places = [nodes[node] for node, fixed in supports.items() if fixed == is_fixed]
+        if places:
             drawn[label] = ax.plot(
-                *np.array(nodes).T,
+                *np.array(places).T,
                 linestyle="",
                 marker=TRIANGLE,
                 markersize=size,

@@ -13,10 +13,12 @@ from skthermo._arguments import check_theta
 from skthermo._arrays import Array
 from skthermo.fem import ModalModel, Structure
 from skthermo.plotting._axes import Axes, panels
-from skthermo.plotting._members import (
+from skthermo.plotting._style import LIGHT, ORANGE, pyplot
+from skthermo.plotting.structures._members import (
     Cell,
     add_lines,
     add_surfaces,
+    check_axes,
     check_structure,
     corners,
     draw_supports,
@@ -25,14 +27,14 @@ from skthermo.plotting._members import (
     sort_members,
     space_axes,
 )
-from skthermo.plotting._style import LIGHT, ORANGE, pyplot
+from skthermo.plotting.structures._view import View
 
 GAP = 0.015  # space between the panels of a figure, as a share of it
 
 
 @dataclass(eq=False, repr=False)
 class ModeShapesDisplay:
-    """Mode shapes over the structure at rest, with their frequencies.
+    """Mode shapes over the structure at rest, with their frequencies, in its plane or in space.
 
     It is best made by `from_structure`.
 
@@ -171,11 +173,12 @@ class ModeShapesDisplay:
         ModeShapesDisplay
             Itself.
         """
-        moved = [moved_nodes(self.structure, shape, amplitude) for shape in self.shapes.T]
-        rest = self.structure.nodes
+        view = View.of(self.structure, ax)
+        moved = [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
+        rest = view.nodes
         points = np.array([place for places in (rest, *moved) for place in places.values()])
         if ax is None:
-            cells = self._new_panels(n_columns, height_of(points))
+            cells = self._new_panels(view, n_columns, height_of(points))
         else:
             self.axes_, cells = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3)), [None] * len(moved)
         self.figure_ = self.axes_[0].figure
@@ -184,8 +187,7 @@ class ModeShapesDisplay:
         for ax_, cell, mode, places, frequency in zip(
             self.axes_, cells, self.modes, moved, self.frequencies, strict=True
         ):
-            if self.structure.dimension == 3 and not hasattr(ax_, "get_zlim"):
-                raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+            check_axes(ax_, view)
             for names, part_colour in parts:
                 _, lines, surfaces = sort_members(self.structure, names)
                 if surfaces:
@@ -201,7 +203,7 @@ class ModeShapesDisplay:
                 if (lines := sort_members(self.structure, names)[1])
             ]
             self.lines_.append(drawn)
-            draw_supports(ax_, self.structure, size=7)
+            draw_supports(ax_, view, size=7)
             set_view(ax_, points, cell)
             title = f"$f_{{{mode + 1}}}$ = {frequency:.{3 if frequency < 10 else 2}f} Hz"
             ax_.set_title(title, fontsize="medium", y=None if cell is None else 1.0)
@@ -219,16 +221,17 @@ class ModeShapesDisplay:
             for group in self.groups
         ]
 
-    def _new_panels(self, n_columns: int, ratio: float) -> list[Cell | None]:
+    def _new_panels(self, view: View, n_columns: int, ratio: float) -> list[Cell | None]:
         """Axes of a new figure, and in space the cell of the figure that each of them should fill."""
         n_columns = min(n_columns, len(self.modes))
         n_rows = -(-len(self.modes) // n_columns)
-        if self.structure.dimension == 2:
+        tall = max(ratio, 1.0)  # panels of tall structures are as high as those of others are wide
+        if not view.is_space:
             names = [f"mode {mode + 1}" for mode in self.modes]
-            self.axes_ = panels(None, names, (5.0, 5.0 * ratio + 0.5), n_columns)
+            self.axes_ = panels(None, names, (5.0 / tall, 5.0 * ratio / tall + 0.5), n_columns)
             return [None] * len(self.modes)
-        inches = 5.5 * ratio + 0.5
-        figure = pyplot().figure(figsize=(5.5 * n_columns, inches * n_rows))
+        inches = 5.5 * ratio / tall + 0.5
+        figure = pyplot().figure(figsize=(5.5 / tall * n_columns, inches * n_rows))
         self.axes_ = np.array([space_axes(figure) for _ in self.modes], dtype=object)
         width, height = 1 / n_columns, 1 / n_rows
         places = (divmod(number, n_columns) for number in range(len(self.modes)))
@@ -238,12 +241,11 @@ class ModeShapesDisplay:
         ]
 
 
-def moved_nodes(structure: Structure, shape: Array, amplitude: float) -> dict[Hashable, Array]:
+def moved_nodes(view: View, shape: Array, amplitude: float) -> dict[Hashable, Array]:
     """Places of the nodes in a mode, whose largest displacement is a share of the structure's extent."""
-    nodes = structure.nodes
-    moves = {node: np.zeros(structure.dimension) for node in nodes}
-    axes = "xyz"[: structure.dimension]
-    for (node, direction), value in zip(structure.dofs, shape, strict=True):
+    nodes, axes = view.nodes, view.directions
+    moves = {node: np.zeros(len(axes)) for node in nodes}
+    for (node, direction), value in zip(view.structure.dofs, shape, strict=True):
         if direction in axes:
             moves[node][axes.index(direction)] = value
     largest = max(np.linalg.norm(move) for move in moves.values())

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from skthermo._arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes, legend_columns
-from skthermo.plotting._members import (
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
+from skthermo.plotting.structures._members import (
     add_lines,
     add_points,
     add_surfaces,
@@ -22,16 +23,19 @@ from skthermo.plotting._members import (
     draw_supports,
     set_view,
     sort_members,
+    structure_axes,
 )
-from skthermo.plotting._members import structure_axes as new_axes
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
+from skthermo.plotting.structures._view import View
 
 WIDTH, THIN = 2.5, 0.8
 
 
 @dataclass(eq=False, repr=False)
 class StructureDisplay:
-    """Members of a structure in two or three dimensions, coloured by value or by group, and its supports.
+    """Members of a structure, coloured by value or by group, and its supports.
+
+    A structure whose nodes and motions lie in one plane is drawn in that plane, any other in space. A triangle marks a
+    node that is held in a direction in which others move: filled where it is held in every such direction.
 
     Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
@@ -129,7 +133,8 @@ class StructureDisplay:
         Parameters
         ----------
         ax : matplotlib's Axes, optional
-            Three-dimensional for a structure in space. A new figure by default.
+            Three-dimensional for a structure in space, and where a plane one should be drawn there. A new figure by
+            default.
         cmap : str, default="viridis"
             Colour map of the values.
         limits : tuple of float, optional
@@ -143,28 +148,32 @@ class StructureDisplay:
             Itself.
         """
         is_own_figure = ax is None
-        self.ax_ = new_axes(ax, self.structure, width=9.0)
+        view = View.of(self.structure, ax)
+        self.ax_ = structure_axes(ax, view, width=9.0)
         self.figure_ = self.ax_.figure
         self.members_: dict[str, Any] = {}
         if self.values is not None:
             width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
-            self._draw_values(self.values, cmap, limits, width)
+            self._draw_values(view, self.values, cmap, limits, width)
         else:
-            self._draw_groups(linewidth)
-        supports = draw_supports(self.ax_, self.structure)
-        nodes = np.array(list(self.structure.nodes.values()))
+            self._draw_groups(view, linewidth)
+        supports = draw_supports(self.ax_, view)
+        nodes = np.array(list(view.nodes.values()))
         below = 0.9 / self.figure_.get_figheight()
         cell = (0.03, below, 0.84 if self.members_ and self.values is not None else 0.94, 0.97 - below)
         set_view(self.ax_, nodes, cell if is_own_figure else None)
-        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure)
-        self._draw_legend(supports, is_own_figure)
+        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure and view.is_space)
+        self._draw_legend(view, supports, is_own_figure)
         return self
 
-    def _draw_values(self, values: Array, cmap: str, limits: tuple[float, float] | None, width: float) -> None:
+    def _draw_values(
+        self, view: View, values: Array, cmap: str, limits: tuple[float, float] | None, width: float
+    ) -> None:
         """Members in the colours of their values; those without are grey and thin, and surfaces among them left out."""
         known = values[np.isfinite(values)]
         low, high = limits or ((known.min(), known.max()) if known.size else (0.0, 1.0))
         colours = pyplot().get_cmap(cmap).with_extremes(bad=LIGHT)
+        nodes = view.nodes
         of_member = dict(zip(self.structure.members, values, strict=True))
         points, lines, surfaces = sort_members(
             self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m]))
@@ -175,27 +184,25 @@ class StructureDisplay:
                 shown = np.ma.masked_invalid([of_member[name] for name in names])
                 widths = np.where(np.ma.getmaskarray(shown), THIN, width)
                 style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
-                self.members_[kind] = add(
-                    self.ax_, corners(self.structure, names, self.structure.nodes), cmap=colours, **style
-                )
+                self.members_[kind] = add(self.ax_, corners(self.structure, names, nodes), cmap=colours, **style)
                 self.members_[kind].set_array(shown)
                 self.members_[kind].set_clim(low, high)
         points = [name for name in points if np.isfinite(of_member[name])]
         if points:
             style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high}
-            places = corners(self.structure, points, self.structure.nodes)
+            places = corners(self.structure, points, nodes)
             self.members_["points"] = add_points(self.ax_, places, zorder=4, **style)
 
-    def _draw_colorbar(self, is_own_figure: bool) -> Any:
+    def _draw_colorbar(self, is_beside: bool) -> Any:
         """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
         shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
-        if is_own_figure and self.structure.dimension == 3:
+        if is_beside:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
         return self.figure_.colorbar(shown, label=plain(self.label or ""), **place)
 
-    def _draw_groups(self, linewidth: float | Mapping[str, float]) -> None:
-        groups, nodes = self.structure.groups, self.structure.nodes
+    def _draw_groups(self, view: View, linewidth: float | Mapping[str, float]) -> None:
+        groups, nodes = self.structure.groups, view.nodes
         widths = linewidth if isinstance(linewidth, Mapping) else {}
         width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
         coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
@@ -214,7 +221,7 @@ class StructureDisplay:
                 style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
                 self.members_[name] = add_lines(self.ax_, corners(self.structure, lines, nodes), **style)
 
-    def _draw_legend(self, supports: Mapping[str, Any], is_own_figure: bool) -> None:
+    def _draw_legend(self, view: View, supports: Mapping[str, Any], is_own_figure: bool) -> None:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
         if not handles:
             return
@@ -223,7 +230,7 @@ class StructureDisplay:
         if not is_own_figure:
             self.ax_.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), **style)
         else:
-            place = "lower center" if self.structure.dimension == 3 else "outside lower center"
+            place = "lower center" if view.is_space else "outside lower center"
             self.figure_.legend(handles, labels, loc=place, **style)
 
 

@@ -1,0 +1,215 @@
+"""Removes values that are far from their neighbours in time."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from datetime import timedelta
+from numbers import Integral, Real
+from typing import Any, overload
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import OneToOneFeatureMixin
+
+from skthermo._arrays import Array, as_floats
+from skthermo._columns import check_positions_are_names, positions_of
+from skthermo._frames import frame_like
+from skthermo._times import has_stamps, row_times
+from skthermo._validation import (
+    Estimator,
+    Interval,
+    TransformerMixin,
+    _fit_context,
+    check_is_fitted,
+    validate_data,
+)
+from skthermo.preprocessing._stamps import as_duration
+from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
+
+LEAST_WINDOW = 3  # rows
+
+
+class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
+    """NaN in place of values that are far from the median of their neighbours in time.
+
+    With ``targets``, the other columns are the weather, and what it explains of the targets is subtracted before values
+    are compared with their neighbours. A frost night then is no outlier, and neither is damage, which stays.
+
+    Parameters
+    ----------
+    window : int or duration, default=25
+        Neighbours of a value, half of them before it: a number of rows or, for frames on a ``DatetimeIndex``, a
+        duration such as "1D".
+    n_deviations : float, default=5.0
+        Number of standard deviations beyond which a value is removed. They are estimated by medians of distances, those
+        of the neighbours or of all records, whichever is larger.
+    targets : sequence of str or sequence of int, optional
+        Names of the frequency columns in a frame, or their positions counted from 0. The other columns, temperatures,
+        stay as they are. By default all columns are filtered, each by itself.
+
+    Attributes
+    ----------
+    n_removed_ : ndarray of shape (n_features,)
+        Number of values of each column that `fit` has found to be outliers.
+    deviations_ : ndarray of shape (n_features,)
+        Standard deviation of each column about the median of its neighbours, by the median of the distances; NaN for
+        the weather.
+    targets_ : ndarray of int
+        Positions of the columns that are filtered.
+    regression_ : object or None
+        What the weather explains of the targets, as broken lines.
+    n_features_in_ : int
+        Number of columns.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    See Also
+    --------
+    check_records : Counts outliers, and finds other faults of records.
+
+    Notes
+    -----
+    Clean the records that an FE model or a detector learns from. Do not clean records before a detector judges them one
+    by one: a threshold for outliers is also one for damage that comes and goes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.preprocessing import HampelFilter
+    >>> F = np.random.default_rng(0).normal(4.0, 0.02, (200, 2))
+    >>> F[50, 1] = 4.8
+    >>> hampel = HampelFilter().fit(F)
+    >>> hampel.n_removed_
+    array([0, 1])
+    >>> bool(np.isnan(hampel.transform(F)[50, 1]))
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "window": [
+            Interval(Integral, LEAST_WINDOW, None, closed="left"),
+            str,
+            timedelta,
+            np.timedelta64,
+            pd.offsets.BaseOffset,
+        ],
+        "n_deviations": [Interval(Real, 0, None, closed="neither")],
+        "targets": ["array-like", None],
+    }
+
+    def __init__(
+        self,
+        window: int | str | timedelta = 25,
+        *,
+        n_deviations: float = 5.0,
+        targets: Sequence[Hashable] | None = None,
+    ):
+        self.window = window
+        self.n_deviations = n_deviations
+        self.targets = targets
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: None = None) -> HampelFilter:
+        """Learn how far values scatter and, with ``targets``, what the weather explains.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records of the healthy structure; NaN is ignored.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        HampelFilter
+            The fitted transformer.
+
+        Raises
+        ------
+        ValueError
+            If a target is not among the columns or is named twice, or the targets are all of them or none; if the
+            window is a duration without a ``DatetimeIndex``, or has no unit.
+        """
+        values = self._validated(X, reset=True)
+        self.targets_, self.regression_ = np.arange(values.shape[1]), None
+        if self.targets is not None:
+            check_positions_are_names(self.targets, getattr(X, "columns", ()))
+            self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+            floats = as_floats(values)
+            self.regression_ = WeatherRegression.of(np.delete(floats, self.targets_, axis=1), floats[:, self.targets_])
+        self.deviations_ = np.full(values.shape[1], np.nan)
+        self.n_removed_ = np.zeros(values.shape[1], dtype=int)
+        distances, local = self._distances(X, values)
+        self.deviations_[self.targets_] = np.nan_to_num(robust_deviation(distances))
+        self.n_removed_[self.targets_] = self._far(distances, local).sum(axis=0)
+        return self
+
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Put NaN in place of outliers.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features)
+            A frame gives a frame on its own index.
+
+        Raises
+        ------
+        ValueError
+            If columns differ from `fit`; if the window is a duration and X has no ``DatetimeIndex``.
+        """
+        check_is_fitted(self)
+        values = self._validated(X, reset=False)
+        cleaned = values.copy()
+        far = np.zeros(values.shape, dtype=bool)
+        far[:, self.targets_] = self._far(*self._distances(X, values))
+        cleaned[far] = np.nan
+        return frame_like(X, cleaned)
+
+    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
+        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+
+    def _distances(self, X: Any, values: NDArray) -> tuple[Array, Array]:
+        """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""
+        rest = as_floats(values)[:, self.targets_]
+        if self.regression_ is not None:
+            predicted = self.regression_.predict(np.delete(as_floats(values), self.targets_, axis=1))
+            rest = rest - np.where(np.isnan(predicted), self.regression_.centre, predicted)
+        return distances_from_neighbours(rest, row_times(X), self._rows_or_duration(X))
+
+    def _far(self, distances: Array, local: Array) -> NDArray[np.bool_]:
+        with np.errstate(invalid="ignore"):
+            return np.abs(distances) > self.n_deviations * np.fmax(local, self.deviations_[self.targets_])
+
+    def _rows_or_duration(self, X: Any) -> int | pd.Timedelta:
+        if isinstance(self.window, Integral):
+            return int(self.window)
+        if not has_stamps(X):
+            raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")
+        return pd.Timedelta(as_duration(self.window, "freq"))
+
+
+def distances_from_neighbours(values: Array, times: Array, window: int | pd.Timedelta) -> tuple[Array, Array]:
+    """Distance of each value from the median of its neighbours in time, and the standard deviation of the distances.
+
+    That is estimated by the median of the neighbours' distances.
+    """
+    order = np.argsort(times, kind="stable")
+    table = pd.DataFrame(values[order])
+    if isinstance(window, pd.Timedelta):
+        table.index = pd.to_datetime(times[order], unit="ns")
+    around = {"window": window, "center": True, "min_periods": 1}
+    distances = table - table.rolling(**around).median()
+    local = NORMAL * distances.abs().rolling(**around).median()
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return distances.to_numpy()[back], local.to_numpy()[back]

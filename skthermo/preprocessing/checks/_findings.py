@@ -1,0 +1,312 @@
+"""Looks at records before anything is learned from them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._frames import check_same_rows, column_names
+from skthermo._times import row_times
+from skthermo.preprocessing._folds import BlockedKFold
+from skthermo.preprocessing._hampel import distances_from_neighbours
+from skthermo.preprocessing._weather_regression import WeatherBasis, median, out_of_fold, robust_deviation
+from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
+from skthermo.preprocessing.checks._stuck import stuck_runs
+from skthermo.preprocessing.checks._swaps import swapped_modes
+from skthermo.preprocessing.checks._trend import trend_table
+
+COLUMNS = ["what", "column", "n_rows", "from", "to", "detail"]
+LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
+MOST_FITTED = 20_000  # rows, evenly spread, that a trend is fitted to
+NOTHING = 0.02  # share of a mode's variance that counts as explained by chance
+WINDOW = 25  # rows that are neighbours of a value
+OUTLYING = 8.0  # robust deviations from the neighbours, and from what the weather explains, of an outlier
+CERTAIN = 5.0  # standard errors of a trend
+LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that matters changes them
+LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
+PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
+
+
+@dataclass(frozen=True, repr=False)
+class RecordFindings:
+    """What `check_records` has found.
+
+    Parameters
+    ----------
+    table : DataFrame
+        A row for each finding: ``what`` was found in which ``column``, in how many rows (``n_rows``), ``from`` and
+        ``to`` which row by the labels of the records' index, and a sentence that says more (``detail``). Empty where
+        nothing was found.
+    n_rows : int
+        Number of records.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.preprocessing import check_records
+    >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
+    >>> print(check_records(year.temperatures, year.frequencies))
+    1 finding in 365 records.
+    stuck sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
+    """
+
+    table: pd.DataFrame
+    n_rows: int
+
+    def summary(self) -> str:
+        """A line for each finding.
+
+        Returns
+        -------
+        str
+            Text of several lines; a single one where nothing was found.
+        """
+        if self.table.empty:
+            return f"No finding in {self.n_rows} records."
+        count = f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."
+        return "\n".join([count, *(f"{what}: {detail}" for what, detail in self.table[["what", "detail"]].to_numpy())])
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """One warning for each kind of finding.
+
+        Yields
+        ------
+        kind, text : str
+            What the warning is about, and what it says.
+        """
+        for kind, rows in self.table.groupby("what", sort=False):
+            details = "; ".join(rows["detail"])
+            if kind in ("stuck sensor", "stuck mode"):
+                yield kind, f"values of a sensor or a mode only repeat: {details}; expected NaN where it is stuck"
+            elif kind == "weather":
+                yield kind, f"the temperatures explain nothing of the frequencies: {details}"
+            elif kind == "time shift":
+                yield kind, f"temperatures of other rows explain the frequencies better: {details}"
+            elif kind == "exchanged modes":
+                yield kind, f"modes look exchanged in some rows: {details}; expected the same mode in all of a column"
+            elif kind == "outliers":
+                yield (
+                    kind,
+                    f"frequencies are far from their neighbours in time and from what the weather explains: {details}; "
+                    "expected NaN where a value is wrong: HampelFilter puts it there",
+                )
+            else:
+                yield kind, f"what the weather leaves of the frequencies has a trend: {details}"
+
+
+def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFindings:
+    """Look at temperatures and frequencies for faults that would otherwise be learned.
+
+    It looks for sensors and modes that are stuck, weather that explains nothing, temperatures of another time, modes
+    exchanged in some rows, outliers, and a trend. A finding is a reason to look at the records, no proof of a fault.
+
+    Parameters
+    ----------
+    temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
+        In degrees Celsius; NaN is allowed.
+    frequencies : array-like or DataFrame of shape (n_samples, n_modes)
+        Of the healthy structure, in Hz; NaN is allowed.
+
+    Returns
+    -------
+    RecordFindings
+        Its ``table`` has a row for each finding, ``summary()`` a line.
+
+    Raises
+    ------
+    ValueError
+        If the tables differ in length or index, or hold something that is no number.
+
+    See Also
+    --------
+    HampelFilter : Puts NaN in place of outliers.
+    residual_trend : The trend of residuals of any regression.
+
+    Notes
+    -----
+    - *Stuck*: a run of at least five equal values. Where neighbouring records are equal by rounding, it has to be four
+      times as long as all but three runs of the column are. Nearly all other periods of its length must vary by at
+      least three steps of rounding, and its value must not be one at which the column rests again and again, as rain
+      does at zero.
+    - What the *weather* explains: broken lines in up to three principal components of the temperatures, predicted out
+      of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every mode.
+    - *Time shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
+      less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
+    - *Exchanged modes*: in some rows, at least three, the values of two columns lie nearer to what the weather explains
+      of the other column, and ordering them at least halves what it leaves.
+    - *Outliers*: values more than eight robust standard deviations away from the median of the 25 rows around, and from
+      what the weather explains.
+    - *Trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
+      the scatter of a single record.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.preprocessing import check_records
+    >>> year = make_truss_campaign(random_state=0)
+    >>> print(check_records(year.temperatures, year.frequencies))
+    No finding in 365 records.
+    >>> late = year.frequencies.shift(60)
+    >>> check_records(year.temperatures, late).table[["what", "n_rows"]]
+             what  n_rows
+    0  time shift     305
+    """
+    check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
+    records = _Records.of(temperatures, frequencies)
+    findings = [*_stuck(records)]
+    if records.n_usable >= LEAST_ROWS:
+        findings += _against_weather(records)
+    return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(records.order))
+
+
+@dataclass
+class _Records:
+    """Records in order of time; what is found to be wrong becomes NaN."""
+
+    T: Array
+    F: Array
+    sensors: list[Hashable]
+    modes: list[Hashable]
+    order: NDArray[np.intp]
+    labels: Any
+    index: Any
+
+    @classmethod
+    def of(cls, temperatures: Any, frequencies: Any) -> _Records:
+        order = np.argsort(row_times(temperatures), kind="stable")
+        index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
+        T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
+        return cls(T, F, column_names(temperatures, "T"), column_names(frequencies, "f"), order, index, index[order])
+
+    @property
+    def n_usable(self) -> int:
+        """Number of rows with a temperature and a frequency."""
+        return int((~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)).sum())
+
+    def label(self, row: int) -> str:
+        """How a row is called in a sentence."""
+        label = self.index[row]
+        if not isinstance(label, pd.Timestamp):
+            return f"row {label}"
+        return f"{label:%Y-%m-%d}" if label == label.normalize() else f"{label:%Y-%m-%d %H:%M}"
+
+    def period(self, rows: NDArray[np.intp]) -> str:
+        """First and last of some rows."""
+        return f"{self.label(rows[0])} to {self.label(rows[-1])}" if len(rows) > 1 else self.label(rows[0])
+
+    def finding(self, what: str, column: Any, rows: NDArray[np.intp], detail: str) -> list[Any]:
+        """A row of the table."""
+        return [what, column, len(rows), self.index[rows[0]], self.index[rows[-1]], detail]
+
+
+def _stuck(records: _Records) -> Iterator[list[Any]]:
+    tables = (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes))
+    for what, table, names in tables:
+        for name, column in zip(names, table.T, strict=True):
+            for rows in stuck_runs(column):
+                detail = f"{name!r} is {column[rows[0]]:.6g} in {len(rows)} rows, {records.period(rows)}"
+                yield records.finding(what, name, rows, detail)
+                column[rows] = np.nan
+
+
+def _against_weather(records: _Records) -> Iterator[list[Any]]:
+    basis = WeatherBasis.of(records.T)
+    places = basis.coordinates(records.T)
+    lines, past = basis.lines(places), with_past(places)
+    folds = BlockedKFold().fold_of(_with_stamps(records))
+    yield from _exchanged(records, lines, folds)
+    yield from _outliers(records, lines, folds)
+    share = explained(lines, records.F, folds)
+    usable = np.flatnonzero(~np.isnan(records.F).all(axis=1) & ~np.isnan(places).any(axis=1))
+    shift = best_shift(lines, past, places, records.F, folds)
+    if shift is not None:
+        yield records.finding("time shift", "", *_shifted(records, shift))
+        return
+    if (share < NOTHING).all():
+        detail = (
+            f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows; "
+            "expected temperatures that belong to the frequencies, row by row"
+        )
+        yield records.finding("weather", "", usable, detail)
+        return
+    yield from _trends(records, np.hstack([lines, past]))
+
+
+def _with_stamps(records: _Records) -> Any:
+    return pd.DataFrame(index=records.index) if isinstance(records.index, pd.DatetimeIndex) else records.T
+
+
+def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[Any]]:
+    for (first, second), rows in swapped_modes(lines, records.F, folds):
+        names = f"{records.modes[first]!r} and {records.modes[second]!r}"
+        n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
+        detail = f"{names} in {len(rows)} of {n_both} rows, {records.period(rows)}"
+        yield records.finding("exchanged modes", names, rows, detail)
+        records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
+
+
+def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[Any]]:
+    F = records.F
+    rest = F - np.where(np.isnan(lines).any(axis=1)[:, np.newaxis], median(F), out_of_fold(lines, F, folds))
+    distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
+    floor = PREDICTABLE * robust_deviation(F)
+    deviation = np.fmax(robust_deviation(rest), floor)
+    local = np.fmax(np.fmax(local, robust_deviation(distances)), floor)
+    with np.errstate(invalid="ignore"):
+        far = (np.abs(distances) > OUTLYING * local) & (np.abs(rest - median(rest)) > OUTLYING * deviation)
+    for name, column, is_far in zip(records.modes, F.T, far.T, strict=True):
+        rows = np.flatnonzero(is_far)
+        if len(rows) and deviation[records.modes.index(name)] > 0:
+            n_known = int((~np.isnan(column)).sum())
+            detail = (
+                f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g} Hz in "
+                f"{records.label(rows[0])}"
+            )
+            yield records.finding("outliers", name, rows, detail)
+    F[far] = np.nan
+
+
+def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:
+    rows = np.arange(max(shift.rows, 0), len(records.F) + min(shift.rows, 0))
+    length, direction = "", "before" if shift.rows > 0 else "after"
+    if isinstance(records.index, pd.DatetimeIndex):
+        hours = abs(shift.rows) * pd.Series(records.index).diff().median().total_seconds() / 3600
+        length = f" (about {hours:.3g} hours)" if hours < 48 else f" (about {hours / 24:.3g} days)"
+    detail = (
+        f"those of {abs(shift.rows)} rows {direction}{length} explain {shift.explained:.0%} of the variance out of "
+        f"fold, those of the same rows {shift.unshifted:.0%}; expected two tables of the same times"
+    )
+    return rows, detail
+
+
+def _trends(records: _Records, inputs: Array) -> Iterator[list[Any]]:
+    rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
+    F, index = records.F[rows], records.index[rows]
+    timed = isinstance(index, pd.DatetimeIndex)
+    table = trend_table(inputs[rows], F, row_times(pd.DataFrame(index=index)), records.modes, timed)
+    for mode, (name, row) in enumerate(table.iterrows()):
+        change, error = row["change"], row["standard_error"]
+        scatter = error * np.sqrt(row["n_independent"] / 12)
+        least = max(LEAST_CHANGE * scatter, LEAST_OF_ALL * robust_deviation(F)[mode])
+        if not (abs(change) > CERTAIN * error and abs(change) > least):
+            continue
+        known = np.flatnonzero(~np.isnan(records.F[:, mode]))
+        a_year = f" ({row['per_year']:+.2g} Hz a year)" if timed else ""
+        detail = (
+            f"{name!r} changes by {change:+.2g} Hz, standard error {error:.1g}{a_year}; first fifth "
+            f"{row['first']:+.2g} Hz, last fifth {row['last']:+.2g} Hz"
+        )
+        yield records.finding("trend", name, known, detail)

@@ -1,0 +1,92 @@
+"""Trend of residuals over time, with a standard error that holds under serial dependence."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, as_columns
+from skthermo._dependence import correlation_time
+from skthermo._frames import column_names
+from skthermo._times import has_stamps, row_times
+
+YEAR = 365.25 * 86400e9  # nanoseconds
+PARTS = 5  # into which the records are divided, to compare the first with the last
+LEAST_RECORDS = 10
+ESTIMATES = ["change", "standard_error", "first", "last", "n_independent"]
+
+
+def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
+    """Trend of residuals over time, by mode: an estimate and its standard error.
+
+    Residuals of a healthy structure that its weather explains have none. A drift of a sensor, a structure that ages, or
+    another season of the weather than the regression knows gives one.
+
+    Parameters
+    ----------
+    residuals : array-like or DataFrame of shape (n_samples, n_modes)
+        Measured minus predicted frequencies, best out of fold, as
+        `~skthermo.detection.TemperatureCompensator.fit_transform` gives them; NaN is ignored. The index of a frame
+        tells their times; without a ``DatetimeIndex``, rows are equally spaced.
+
+    Returns
+    -------
+    DataFrame of shape (n_modes, 6)
+        In the unit of the residuals, by mode: ``change``, by which a straight line changes from the first record to the
+        last; its ``standard_error``; the same ``per_year`` (NaN without a ``DatetimeIndex``); ``first`` and ``last``,
+        the means of the first and the last fifth of the period, beside the mean of all; and ``n_independent``, as how
+        many independent records the residuals count. NaN for a mode with fewer than a dozen residuals.
+
+    Notes
+    -----
+    The line is that of least squares. Its variance is that of independent records times the correlation time, 1 + 2 *
+    the sum of the autocorrelations, of what remains beside the line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.preprocessing import residual_trend
+    >>> noise = np.random.default_rng(0).normal(0, 0.01, (1000, 1))
+    >>> residual_trend(noise + np.linspace(0, 0.02, 1000)[:, np.newaxis])[["change", "standard_error"]].round(4)
+        change  standard_error
+    r1  0.0196          0.0011
+    """
+    values, times = as_columns(residuals), row_times(residuals)
+    names = column_names(residuals, "r") if values.ndim == np.ndim(residuals) else ["r1"]
+    order = np.argsort(times, kind="stable")
+    return trend_table(np.ones((len(values), 1)), values[order], times[order], names, has_stamps(residuals))
+
+
+def trend_table(inputs: Array, values: Array, times: Array, names: Sequence[Hashable], is_timed: bool) -> pd.DataFrame:
+    """Trend of each column beside what inputs, (n_samples, n_inputs), explain of it; rows in order of time."""
+    span = np.ptp(times) if len(times) else 0.0
+    places = (times - times[:1]) / span if span > 0 else np.zeros(len(times))
+    rows = [_trend(inputs, places, column) for column in values.T]
+    table = pd.DataFrame(
+        rows, index=list(names), columns=["change", "standard_error", "first", "last", "n_independent"]
+    )
+    table.insert(2, "per_year", table["change"] * (YEAR / span if is_timed and span > 0 else np.nan))
+    return table
+
+
+def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
+    """Change from place 0 to 1, its standard error, means of the first and last part, and the effective number."""
+    known = np.flatnonzero(~np.isnan(column) & ~np.isnan(inputs).any(axis=1))
+    x, y, beside = places[known], column[known], inputs[known]
+    if len(y) < LEAST_RECORDS + 2 * inputs.shape[1] or np.ptp(x) == 0:
+        return [np.nan] * 5
+    # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
+    left = np.column_stack([x, y])
+    left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-8)[0]
+    alone, rest = left.T
+    change = alone @ rest / (alone @ alone)
+    scatter = np.full(len(column), np.nan)
+    scatter[known] = rest - change * alone
+    time = min(correlation_time(scatter), len(y) / 2)
+    variance = np.nansum(scatter**2) / max(len(y) - inputs.shape[1] - 2 * time, 1.0)
+    at = scatter[known] + change * (x - x.mean())
+    ends = [at[part].mean() if part.any() else np.nan for part in (x <= 1 / PARTS, x >= 1 - 1 / PARTS)]
+    return [change, np.sqrt(variance * time / (alone @ alone)), *ends, len(y) / time]

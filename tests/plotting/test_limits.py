@@ -1,0 +1,117 @@
+"""Axes that outliers do not stretch, marks that count them, and records that are not judged."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.plotting import (
+    DamageIndexDisplay,
+    FrequencyTemperatureDisplay,
+    HistoryDisplay,
+    PredictionDisplay,
+)
+
+THRESHOLD = 4.0
+
+
+@pytest.fixture
+def index():
+    """A year of damage indices between 1 and 3."""
+    times = pd.date_range("2024-01-01", periods=365, freq="D")
+    return pd.Series(np.random.default_rng(0).uniform(1, 3, len(times)), times)
+
+
+def edge_marks(ax):
+    return [line for line in ax.lines if str(line.get_gid()).startswith("beyond")]
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def test_indices_far_above_the_others_are_counted_at_the_edge_where_they_are(index):
+    index.iloc[[40, 200]] = [50.0, np.inf]
+    display = DamageIndexDisplay.from_predictions(index, THRESHOLD)
+    low, high = display.ax_.get_ylim()
+    assert (low, high) == (0.0, pytest.approx(1.05 * THRESHOLD))
+    (mark,) = edge_marks(display.ax_)
+    np.testing.assert_array_equal(mark.get_xdata(orig=False), display.points_[""][0].get_xdata(orig=False)[[40, 200]])
+    assert texts(display.ax_) == ["2 beyond, up to inf"]
+
+
+@pytest.mark.parametrize("n_damaged", [0, 20, 180])
+def test_a_group_of_high_indices_is_no_outlier(index, n_damaged):
+    index.iloc[len(index) - n_damaged :] += 20
+    display = DamageIndexDisplay.from_predictions(index, THRESHOLD)
+    assert display.ax_.get_ylim()[1] > index.max()
+    assert not edge_marks(display.ax_)
+    assert not texts(display.ax_)
+
+
+def test_every_point_is_in_view_or_counted(index):
+    random = np.random.default_rng(1)
+    for heavy in (random.standard_cauchy(500), np.exp(2 * random.normal(size=500)), np.r_[np.full(499, 2.0), 9.0]):
+        display = HistoryDisplay.from_predictions(heavy)
+        low, high = display.axes_[0].get_ylim()
+        n_beyond = ((heavy < low) | (heavy > high)).sum()
+        assert sum(int(text.split()[0]) for text in texts(display.axes_[0])) == n_beyond
+        assert sum(len(mark.get_xdata()) for mark in edge_marks(display.axes_[0])) == n_beyond
+        assert n_beyond <= 2 * np.ceil(0.02 * len(heavy))
+
+
+def test_records_without_an_index_are_grey_ticks_with_their_number(index):
+    index.iloc[[3, 4, 5, 300]] = np.nan
+    panels = {"first": {"healthy": index}, "second": {"healthy": index, "damaged": index[:3]}}
+    display = DamageIndexDisplay.from_scenarios(panels, THRESHOLD)
+    assert [texts(ax) for ax in display.axes_] == [["4 not judged"], ["healthy: 4 not judged"]]
+    (ticks,) = (line for line in display.ax_.lines if line.get_gid() == "not judged")
+    np.testing.assert_array_equal(ticks.get_xdata(), index.index[[3, 4, 5, 300]])
+    assert ticks.get_color() == "#555555"
+
+
+def test_an_index_of_which_nothing_is_judged_says_so(index):
+    display = DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD)
+    assert texts(display.ax_) == ["365 not judged"]
+
+
+def test_one_legend_names_the_labels_of_all_panels_which_keep_their_colours(index):
+    panels = {"first": {"healthy": index}, "second": {"damaged": index, "healthy": index}}
+    display = DamageIndexDisplay.from_scenarios(panels, THRESHOLD)
+    (legend,) = display.figure_.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["healthy", "threshold", "damaged"]
+    assert not any(ax.get_legend() for ax in display.axes_)
+    (first,), (damaged, healthy) = display.points_.values()
+    assert first.get_color() == healthy.get_color() != damaged.get_color()
+
+
+def test_sensor_failures_do_not_stretch_the_temperatures(later):
+    T, F = later.temperatures["T1"].copy(), later.frequencies.copy()
+    T.iloc[7], F.iloc[9, 0] = -999.0, 0.0
+    display = FrequencyTemperatureDisplay.from_predictions(T, F)
+    for ax in display.axes_:
+        assert ax.get_xlim()[0] > T.drop(T.index[7]).min() - 5
+        assert "1 beyond, down to -999" in texts(ax)
+    assert display.axes_[0].get_ylim()[0] > F["f1"].drop(F.index[9]).min() - 0.5
+    assert "1 beyond, down to 0" in texts(display.axes_[0])
+
+
+def test_intervals_stay_in_view_and_outliers_of_measurements_do_not_stretch_them(later):
+    measured, clean = later.frequencies.copy(), later.clean_frequencies
+    measured.iloc[[5, 50], 2] *= 10
+    display = PredictionDisplay.from_predictions(measured, clean, 0.9 * clean, 1.1 * clean)
+    low, high = display.axes_[2].get_ylim()
+    assert 0.85 * clean["f3"].min() < low < 0.9 * clean["f3"].min()
+    assert 1.1 * clean["f3"].max() < high < 1.15 * clean["f3"].max()
+    assert texts(display.axes_[2])[0].startswith("2 beyond, up to")
+    assert not texts(display.axes_[1])
+
+
+def test_drawing_again_counts_anew(later):
+    figure, axes = plt.subplots(2, 3)
+    F = later.frequencies.copy()
+    F.iloc[3, 0] = 1e3
+    for _ in range(2):
+        HistoryDisplay.from_predictions(F, ax=axes)
+    assert texts(axes.ravel()[0]) == ["2 beyond, up to 1000"]
+    assert plt.get_fignums() == [figure.number]

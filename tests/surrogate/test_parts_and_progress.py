@@ -1,0 +1,144 @@
+"""Parameters of parts that are still None, and what a fit tells about its stages."""
+
+import re
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.preprocessing import LagFeatures
+from skthermo.studies import DetectabilityStudy, sweep
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures.iloc[::3], YEAR.frequencies.iloc[::3]
+INVERSE = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=60, refine=0, random_state=0)
+
+
+def chain(**parameters):
+    fem = DataInformedFEM(TRUSS, inverse=clone(INVERSE), mapper=TemperatureMapper(LinearRegression()))
+    return fem.set_params(**parameters)
+
+
+def test_parameters_of_default_parts_put_the_part_in_place():
+    fem = DataInformedFEM(TRUSS)
+    assert fem.get_params()["inverse"] is None
+    assert "inverse__n_samples" not in fem.get_params()
+    fem.set_params(reduce=1e-4, n_jobs=1, inverse__n_samples=50, inverse__regressor__alpha=0.5)
+    fem.set_params(mapper__regressor__hingefeatures__n_knots=2)
+    expected = InverseSurrogate(reduce=1e-4, n_jobs=1, n_samples=50).get_params(deep=False) | {"regressor": None}
+    assert fem.inverse.get_params(deep=False) | {"regressor": None} == expected
+    assert fem.inverse.regressor.alpha == 0.5
+    assert fem.mapper.regressor[0].n_knots == clone(fem).get_params()["mapper__regressor__hingefeatures__n_knots"] == 2
+    assert DataInformedFEM(TRUSS).inverse is None
+    again = fem.set_params(inverse=None, inverse__n_samples=70).inverse
+    assert (again.n_samples, again.regressor) == (70, None)
+
+
+def test_a_default_part_put_in_place_gives_what_none_gives():
+    options = {"inverse__bounds": 0.2, "inverse__n_samples": 60, "inverse__noise": 0.01, "inverse__refine": 0}
+    by_name = DataInformedFEM(TRUSS, random_state=0).set_params(**options)
+    by_part = DataInformedFEM(
+        TRUSS, inverse=InverseSurrogate(bounds=0.2, n_samples=60, noise=0.01, refine=0), random_state=0
+    )
+    np.testing.assert_array_equal(by_name.fit(T, F).predict(T), by_part.fit(T, F).predict(T))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("inverse__samples", r"Invalid parameter 'samples' for estimator InverseSurrogate\(\). Valid parameters are"),
+        ("mapper__regressor__depth", "Invalid parameter 'depth' for estimator Pipeline"),
+        ("mapping__regressor", "Invalid parameter 'mapping' for estimator DataInformedFEM"),
+        ("aligner__method", "aligner is 'passthrough', without parameters such as 'method'; expected an estimator"),
+        ("random_state__seed", "random_state is None, without parameters such as 'seed'; expected an estimator"),
+        ("model__E", r"model is AffineModel\(.*\), without parameters such as 'E'"),
+    ],
+)
+def test_unknown_parameters_are_named_and_change_nothing(name, message):
+    fem = DataInformedFEM(TRUSS)
+    with pytest.raises(ValueError, match=message):
+        fem.set_params(**{name: 1})
+    assert fem.inverse is None
+    assert fem.mapper is None
+
+
+def test_search_over_parameters_of_default_parts():
+    grid = {"inverse__n_samples": [50, 60], "mapper__regressor__ridgecv__alphas": [[1e-3], [1e9]]}
+    fem = DataInformedFEM(TRUSS, random_state=0).set_params(
+        inverse__regressor=Ridge(), inverse__bounds=0.2, inverse__refine=0, inverse__noise=0.01
+    )
+    search = GridSearchCV(fem, grid, cv=KFold(2, shuffle=True, random_state=0)).fit(T, F)
+    assert search.best_params_["mapper__regressor__ridgecv__alphas"] == [1e-3]
+    assert np.ptp(search.cv_results_["mean_test_score"]) > 0.1
+
+
+def lines_of(text):
+    return re.findall(r"\[(\w+)\] \.+ (\(.*), total= +\d+\.\d[a-z]+", text)
+
+
+def test_verbose_tells_the_stages(capsys):
+    quiet = chain().fit(T, F)
+    assert capsys.readouterr().out == ""
+    fem = chain(verbose=True, inverse__verbose=1, inverse__narrow_bounds=True).fit(T, F)
+    inner = ["simulations", "regressor", "narrower simulations", "regressor again"]
+    outer = ["inverse surrogate", "parameters of the records", "temperature mapper", "report"]
+    expected = [("InverseSurrogate", f"({i} of 4) {name}") for i, name in enumerate(inner, 1)]
+    expected += [("DataInformedFEM", f"({i} of 4) {name}") for i, name in enumerate(outer, 1)]
+    assert lines_of(capsys.readouterr().out) == expected
+    scenarios = sweep(fem, (0.2,), groups=["bottom"])
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, verbose=1)
+    study.run(T)
+    stages = ["detector", "frequencies", "first repeat", "other 1 repeats"]
+    found = lines_of(capsys.readouterr().out)
+    assert found == [("DetectabilityStudy", f"({i} of 4) {name}") for i, name in enumerate(stages, 1)]
+    with pytest.raises(ValueError, match="verbose is 'much'; expected a boolean or an integer from 0"):
+        study.set_params(verbose="much").run(T)
+    with pytest.raises(ValueError, match="'verbose' parameter"):
+        quiet.set_params(verbose="much").fit(T, F)
+
+
+class Recorder:
+    """Keeps what scikit-learn tells a callback."""
+
+    max_propagation_depth = 1
+
+    def __init__(self):
+        self.tasks = []
+
+    def setup(self, estimator, context):
+        self.tasks.append("setup")
+
+    def teardown(self, estimator, context):
+        self.tasks.append("teardown")
+
+    def on_fit_task_begin(self, estimator, context):
+        self.tasks.append((type(estimator).__name__, context.task_name, context.max_subtasks))
+
+    def on_fit_task_end(self, estimator, context):
+        self.tasks.append(context.task_name)
+
+
+def test_callbacks_see_the_stages():
+    pytest.importorskip("sklearn.callback")  # from scikit-learn 1.9
+    recorder = Recorder()
+    fem = chain(mapper=make_pipeline(LagFeatures(1), TemperatureMapper(LinearRegression()))).set_callbacks(recorder)
+    twin = clone(fem).fit(T, F)
+    inside = [("InverseSurrogate", "simulations", 0), "simulations", ("InverseSurrogate", "regressor", 0), "regressor"]
+    begun = [task for task in recorder.tasks if isinstance(task, tuple)]
+    assert begun[0] == ("DataInformedFEM", "fit", 4)
+    assert recorder.tasks[0] == "setup"
+    assert recorder.tasks[2:8] == [("InverseSurrogate", "fit", 2), *inside, "fit"]
+    assert ("Pipeline", "fit", 2) in begun
+    assert recorder.tasks[-4:] == [("DataInformedFEM", "report", 0), "report", "fit", "teardown"]
+    np.testing.assert_array_equal(twin.predict(T), clone(fem).set_callbacks().fit(T, F).predict(T))
+    with pytest.raises(ValueError, match="constant"):
+        fem.fit(T.assign(T1=1.0), F)
+    with pytest.raises(ValueError, match="bounds"):
+        fem.set_params(inverse__bounds=-1).fit(T, F)
+    assert recorder.tasks[-1] == "teardown"

@@ -1,0 +1,180 @@
+"""Weights of records reach the temperature mapper, with and without scikit-learn's metadata routing."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn import config_context
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.exceptions import UnsetMetadataPassedError
+from sklearn.linear_model import LinearRegression, Ridge, RidgeCV
+from sklearn.model_selection import GridSearchCV, KFold, cross_validate
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.metrics import complete_r2
+from skthermo.preprocessing import HingeFeatures, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures.iloc[:360:3], YEAR.frequencies.iloc[:360:3]
+WEIGHTS = np.random.default_rng(0).uniform(0.1, 2, len(T))
+PLAIN = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, refine=0, random_state=0)
+FOLDS = KFold(2, shuffle=True, random_state=0)
+ROUTING = pytest.mark.parametrize("routing", [False, True], ids=["off", "on"])
+
+
+class Spy(LinearRegression):
+    """Keeps the weights that its fit gets."""
+
+    def fit(self, X, y, sample_weight=None):
+        self.weights_ = sample_weight
+        return super().fit(X, y, sample_weight)
+
+
+def chain(mapper=None, inverse=PLAIN):
+    return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
+
+
+@ROUTING
+@pytest.mark.parametrize(
+    "wrapped",
+    [
+        lambda mapper: mapper,
+        lambda mapper: make_pipeline(LagFeatures(1), mapper),
+        lambda mapper: make_pipeline(LagFeatures(1), make_pipeline("passthrough", mapper)),
+        lambda mapper: GridSearchCV(make_pipeline(LagFeatures(1), mapper), {"lagfeatures__lags": [1]}, cv=2),
+        lambda mapper: TransformedTargetRegressor(mapper, check_inverse=False),
+        lambda mapper: TemperatureMapper(MultiOutputRegressor(mapper.regressor)),
+        lambda mapper: TemperatureMapper(make_pipeline("passthrough", mapper.regressor)),
+        lambda mapper: TemperatureMapper(TransformedTargetRegressor(mapper.regressor)),
+    ],
+)
+def test_weights_reach_the_last_step(wrapped, routing):
+    with config_context(enable_metadata_routing=routing):
+        fit = chain(wrapped(TemperatureMapper(LinearRegression()))).fit(T, F, sample_weight=WEIGHTS)
+    alone = TemperatureMapper(LinearRegression()).fit(T, fit.parameters_, sample_weight=WEIGHTS)
+    np.testing.assert_allclose(fit.predict_parameters(T), alone.predict(T), rtol=1e-9)
+    unweighted = TemperatureMapper(LinearRegression()).fit(T, fit.parameters_)
+    assert np.abs(unweighted.predict(T) / alone.predict(T) - 1).to_numpy().max() > 1e-5
+
+
+def test_a_record_of_weight_0_counts_as_left_out():
+    kept = WEIGHTS > 0.5
+    fit = chain().fit(T, F, sample_weight=kept)
+    alone = TemperatureMapper(LinearRegression()).fit(T[kept], fit.parameters_[kept])
+    np.testing.assert_allclose(fit.predict_parameters(T), alone.predict(T), rtol=1e-9)
+    assert fit.report_.n_trained == kept.sum()
+    assert fit.report_.left_out.to_dict() == {"their weight is 0": (~kept).sum()}
+    assert len(fit.residuals_.values) == kept.sum()
+    assert fit.training_range_.excess(T[kept]).max() == 0
+    coldest = T["T1"].argsort().to_numpy()[0]
+    warm = chain().fit(T, F, sample_weight=np.arange(len(T)) != coldest)
+    assert warm.applicability(T.iloc[[coldest]])["T1"].item() > 0
+
+
+def test_weights_multiply_those_of_rows_with_gaps():
+    gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.2)
+    inverse = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=50, random_state=0)
+    fit, plain = (chain(TemperatureMapper(Spy()), inverse).fit(T, gaps, sample_weight=w) for w in (WEIGHTS, None))
+    given, posterior = (one.mapper_.regressor_.weights_ for one in (fit, plain))
+    known = gaps.notna().any(axis=1).to_numpy()
+    np.testing.assert_allclose(given, WEIGHTS[known] * posterior)
+    assert (posterior < 1).any()
+
+
+@ROUTING
+def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
+    with config_context(enable_metadata_routing=routing):
+        series = pd.Series(WEIGHTS, T.index).sample(frac=1, random_state=0)
+        by_name = chain().fit(T, F, sample_weight=series)
+        by_position = chain().fit(T, F, sample_weight=WEIGHTS)
+    np.testing.assert_array_equal(by_name.predict(T), by_position.predict(T))
+    assert by_name.score(T, F, sample_weight=series) == complete_r2(F, by_name.predict(T), WEIGHTS)
+    assert by_name.score(T, F, sample_weight=series) != by_name.score(T, F)
+
+
+@ROUTING
+@pytest.mark.parametrize(
+    ("weights", "mapper", "message"),
+    [
+        (WEIGHTS[1:], None, r"sample_weight has shape \(119,\); expected \(120,\)"),
+        (WEIGHTS[:, np.newaxis], None, r"sample_weight has shape \(120, 1\)"),
+        (-WEIGHTS, None, "is -1.3.* in row 0, and negative, NaN or infinite in 120 of 120 rows"),
+        (np.where(np.arange(120) == 7, np.nan, 1.0), None, "is nan in row 7, and .* in 1 of 120 rows"),
+        (np.zeros(120), None, "sample_weight is zero in all 120 rows"),
+        (pd.Series(WEIGHTS), None, "120 of them unknown to X, and lacks 120 of its 120; expected the index of X"),
+        (pd.Series(WEIGHTS[:50], T.index[:50]), None, "has 50 rows, 0 of them unknown to X, and lacks 70 of its 120"),
+        (
+            WEIGHTS,
+            TemperatureMapper(KNeighborsRegressor()),
+            r"fit of TemperatureMapper\(regressor=.* takes no",
+        ),
+        (WEIGHTS, make_pipeline(LagFeatures(2), KNeighborsRegressor()), r"(?s)fit of Pipeline.* takes no weights"),
+    ],
+)
+def test_wrong_weights_are_named(weights, mapper, message, routing):
+    with config_context(enable_metadata_routing=routing), pytest.raises(ValueError, match=message):
+        chain(mapper).fit(T, F, sample_weight=weights)
+
+
+def test_a_mapper_alone_names_a_regressor_that_takes_no_weights():
+    with pytest.raises(ValueError, match=r"fit of KNeighborsRegressor\(\) takes no weights"):
+        TemperatureMapper(KNeighborsRegressor()).fit(T, np.ones((120, 4)), sample_weight=WEIGHTS)
+
+
+@ROUTING
+def test_cross_validation_and_search_hand_weights_on(routing):
+    with config_context(enable_metadata_routing=routing):
+        asking = chain(TemperatureMapper(Spy()))
+        if routing:
+            asking.set_fit_request(sample_weight=True).set_score_request(sample_weight=True)
+        series = pd.Series(WEIGHTS, T.index)
+        found = cross_validate(
+            asking, T, F, cv=FOLDS, params={"sample_weight": series}, return_estimator=True, return_indices=True
+        )
+        search = GridSearchCV(asking, {"mapper__regressor__fit_intercept": [True, False]}, cv=FOLDS)
+        search.fit(T, F, sample_weight=WEIGHTS)
+        unasked = chain()
+        if routing:
+            with pytest.raises(UnsetMetadataPassedError, match=r"\[sample_weight\] .* DataInformedFEM"):
+                cross_validate(unasked, T, F, cv=FOLDS, params={"sample_weight": series})
+    for fit, train in zip(found["estimator"], found["indices"]["train"], strict=True):
+        np.testing.assert_array_equal(fit.mapper_.regressor_.weights_, WEIGHTS[train])
+    np.testing.assert_array_equal(search.best_estimator_.mapper_.regressor_.weights_, WEIGHTS)
+
+
+def test_with_routing_the_steps_that_request_weights_get_them():
+    theta = np.exp(-0.004 * T.to_numpy())
+    lines = make_pipeline(HingeFeatures(2), RidgeCV())
+    with config_context(enable_metadata_routing=True):
+        asked = clone(lines)
+        for _, step in asked.steps:
+            step.set_fit_request(sample_weight=True)
+        both = TemperatureMapper(asked).fit(T, theta, sample_weight=WEIGHTS)
+        last = TemperatureMapper(lines).fit(T, theta, sample_weight=WEIGHTS)
+        refusing = make_pipeline(HingeFeatures(2), Ridge())
+        refusing[0].set_fit_request(sample_weight=False)
+        refusing[1].set_fit_request(sample_weight=False)
+        refused = chain(make_pipeline(LagFeatures(1), refusing))
+        with pytest.raises(ValueError, match=r"takes no weights; expected .* by set_fit_request"):
+            refused.fit(T, F, sample_weight=WEIGHTS)
+        refused.fit(T, F)
+        half = clone(lines)
+        half[0].set_fit_request(sample_weight=True)
+        with pytest.raises(UnsetMetadataPassedError, match="RidgeCV"):
+            TemperatureMapper(half).fit(T, theta, sample_weight=WEIGHTS)
+    inputs = both.inputs_.transform(T.to_numpy())
+    np.testing.assert_array_equal(both.regressor_[0].knots_, HingeFeatures(2).fit(inputs, sample_weight=WEIGHTS).knots_)
+    np.testing.assert_array_equal(last.regressor_[0].knots_, HingeFeatures(2).fit(inputs).knots_)
+
+
+def test_routing_changes_no_result():
+    gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
+    fem = DataInformedFEM(TRUSS, inverse=InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=100), random_state=0)
+    off = clone(fem).fit(T, gaps)
+    with config_context(enable_metadata_routing=True):
+        on = clone(fem).fit(T, gaps)
+        np.testing.assert_array_equal(on.predict(T, return_std=True), off.predict(T, return_std=True))
