@@ -126,7 +126,9 @@ GAPPY = T.where(np.random.default_rng(0).random(T.shape) > 0.012)
 DIAGONAL = F.mask(np.eye(6, dtype=bool)[np.arange(365) % 6])
 HOLES = T.where(np.eye(3, dtype=bool)[np.arange(365) % 3])
 SHAPES = TRUSS.modes(ONES[:1])[1][0, [0, 4, 8]]
-DETECTOR = MahalanobisDetector().fit(F)
+with warnings.catch_warnings():  # a year of raw frequencies follows the seasons
+    warnings.simplefilter("ignore")
+    DETECTOR = MahalanobisDetector().fit(F)
 
 
 def compensator(estimator=LINEAR, targets=MODES, **options):

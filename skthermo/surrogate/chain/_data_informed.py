@@ -527,7 +527,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
             weather, order = self._weather(X), np.argsort(row_times(X), kind="stable")
             return self.residuals_.draw(weather[order], random)[np.argsort(order)]
-        shape = (len(self._temperatures(X)), len(self.mode_names_))
+        shape = (len(self._temperatures(X)[0]), len(self.mode_names_))
         return check_noise(noise, shape[1], self.mode_names_) * random.standard_normal(shape)
 
     def simulate_modes(
