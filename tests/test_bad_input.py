@@ -16,7 +16,6 @@ from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
-from sklearn.pipeline import make_pipeline
 
 import skthermo
 from skthermo._arguments import check_bounds, check_dofs, check_noise, check_prior, check_theta
@@ -595,7 +594,7 @@ DETECTION = [
         "missing modes",
         lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)),
         "warning",
-        "7 of 365 rows lack values and have no damage index",
+        "7 of 365 rows are not judged",
     ),
     ("all modes lost", lambda: DETECTOR.predict(F * NAN), "warning", "365 of 365 rows"),
     ("threshold of text", lambda: MahalanobisDetector(threshold="paper").fit(F), "error", "'threshold'.*'paper'"),
@@ -676,12 +675,11 @@ DETECTION = [
     ("kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "warning", "above 150: kelvin"),
     ("other columns later", lambda: COMPENSATOR.transform(BOTH.iloc[:, ::-1]), "error", "feature names"),
     ("names twice", lambda: MahalanobisDetector().fit(F.iloc[:, [0, 0]]), "error", "expected each name once"),
-    ("gaps in every row", lambda: compensator().fit(HOLES.join(F)), "error", "0 of 365|complete|row"),
     (
         "masked modes",
         lambda: MahalanobisDetector().fit(F.to_numpy()[:, :1]).predict(masked(F)[:, :1]),
         "warning",
-        "1 of 365 rows lack values and have no damage index",
+        "1 of 365 rows are not judged",
     ),
     ("a table of booleans", lambda: MahalanobisDetector().fit(F > 10), "error", "expected"),
     ("an infinite record", lambda: DETECTOR.predict(changed(F, 0, 0, INF)), "error", "infinity"),
@@ -974,7 +972,7 @@ SURROGATE = [
         "weights of other rows",
         lambda: TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=[1.0, 2.0]),
         "error",
-        r"sample_weight.shape == \(2,\), expected \(365,\)",
+        r"sample_weight has shape \(2,\); expected \(365,\)",
     ),
     ("a network of text", lambda: paper_network("big"), "error", "'big'"),
     ("other lengths", lambda: chain().fit(T, F[1:]), "error", "365 rows and frequencies 364"),
@@ -1041,13 +1039,6 @@ SURROGATE = [
         "warning",
         "20 complete rows train 4 parameters",
     ),
-    (
-        "gaps and lags",
-        lambda: chain(mapper=make_pipeline(LagFeatures(24, padding="nan"), TemperatureMapper(Ridge()))).fit(GAPPY, F),
-        "warning",
-        "only .* of 365 rows trained",
-    ),
-    ("all rows have gaps", lambda: chain(mapper=TemperatureMapper(Ridge())).fit(HOLES, F), "error", "complete|NaN|row"),
     ("scored on other rows", lambda: CHAIN.score(T, F[1:]), "error", "365 rows and .* 364"),
     ("scored on another index", lambda: CHAIN.score(T, F.shift(freq="1D")), "error", "different indices"),
     ("scored without F", lambda: CHAIN.score(T, None), "error", "None|y"),
