@@ -1,16 +1,20 @@
-"""Checks of models, theta, bounds, priors, noise, degrees of freedom and units.
+"""Checks of models, theta, bounds, priors, noise, degrees of freedom and units; values with names are read by name.
 
 Each check returns its argument as an array, or raises a ValueError that says what was got and what was expected.
 """
 
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, Bounds, by_parameter, real_array
+from skthermo._arrays import Array, Bounds, is_real, real_array, refuse_no_numbers
+
+MOST_NOISE = 0.2  # largest relative noise of frequencies: more is meant in percent
 
 
 def check_theta(
@@ -18,9 +22,7 @@ def check_theta(
 ) -> Array:
     """Rows of finite, positive multipliers, one column for each parameter."""
     names = list(parameter_names)
-    if hasattr(theta, "columns") and list(theta.columns) != names:
-        raise ValueError(f"theta has the columns {list(theta.columns)}; expected the parameters {names} in this order")
-    values = real_array(theta, "theta")
+    values = real_array(by_name(columns_by_name(theta, names, "theta"), names, "theta"), "theta")
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(
@@ -42,13 +44,14 @@ def check_theta(
 def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     """Lowest and highest multiplier of every parameter."""
     names = list(parameter_names)
-    if isinstance(bounds, Mapping):
-        widths = by_parameter(bounds, names, "bounds")
+    if isinstance(bounds, Mapping) or is_labelled(bounds):
+        widths = by_name(bounds, names, "bounds")
         return np.vstack([check_bounds(_pair(width, name), [name]) for name, width in zip(names, widths, strict=True)])
-    array = real_array(bounds, "bounds")
+    ends = columns_by_name(bounds, ("lowest", "highest"), "bounds", "columns")
+    array = real_array(rows_by_name(ends, names, "bounds"), "bounds")
     if array.ndim == 0:
         if not 0 < array < 1:
-            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3")
+            raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3 for 30 %")
         return np.tile([1 - array, 1 + array], (len(names), 1))
     if array.shape != (len(names), 2):
         raise ValueError(
@@ -64,34 +67,99 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
 def check_prior(prior: ArrayLike | Mapping[str, float], parameter_names: Sequence[str]) -> Array:
     """Standard deviation of the prior of every parameter."""
     names = list(parameter_names)
-    given = by_parameter(prior, names, "prior") if isinstance(prior, Mapping) else prior
-    deviations = real_array(given, "prior")
-    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & np.isfinite(deviations)).all():
+    deviations = real_array(by_name(prior, names, "prior"), "prior")
+    if deviations.shape not in ((), (len(names),)) or not ((deviations > 0) & (deviations <= 1)).all():
         raise ValueError(
-            f"prior is {deviations}; expected relative standard deviations above 0, a number or one for each of {names}"
+            f"prior is {deviations}; expected relative standard deviations above 0 and at most 1 (0.3 means 30 %), "
+            f"a number or one for each of {names}"
         )
     return np.broadcast_to(deviations, (len(names),))
 
 
-def check_noise(noise: ArrayLike, n_modes: int) -> NDArray[np.float64]:
+def check_noise(
+    noise: ArrayLike,
+    n_modes: int,
+    mode_names: Sequence[Any] | None = None,
+    *,
+    what: str = "noise",
+    most: float = MOST_NOISE,
+) -> NDArray[np.float64]:
     """Relative standard deviation of every mode."""
-    array = real_array(noise, "noise")
+    array = real_array(by_mode(noise, n_modes, mode_names, what), what)
     if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
         raise ValueError(
-            f"noise is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
+            f"{what} is {array}; expected a relative standard deviation, 0 or more and below 1 (0.01 means 1 %), "
             f"a number or one for each of the {n_modes} modes"
+        )
+    if (array > most).all():  # a single mode may be unknown
+        raise ValueError(
+            f"{what} is {array}, which means {100 * np.min(array):.0f} % or more in every mode: percent? expected at "
+            f"most {most:g} in some mode, and {np.min(array) / 100:g} where {np.min(array):g} % is meant"
         )
     return np.broadcast_to(array, (n_modes,))
 
 
+def by_mode(values: Any, n_modes: int, mode_names: Sequence[Any] | None, what: str) -> Any:
+    """Values of a Series or mapping by mode in the order of the modes, which are named f1, f2, ... by default."""
+    names = [f"f{i + 1}" for i in range(n_modes)] if mode_names is None else list(mode_names)[:n_modes]
+    return by_name(values, names, what, "modes")
+
+
+def check_flag(flag: Any, what: str) -> bool:
+    """Whether a flag is set; anything but a boolean is an error."""
+    if not isinstance(flag, bool | np.bool_):
+        raise ValueError(f"{what} is {flag!r:.100}; expected True or False")
+    return bool(flag)
+
+
+def check_jobs(n_jobs: Any) -> None:
+    """Raise an error for what is no number of joblib's jobs."""
+    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
+        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+
+
+def check_names(names: Any, what: str) -> list[str]:
+    """Different names as a list; one text in place of several is an error."""
+    given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
+    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
+        raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
+    if len(set(given)) < len(given):
+        raise ValueError(f"{what} are {given!r:.200}; expected each name once")
+    return given
+
+
+def check_size(value: Any, what: str, lowest: float, highest: float, expected: str) -> float:
+    """A real number strictly between two others."""
+    if not is_real(value) or not lowest < float(value) < highest:
+        raise ValueError(f"{what} is {value!r:.100}; expected {expected}")
+    return float(value)
+
+
+def integer_row(values: Any, what: str, expected: str = "integers in one row") -> NDArray[np.integer]:
+    """One or more integers; anything else, also True and False among them, is an error."""
+    try:
+        array = np.asarray(values)
+        is_row = array.ndim == 1 and array.size and np.issubdtype(array.dtype, np.integer)
+        refuse_no_numbers(values, what)
+    except ValueError as error:  # also rows of different length
+        raise ValueError(f"{what} is {values!r:.200}; expected {expected}") from error
+    if not is_row:
+        raise ValueError(
+            f"{what} is {values!r:.100}, of shape {array.shape} and type {array.dtype}; expected {expected}"
+        )
+    return array
+
+
+def check_path(path: Any, what: str = "path") -> Path:
+    """A path, given as text or as a path."""
+    if not isinstance(path, str | PathLike) or not str(path):
+        raise ValueError(f"{what} is {path!r:.200}; expected a path, as text or a pathlib.Path")
+    return Path(path)
+
+
 def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     """Different degrees of freedom of a model."""
-    try:
-        array = np.asarray(dofs)
-    except ValueError as error:  # rows of different length
-        raise ValueError(f"dofs is {dofs!r:.200}; expected integers in one row") from error
-    if array.ndim != 1 or not array.size or not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"dofs has shape {array.shape} and type {array.dtype}; expected integers in one row")
+    array = integer_row(dofs, "dofs")
     outside = array[(array < 0) | (array >= n_dof)]
     if outside.size:
         raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
@@ -110,7 +178,7 @@ def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:
 def _pair(width: Any, name: str) -> Any:
     """A half-width, or lowest and highest as the only row."""
     if np.ndim(width) == 0:
-        if not (isinstance(width, Real) and 0 < float(width) < 1):
+        if not (is_real(width) and 0 < float(width) < 1):
             raise ValueError(
                 f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
                 "highest)"
@@ -136,3 +204,59 @@ def check_model(candidate: Any) -> None:
             f"model is {candidate!r:.200}; expected an FE model, an object with parameter_names, n_modes and "
             "frequencies"
         )
+
+
+def by_name(values: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
+    """Values of a mapping, or of a Series with labels, in the order of the names; anything else unchanged.
+
+    The labels must be exactly the names. Labels 0, 1, 2, ... are no names.
+    """
+    if isinstance(values, Mapping):
+        labels = list(values)
+    elif is_labelled(values):
+        labels = list(values.index)
+    else:
+        return values
+    check_labels(labels, names, what, kind)
+    return [values[name] for name in names]
+
+
+def rows_by_name(table: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
+    """A frame with labelled rows in the order of the names; anything else unchanged."""
+    if not hasattr(table, "iloc") or table.ndim != 2 or is_numbered(table.index):
+        return table
+    check_labels(list(table.index), names, what, kind)
+    return table.loc[list(names)]
+
+
+def columns_by_name(table: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
+    """A frame with labelled columns in the order of the names; anything else unchanged."""
+    if not hasattr(table, "columns") or is_numbered(table.columns):
+        return table
+    check_labels(list(table.columns), names, what, kind)
+    return table[list(names)]
+
+
+def check_labels(labels: Sequence[Any], names: Sequence[Any], what: str, kind: str) -> None:
+    """Raise an error unless labels are the names, in any order."""
+    unknown = [label for label in labels if label not in names]
+    missing = [name for name in names if name not in labels]
+    repeated = [label for place, label in enumerate(labels) if label in labels[:place]]
+    for wrong, problem in ((unknown, "unknown"), (missing, "missing"), (repeated, "repeated")):
+        if wrong:
+            raise ValueError(f"{what}: {wrong} are {problem}; expected each of the {kind} {list(names)}")
+
+
+def is_labelled(values: Any) -> bool:
+    """Whether values are a Series of pandas whose labels are not just 0, 1, 2, ..."""
+    return hasattr(values, "iloc") and values.ndim == 1 and not is_numbered(values.index)
+
+
+def is_numbered(labels: Any) -> bool:
+    """Whether labels are just 0, 1, 2, ..., which name nothing."""
+    return list(labels) == list(range(len(labels)))
+
+
+def as_mapping(values: Any) -> Any:
+    """A Series with different labels as a mapping; anything else unchanged."""
+    return dict(values.items()) if is_labelled(values) and values.index.is_unique else values

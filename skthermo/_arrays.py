@@ -1,7 +1,9 @@
-"""Arrays, matrices and seeds, without scikit-learn or pandas."""
+"""Arrays, matrices and seeds, without scikit-learn or pandas; what counts as a number: not times, text, booleans, bytes
+or categories, which NumPy and pandas would convert."""
 
-from collections.abc import Callable, Mapping, Sequence
-from numbers import Integral
+from collections.abc import Callable, Iterator, Mapping
+from datetime import date, time, timedelta
+from numbers import Integral, Real
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,34 +16,51 @@ MatrixLike: TypeAlias = ArrayLike | scipy.sparse.sparray | scipy.sparse.spmatrix
 Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
 RandomState: TypeAlias = int | np.random.RandomState | None
 
+NO_NUMBERS = {
+    "booleans": (bool, np.bool_),
+    "text": (str,),
+    "bytes": (bytes, bytearray, memoryview),
+    "times": (date, time, timedelta, np.datetime64, np.timedelta64),
+    "complex numbers": (complex, np.complexfloating),
+}
+KINDS = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
+HUGE = 1e150  # squares of larger numbers are infinite
 
-def by_parameter(values: Mapping[str, Any], parameter_names: Sequence[str], what: str) -> list[Any]:
-    """Values of a mapping in the order of the parameters; its keys must be exactly the parameters."""
-    unknown = [name for name in values if name not in parameter_names]
-    missing = [name for name in parameter_names if name not in values]
-    if unknown or missing:
-        problem = f"{unknown} are unknown" if unknown else f"{missing} are missing"
-        raise ValueError(f"{what}: {problem}; expected each of the parameters {list(parameter_names)}")
-    return [values[name] for name in parameter_names]
 
-
-def real_array(values: Any, what: str) -> Array:
-    """An array of floats; complex numbers, sparse matrices and values that are not numbers are errors."""
+def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
+    """An array of floats; complex numbers, sparse matrices and what is no number or, without ``any_size``, too
+    large to be squared, are errors."""
     if values is None:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
     try:
-        if not np.iscomplexobj(values):
-            return as_floats(values)
+        array = None if np.iscomplexobj(values) else as_floats(values)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{what} is {values!r:.200}; expected numbers ({error})") from error
-    raise ValueError(f"{what} is complex; expected real numbers")
+        reason = str(error).partition(";")[0]
+        raise ValueError(f"{what} is {values!r:.200}; expected numbers ({reason})") from error
+    if array is None:
+        raise ValueError(f"{what} is complex; expected real numbers")
+    if not any_size:
+        refuse_huge(array, what)
+    return array
+
+
+def shape_array(values: Any, what: str, *, any_size: bool = False) -> NDArray:
+    """An array of floats or, where some are complex, of complex numbers: mode shapes."""
+    try:
+        is_complex = np.iscomplexobj(values)
+    except ValueError as error:  # rows of different length
+        raise ValueError(f"{what} is {values!r:.200}; expected rows of one length") from error
+    return np.asarray(values, dtype=complex) if is_complex else real_array(values, what, any_size=any_size)
 
 
 def as_floats(values: Any) -> Array:
-    """An array of floats; values that are masked or missing become NaN."""
+    """An array of floats; values that are masked or missing become NaN, and what is no number is an error."""
     values = without_mask(values)
+    if scipy.sparse.issparse(values):
+        raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
+    refuse_no_numbers(values)
     is_pandas = hasattr(values, "iloc")
     array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):
@@ -83,7 +102,7 @@ def positive_integer(value: Any, what: str) -> int:
 
     NumPy's small integer types would overflow in products.
     """
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+    if not isinstance(value, Integral) or not is_real(value) or value < 1:
         raise ValueError(f"{what} is {value!r}; expected a positive integer")
     return int(value)
 
@@ -93,6 +112,8 @@ def as_random_state(seed: Any) -> np.random.RandomState:
     from sklearn.utils import check_random_state
 
     try:
+        if isinstance(seed, bool):
+            raise ValueError
         return check_random_state(seed)
     except ValueError as error:
         raise ValueError(
@@ -138,3 +159,74 @@ def central_differences(function: Callable[[Array], Array], theta: Array, values
     n_known = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
     widths = n_known * (step * theta).reshape(n_samples, n_parameters, *[1] * (values.ndim - 1))
     return np.moveaxis((above - below) / widths, 1, -1)
+
+
+def is_real(value: Any) -> bool:
+    """Whether a value is a real number; True, False and durations are none."""
+    return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
+
+
+def refuse_no_numbers(values: Any, what: str = "the input") -> None:
+    """Raise an error for an array, a table or nested lists with values that are no numbers.
+
+    NumPy and pandas would read "1.0" and True as 1, and a date as nanoseconds.
+    """
+    if isinstance(values, type) or callable(values):
+        raise ValueError(f"{what} is {values!r:.100}; expected numbers")
+    for name, part in _parts(values):
+        what, example = _no_number(part)
+        if what:
+            where = f"column {name!r}" if name is not None else what
+            hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
+            raise ValueError(
+                f"{where} holds {what}, such as {example!r:.60}; expected numbers"
+                f"{hint if name is not None and what == 'times' else ''}"
+            )
+
+
+def refuse_huge(values: Any, what: str) -> None:
+    """Raise an error for finite numbers that are too large to be squared."""
+    array = np.asarray(values)
+    if array.dtype == np.float64 and array.size and np.fmax.reduce(np.abs(array), axis=None) > HUGE:
+        huge = array[np.isfinite(array) & (np.abs(array) > HUGE)]
+        if huge.size:
+            raise ValueError(f"{what} holds {huge[0]:g}; expected numbers from {-HUGE:g} to {HUGE:g}")
+
+
+def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
+    """Columns of a frame that may hold no numbers, by name; of anything else the values themselves."""
+    if not (hasattr(values, "columns") and hasattr(values, "dtypes")):
+        yield None, values
+        return
+    for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
+        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc":
+            yield name, values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
+
+
+def _no_number(values: Any) -> tuple[str, Any]:
+    """What kind of values are no numbers, and the first of them; an empty text if all are numbers."""
+    if isinstance(values, list | tuple):
+        if len({len(row) for row in values if isinstance(row, list | tuple)}) > 1:
+            return "rows of different lengths", values
+        return next((found for found in map(_no_number, values) if found[0]), ("", None))
+    dtype = getattr(values, "dtype", None)
+    if dtype is None:
+        return _kind_of(values), values
+    kind = "categories" if str(dtype) == "category" else KINDS.get(getattr(dtype, "kind", ""), "")
+    if kind:
+        return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
+    if getattr(dtype, "kind", "") == "O":
+        objects = np.ravel(np.asarray(values, dtype=object))
+        kinds = {kind: _kind_of_type(kind) for kind in set(map(type, objects))}
+        if any(kinds.values()):
+            example = next(value for value in objects if kinds[type(value)])
+            return kinds[type(example)], example
+    return "", None
+
+
+def _kind_of(value: Any) -> str:
+    return _kind_of_type(type(value))
+
+
+def _kind_of_type(cls: type) -> str:
+    return next((what for what, classes in NO_NUMBERS.items() if issubclass(cls, classes)), "")

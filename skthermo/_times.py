@@ -1,5 +1,6 @@
 """When a record was taken: its time on a DatetimeIndex, else its number."""
 
+from datetime import timedelta
 from numbers import Real
 from typing import Any
 
@@ -22,9 +23,11 @@ def time_of(T: Any, moment: Any, what: str) -> float:
     """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last."""
     times, is_timed = row_times(T), has_stamps(T)
     if isinstance(moment, int | np.integer) and not isinstance(moment, bool) and moment >= 0:
+        if not is_timed:
+            return float(moment)
         return float(times[moment]) if moment < len(times) else np.inf
     try:
-        if is_timed and not isinstance(moment, Real):
+        if is_timed and not isinstance(moment, Real | timedelta) and not pd.isna(moment):
             return float((pd.Timestamp(moment).as_unit("ns") - T.index[0].as_unit("ns")).value)
     except (TypeError, ValueError):
         pass

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 import numpy as np
 import pandas as pd
 import sklearn.utils
+import sklearn.utils._param_validation
 import sklearn.utils.validation
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
@@ -18,14 +19,14 @@ from sklearn.neighbors._base import _get_weights
 from sklearn.pipeline import Pipeline
 from sklearn.utils import check_random_state
 from sklearn.utils._metadata_requests import _routing_enabled
-from sklearn.utils._param_validation import HasMethods, Interval, InvalidParameterError, StrOptions
+from sklearn.utils._param_validation import HasMethods, InvalidParameterError, StrOptions
 from sklearn.utils._user_interface import _print_elapsed_time
 from sklearn.utils.metadata_routing import get_routing_for_object
 from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted
 
 from skthermo._arguments import is_model
-from skthermo._arrays import without_mask, without_missing
+from skthermo._arrays import refuse_huge, refuse_no_numbers, without_mask, without_missing
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
     Method = TypeVar("Method", bound=Callable[..., Any])
@@ -71,7 +72,6 @@ __all__ = [
     "_routing_enabled",
     "check_array",
     "check_is_fitted",
-    "numbers_expected",
     "routes_weights",
     "seed_parts",
     "seeded",
@@ -82,6 +82,14 @@ __all__ = [
 
 class Estimator(BaseEstimator):
     """Base of estimators that accept NaN in X, and of which clones share FE models."""
+
+    def _validate_params(self) -> None:
+        if isinstance(getattr(self, "random_state", None), bool):
+            raise InvalidParameterError(
+                f"The 'random_state' parameter of {type(self).__name__} is {self.random_state!r}; expected an integer, "
+                "a RandomState or None"
+            )
+        super()._validate_params()
 
     def __sklearn_clone__(self) -> Self:
         parameters = self.get_params(deep=False)
@@ -143,53 +151,37 @@ class Estimator(BaseEstimator):
         return tags
 
 
+class Interval(sklearn.utils._param_validation.Interval):
+    """scikit-learn's interval without True and False, which would count as 1 and 0."""
+
+    def is_satisfied_by(self, val: Any) -> bool:
+        """Whether a value is a number within the interval."""
+        return not isinstance(val, bool | np.timedelta64) and super().is_satisfied_by(val)
+
+
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data`; masked or missing values in X become NaN, and repeated column names are an
-    error."""
-    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
-        raise ValueError(f"X has the columns {list(X.columns)}; expected each name once")
-    with numbers_expected():
-        return sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
+    """scikit-learn's `validate_data`; masked or missing values in X become NaN, and repeated column names and what is
+    no number are errors."""
+    values = sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
+    refuse_huge(values, "X")
+    return values
 
 
 def check_array(values: Any, **options: Any) -> Any:
-    """scikit-learn's `check_array`; masked or missing values become NaN."""
-    with numbers_expected():
-        return sklearn.utils.check_array(with_nan(values), **options)
-
-
-def refuse_times(table: Any) -> None:
-    """Refuse a column of times in a frame of pandas or Polars, which would count as numbers or fail later."""
-    if not (hasattr(table, "columns") and hasattr(table, "dtypes")):
-        return
-    for name, dtype in zip(table.columns, table.dtypes, strict=True):
-        is_time = dtype.is_temporal() if hasattr(dtype, "is_temporal") else getattr(dtype, "kind", "") in ("M", "m")
-        if is_time:
-            raise ValueError(
-                f"column {name!r} holds times; expected numbers, and times as the index of a pandas frame, as by "
-                f"frame.set_index({name!r})"
-            )
-
-
-@contextmanager
-def numbers_expected() -> Iterator[None]:
-    """Replace NumPy's conversion error by one that says that a table holds text or complex numbers."""
-    try:
-        yield
-    except (ValueError, TypeError) as error:
-        text, is_complex = str(error), "'complex'" in str(error)
-        if not (is_complex or text.startswith("could not convert string")):
-            raise
-        what = "complex numbers" if is_complex else f"text: {text.partition(': ')[2]}"
-        raise ValueError(f"X holds {what}; expected numbers") from error
+    """scikit-learn's `check_array`; masked or missing values become NaN, and what is no number is an error."""
+    array = sklearn.utils.check_array(with_nan(values), **options)
+    refuse_huge(array, options.get("input_name") or "y")
+    return array
 
 
 def with_nan(X: Any) -> Any:
     """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
 
-    A column of times is an error.
+    Times, text, booleans, bytes and repeated column names are errors.
     """
-    refuse_times(X)
+    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
+        raise ValueError(f"the input has the columns {list(X.columns)}; expected each name once")
+    refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
     if isinstance(X, np.ndarray) and X.dtype == object:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from skthermo._arguments import check_noise
-from skthermo._arrays import Array, as_random_state, positive_integer
+from skthermo._arguments import check_flag, check_noise
+from skthermo._arrays import Array, as_random_state, is_real, positive_integer
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors
 from skthermo.datasets._kw51_truth import (
@@ -102,7 +101,7 @@ def _by_group(values: Mapping[str, float] | None, what: str) -> Mapping[str, flo
     if not isinstance(values, Mapping) or not set(values) <= set(groups):
         raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
     for group, value in values.items():
-        if not isinstance(value, Real) or not np.isfinite(value):
+        if not is_real(value) or not np.isfinite(value):
             raise ValueError(f"{what} of group {group!r} is {value!r}; expected a finite number")
     return values
 
@@ -290,6 +289,8 @@ def make_kw51_campaign(
     """
     n_hours = positive_integer(n_hours, "n_hours")
     deviations = check_noise(noise, 6)
+    for what, flag in (("gaps", gaps), ("retrofit", retrofit), ("shapes", shapes)):
+        check_flag(flag, what)
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 

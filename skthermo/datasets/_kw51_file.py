@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from skthermo._arguments import check_path
 from skthermo._arrays import Array
 from skthermo._io import read_matlab
 from skthermo._warnings import warn_user
@@ -110,7 +111,7 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     ...
     FileNotFoundError: no_such_folder/trackedmodes.zip is not a file; expected trackedmodes.zip or trackedmodes.mat
     """
-    file = Path(path)
+    file = check_path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
     data = _data(read_matlab(file), file)

@@ -107,6 +107,8 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     array([1.1658, 1.    , 0.933 ])
     """
     celsius = real_array(temperature, "temperature")
+    if np.isinf(celsius).any():
+        raise ValueError("temperature holds infinite values; expected degrees Celsius, or NaN")
     if celsius.size and (celsius > KELVIN).all():
         raise ValueError(f"temperature is {celsius.min():g} or more, kelvin? expected degrees Celsius")
     return 1 - (celsius - 20) / 200 * np.exp(-0.01 * celsius)
@@ -190,7 +192,7 @@ def make_truss_campaign(
     )
     model = truss_structure().assemble(ZONES, groups=PARAMETERS)
     theta = steel_modulus(temperatures)
-    clean = model.damaged(damage or {}).frequencies(theta)
+    clean = model.damaged({} if damage is None else damage).frequencies(theta)
     noisy = add_noise(clean, noise, random_state=random)
     modes = [f"f{i + 1}" for i in range(model.n_modes)]
     return TrussCampaign(

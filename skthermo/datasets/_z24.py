@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from skthermo._arguments import check_path
 from skthermo._io import read_matlab
 from skthermo.datasets._results import Z24Monitoring
 
@@ -78,7 +79,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     ...
     FileNotFoundError: no_such_folder/z24.csv is not a file; expected the Z24 data as CSV or MATLAB v5 file
     """
-    file = Path(path)
+    file = check_path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not a file; expected the Z24 data as CSV or MATLAB v5 file")
     with open(file, "rb") as stream:

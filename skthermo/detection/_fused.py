@@ -115,6 +115,12 @@ class FusedDetector(DamageDetector, _BaseComposition):
     def _learn(self, X: ArrayLike, times: Array) -> Array:
         if not self.detectors:
             raise ValueError("detectors is an empty list; expected one or more (name, detector)")
+        pairs = [pair for pair in self.detectors if isinstance(pair, tuple) and len(pair) == 2]
+        wrong = [p for p in pairs if not isinstance(p[0], str) or isinstance(p[1], type) or not hasattr(p[1], "fit")]
+        if len(pairs) < len(self.detectors) or wrong or len({name for name, _ in pairs}) < len(pairs):
+            raise ValueError(
+                f"detectors is {self.detectors!r:.200}; expected pairs (name, detector) with names of their own"
+            )
         self._validate_names([name for name, _ in self.detectors])
         with warnings_once("for other detectors"):
             self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]

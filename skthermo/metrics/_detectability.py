@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import is_labelled
 from skthermo._arrays import real_array
+from skthermo._frames import check_same_rows
 from skthermo._times import row_times, time_of
 from skthermo._warnings import warn_user
 
@@ -124,6 +126,8 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     s, p, reliable_pod = (
         real_array(values, name) for name, values in (("severities", severities), ("pod", pod), ("level", level))
     )
+    if all(is_labelled(values) for values in (severities, pod)):
+        check_same_rows(severities, pod, ("severities", "pod"))
     if s.ndim != 1 or s.shape != p.shape or not s.size:
         raise ValueError(f"severities have shape {s.shape} and pod {p.shape}; expected two vectors of one length")
     if not np.isfinite(s).all() or len(np.unique(s)) < len(s):

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
-from skthermo._arguments import is_model
+from skthermo._arguments import by_mode, is_model
 from skthermo._arrays import as_floats, real_array
 from skthermo._frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
@@ -169,7 +169,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
         if is_model(self.reference):
             reference = as_floats(self.reference.frequencies(np.ones((1, len(self.reference.parameter_names)))))[0]
         else:
-            reference = real_array(self.reference, "reference")
+            names = getattr(self, "feature_names_in_", None)
+            reference = real_array(by_mode(self.reference, n_modes, names, "reference"), "reference")
         if reference.shape != (n_modes,) or not np.isfinite(reference).all():
             raise ValueError(
                 f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "

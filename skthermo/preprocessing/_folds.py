@@ -89,7 +89,7 @@ class BlockedKFold(BaseCrossValidator):
         times = row_times(X)
         n_rows = len(times)
         if n_rows < self.n_splits:
-            raise ValueError(f"{n_rows} rows are fewer than {self.n_splits} folds")
+            raise ValueError(f"{n_rows} rows are fewer than {self.n_splits} folds; expected a row for each")
         positions, length = times - times.min(), self._length(X)
         if (is_rows := isinstance(length, int)) or not has_stamps(X):
             positions = np.empty(n_rows)

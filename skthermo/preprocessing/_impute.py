@@ -17,7 +17,6 @@ from skthermo._validation import (
     _num_samples,
     check_array,
     check_is_fitted,
-    numbers_expected,
     validate_data,
     with_nan,
 )
@@ -136,9 +135,12 @@ class KNNGapImputer(KNNImputer):
         UserWarning
             If there are numbers that stand for a missing value, such as -999, while ``missing_values`` is NaN.
         """
+        if isinstance(self.n_neighbors, bool):
+            raise ValueError(f"n_neighbors is {self.n_neighbors}; expected an integer")
+        if isinstance(self.weights, type) or isinstance(self.metric, type):
+            raise ValueError(f"weights is {self.weights!r} and metric {self.metric!r}; expected no class")
         X = with_nan(X)
-        with numbers_expected():
-            super().fit(X, y)
+        super().fit(X, y)
         kept = set(super().get_feature_names_out())
         self.is_empty_ = np.array([name not in kept for name in _check_feature_names_in(self, None)])
         if self.is_empty_.any() and not self.keep_empty_features:

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._arrays import is_real
+
 LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
 ZERO = np.timedelta64(0, "ns")
 DATE_AS_TEXT = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
@@ -49,6 +51,8 @@ def as_duration(value: Any, name: str) -> np.timedelta64:
             f"{name} is {value!r}; expected a duration of fixed length with its unit, such as '10min', '1h' or '30D'"
         )
     try:
+        if is_real(value) or isinstance(value, bool):  # nanoseconds for pandas
+            raise TypeError
         numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
         duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
     except (ValueError, TypeError, AttributeError) as error:

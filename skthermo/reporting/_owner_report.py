@@ -13,7 +13,9 @@ from uuid import uuid4
 
 from sklearn.exceptions import NotFittedError
 
+from skthermo._arguments import check_path
 from skthermo._formatting import counted
+from skthermo.fem import Structure
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._findings import findings_of
 from skthermo.reporting._html import Html, bullets, element, page, paragraphs, section, table
@@ -88,7 +90,11 @@ def owner_report(
         raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
-    file = Path(path)
+    if title is not None and not isinstance(title, str):
+        raise ValueError(f"title is {title!r:.100}; expected a text")
+    if structure is not None and not isinstance(structure, Structure):
+        raise ValueError(f"structure is {structure!r:.200}; expected a Structure")
+    file = check_path(path)
     if not file.parent.is_dir():
         raise ValueError(
             f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"

@@ -68,7 +68,8 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     >>> paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes
     (256, 128, 64, 32, 16)
     """
-    purpose = TABLES.get(network, network)
+    is_name = isinstance(network, str | int) and not isinstance(network, bool)
+    purpose = TABLES.get(network, network) if is_name else None
     if purpose not in NETWORKS:
         raise ValueError(f"network is {network!r}; expected one of {[*NETWORKS]} or of the tables {[*TABLES]}")
     settings = NETWORKS[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000}

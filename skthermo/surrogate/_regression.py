@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
+from skthermo._arguments import check_flag, columns_by_name
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
 from skthermo._regressors import fit_outputs, predict_with_std
@@ -61,7 +62,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         ValueError
             If ``return_std`` is set and the regressor gives no standard deviations.
         """
-        theta, std = self._predict_arrays(X, return_std)
+        theta, std = self._predict_arrays(X, check_flag(return_std, "return_std"))
         return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
@@ -81,7 +82,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         float
             NaN if fewer than two rows are complete.
         """
-        return complete_r2(as_columns(y), as_columns(self.predict(X)), row_weights(sample_weight, X))
+        predicted = self.predict(X)
+        targets = y if self.parameter_names_ is None else columns_by_name(y, self.parameter_names_, "y")
+        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
 
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None

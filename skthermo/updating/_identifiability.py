@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
 from skthermo._arguments import check_model, check_noise
-from skthermo._arrays import Array, real_array
+from skthermo._arrays import HUGE, Array, is_real, real_array
 from skthermo._formatting import SPACE, counted, listed
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
@@ -223,6 +222,8 @@ def cramer_rao(information: ArrayLike) -> Array:
            [ nan,  inf]])
     """
     information = real_array(information, "information")
+    if np.isinf(information).any():
+        raise ValueError("information holds infinite values; expected finite ones")
     if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
         raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
     if not np.isfinite(information).all():
@@ -245,7 +246,7 @@ def cramer_rao(information: ArrayLike) -> Array:
 
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
-    if not isinstance(shape_noise, Real) or not 0 < shape_noise < np.inf:
+    if not is_real(shape_noise) or not 0 < shape_noise < HUGE:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
     shapes, d_shapes = shape_jacobian(model, row, dofs)

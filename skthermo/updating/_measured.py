@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs
-from skthermo._arrays import Array, real_array
+from skthermo._arguments import by_name, check_dofs
+from skthermo._arrays import Array, real_array, shape_array
 from skthermo._warnings import warn_user
 
 
@@ -59,7 +59,7 @@ def read_measured(
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
     places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
-    weights = _per_mode(shape_weight, n_modes, "shape_weight")
+    weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
     if not places.size and weights.any():
@@ -107,13 +107,13 @@ def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tu
     if shapes is None:
         return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
     places = check_dofs(dofs, n_dof)
-    array = np.asarray(shapes)
+    array = shape_array(shapes, "shapes")
     if array.shape != (len(places), n_modes):
         raise ValueError(
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = _real_shapes(array) if np.iscomplexobj(array) else real_array(shapes, "shapes")
+    array = _real_shapes(array) if np.iscomplexobj(array) else array
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]
@@ -127,7 +127,7 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
     """Standard deviations in Hz; without any, the frequencies themselves, for a weight of 1."""
     if frequency_std is None:
         return means
-    deviations = _per_mode(frequency_std, len(means), "frequency_std")
+    deviations = _per_mode(frequency_std, names, "frequency_std")
     wrong = np.flatnonzero(np.isfinite(means) & ~((deviations > 0) & np.isfinite(deviations)))
     if wrong.size:
         raise ValueError(
@@ -136,8 +136,9 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
     return deviations
 
 
-def _per_mode(values: ArrayLike, n_modes: int, what: str) -> Array:
-    array = real_array(values, what)
+def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
+    n_modes = len(names)
+    array = real_array(by_name(values, names, what, "modes"), what)
     if array.shape not in ((), (n_modes,)):
         raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
     return np.broadcast_to(array, (n_modes,)).copy()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_model, check_theta
-from skthermo._arrays import Array, central_differences, real_array
+from skthermo._arrays import HUGE, Array, central_differences, is_real, real_array
 from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
@@ -86,7 +85,7 @@ def sensitivity(
             raise ValueError(f"{model!r} has no method 'jacobian'; expected one that has, or method='central'")
         jacobian = model.jacobian(row)
     elif method == "central":
-        if not isinstance(step, Real) or not SMALLEST_STEP <= step < 1:
+        if not is_real(step) or not SMALLEST_STEP <= step < 1:
             raise ValueError(
                 f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which rounding takes "
                 "more than half of the digits, to 1, such as 0.01"
@@ -128,7 +127,12 @@ def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
     if not isinstance(S, pd.DataFrame):
         raise ValueError(f"S is a {type(S).__name__}; expected a DataFrame whose columns are parameters")
     values = real_array(S, "S")
-    if not isinstance(threshold, Real) or not 0 <= threshold < np.inf:
+    if not values.size or not np.isfinite(values).all() or S.columns.has_duplicates:
+        raise ValueError(
+            f"S has shape {values.shape} and the columns {list(S.columns)}; expected finite sensitivities of different "
+            "parameters"
+        )
+    if not is_real(threshold) or not 0 <= threshold < HUGE:
         raise ValueError(f"threshold is {threshold!r}; expected a number of zero or more, such as 0.1")
     return [*S.columns[(np.abs(values) >= threshold).any(axis=0)]]
 

@@ -116,14 +116,15 @@ def test_theta_is_checked_everywhere(method, theta, message):
         getattr(make_truss(), method)(theta)
 
 
-def test_theta_frame_must_have_the_models_columns():
+def test_theta_frame_is_read_by_its_columns():
     import pandas as pd
 
     truss = make_truss()
-    frame = pd.DataFrame(np.ones((2, 4)), columns=truss.parameter_names)
+    frame = pd.DataFrame([[1.0, 0.9, 1.1, 0.8]] * 2, columns=truss.parameter_names)
     np.testing.assert_array_equal(truss.frequencies(frame), truss.frequencies(frame.to_numpy()))
-    with pytest.raises(ValueError, match="theta has the columns"):
-        truss.frequencies(frame[["top", "bottom", "diagonal", "vertical"]])
+    np.testing.assert_array_equal(truss.frequencies(frame[frame.columns[::-1]]), truss.frequencies(frame.to_numpy()))
+    with pytest.raises(ValueError, match="theta: \\['deck'\\] are unknown; expected each of the parameters"):
+        truss.frequencies(frame.rename(columns={"top": "deck"}))
 
 
 @pytest.mark.parametrize(

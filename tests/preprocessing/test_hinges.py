@@ -101,7 +101,9 @@ def test_columns_without_values_and_bad_numbers_of_knots_are_errors():
     with pytest.raises(ValueError, match="'deck' is NaN in every row; expected values to place knots at"):
         HingeFeatures().fit(AIR.assign(deck=np.nan))
     with pytest.raises(ValueError, match="'deck' is NaN in every row"):
-        HingeFeatures().fit(AIR.assign(deck=AIR["deck"].where(AIR["air"] > 0)), sample_weight=AIR["air"] <= 0)
+        HingeFeatures().fit(
+            AIR.assign(deck=AIR["deck"].where(AIR["air"] > 0)), sample_weight=(AIR["air"] <= 0).astype(float)
+        )
     for n_knots in (0, 1.5, "many"):
         with pytest.raises(ValueError, match="'n_knots'"):
             HingeFeatures(n_knots).fit(AIR)

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_theta
+from skthermo._arguments import check_flag, check_theta
 from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
@@ -125,7 +125,7 @@ class AffineModel(AffineBase):
             stiffness_terms,
             mass_terms,
             ranks=range(n_modes),
-            track=bool(track),
+            track=check_flag(track, "track"),
             available=min(available, solvable),
         )
 

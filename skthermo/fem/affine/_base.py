@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs, check_theta
-from skthermo._arrays import Array, MatrixLike
+from skthermo._arguments import check_dofs, check_flag, check_theta
+from skthermo._arrays import Array, MatrixLike, real_array, shape_array
 from skthermo._threads import map_on_blas_threads
 from skthermo._warnings import warn_user
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
@@ -143,6 +143,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
         row = check_theta(theta, self.parameter_names, one_row=True)
+        check_flag(follow, "follow")
         self._warn_of_bounds(row)
         return self._core.local_modes(row, follow=follow, basis=self._basis)
 
@@ -159,7 +160,12 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         ndarray of shape (n_samples, n_modes, n_candidates)
             Between 0 and 1.
         """
-        return self._full_core.nominal_mac(shapes)
+        array = shape_array(shapes, "shapes", any_size=True)
+        if array.ndim != 3 or array.shape[1] != self.n_dof or np.isinf(array).any():
+            raise ValueError(
+                f"shapes have shape {array.shape}; expected (n_samples, {self.n_dof}, n_candidates), finite or NaN"
+            )
+        return self._full_core.nominal_mac(array)
 
     def matrices(self, theta: ArrayLike) -> tuple[scipy.sparse.csc_array, scipy.sparse.csc_array]:
         """Stiffness and mass at one theta.
@@ -286,7 +292,10 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         scaled = np.zeros((len(self._full_core.stiffness.factors), len(chosen)), dtype=np.int64)
         for column, group in enumerate(chosen):
             scaled[list(self.groups[group]), column] = 1
-        bounds = np.tile([1 - severities[1], 1 - severities[0]], (len(chosen), 1))
+        range_of = real_array(severities, "severities")
+        if range_of.shape != (2,) or not -np.inf < range_of[0] < range_of[1] < 1:
+            raise ValueError(f"severities is {severities!r:.200}; expected the lowest and the highest, below 1")
+        bounds = np.tile([1 - range_of[1], 1 - range_of[0]], (len(chosen), 1))
         return self._changed(lambda core: core.with_group_factors(scaled), names, bounds)
 
     def with_added(self, stiffness: MatrixLike | None = None, mass: MatrixLike | None = None) -> Self:
@@ -319,10 +328,10 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         >>> bool(heavier.frequencies([[1, 1, 1, 1]])[0, 0] < truss.frequencies([[1, 1, 1, 1]])[0, 0])
         True
         """
-        if mass is not None and np.ndim(mass) == 1 and not scipy.sparse.issparse(mass):
+        if mass is not None and not scipy.sparse.issparse(mass) and real_array(mass, "added mass").ndim == 1:
             if np.shape(mass) != (self.n_dof,):
                 raise ValueError(f"mass has shape {np.shape(mass)}; expected ({self.n_dof},) or a matrix")
-            mass = scipy.sparse.diags_array(np.asarray(mass, dtype=float)).tocsc()
+            mass = scipy.sparse.diags_array(real_array(mass, "added mass")).tocsc()
         added = [
             None if matrix is None else read_matrix(matrix, f"added {what}", self.n_dof)
             for matrix, what in ((stiffness, "stiffness"), (mass, "mass"))

@@ -1,13 +1,13 @@
 """Reads and checks the arguments of an affine model."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arrays import Matrix, positive_integer, real_array
+from skthermo._arguments import as_mapping, integer_row
+from skthermo._arrays import Matrix, is_real, positive_integer, real_array
 
 Key = tuple[str, ...]
 
@@ -88,16 +88,16 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
         raise ValueError(f"terms name {unknown}; expected only the parameters {list(names)}")
     unused = [name for name in names if name not in mentioned]
     if unused:
-        raise ValueError(f"no term names the parameters {unused}; the terms name {list(mentioned)}")
+        raise ValueError(f"no term names the parameters {unused}; expected some of {list(mentioned)}")
     return names
 
 
 def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
     """Names of parameters, all different."""
-    if not isinstance(parameter_names, Iterable):
+    if not isinstance(parameter_names, Iterable) or isinstance(parameter_names, bytes | type):
         raise ValueError(f"parameter_names is {parameter_names!r}; expected one or more different names")
     names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
-    if not names or len(set(names)) < len(names):
+    if not names or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
         raise ValueError(f"parameter_names is {names}; expected one or more different names")
     return names
 
@@ -108,27 +108,32 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
         groups = {name: [i for i, key in enumerate(keys) if name in key] for name in names}
         return {name: tuple(positions) for name, positions in groups.items() if positions}
     found = {}
+    if not isinstance(groups, Mapping):
+        raise ValueError(f"groups is {groups!r:.200}; expected a mapping of group to the terms that it scales")
     for group, terms in groups.items():
+        if isinstance(terms, bytes | type) or not isinstance(terms, Iterable):
+            raise ValueError(f"group {group!r} is {terms!r:.200}; expected stiffness terms, such as ['E_deck']")
         positions: set[int] = set()
         for term in [terms] if isinstance(terms, str) else terms:
             matches = [i for i, key in enumerate(keys) if term in (i, key) or (term,) == key]
-            if not matches:
+            if not matches or isinstance(term, bool):
                 raise ValueError(f"group {group!r} names the term {term!r}; expected one of {list(keys)}")
             positions.update(matches)
         if not positions:
-            raise ValueError(f"group {group!r} names no stiffness term")
+            raise ValueError(f"group {group!r} names no stiffness term; expected one or more of {list(keys)}")
         found[group] = tuple(sorted(positions))
     return found
 
 
 def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
     """Checks that groups are known and that severities leave some stiffness."""
+    damage = as_mapping(damage)
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (isinstance(severity, Real) and LOWEST_SEVERITY <= float(severity) < 1):
+        if not (is_real(severity) and LOWEST_SEVERITY <= float(severity) < 1):
             raise ValueError(
                 f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
                 f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
@@ -143,9 +148,7 @@ def check_n_modes(n_modes: int) -> int:
 
 def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:
     """Checks that ranks of modes are different integers from 0 to below the number available."""
-    ranks = np.asarray(modes)
-    if ranks.ndim != 1 or not ranks.size or not np.issubdtype(ranks.dtype, np.integer):
-        raise ValueError(f"modes is {modes!r}; expected ranks of modes, such as [0, 1, 3, 2], the lowest being 0")
+    ranks = integer_row(modes, "modes", "ranks of modes, such as [0, 1, 3, 2], the lowest being 0")
     outside = ranks[(ranks < 0) | (ranks >= available)]
     if outside.size:
         raise ValueError(f"mode {outside[0]} is none of the model's; expected 0 to {available - 1}")

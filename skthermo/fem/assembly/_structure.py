@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, real_array
 from skthermo.fem.affine import AffineModel
 from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element, check_matrices
@@ -187,6 +187,8 @@ class Structure:
             if not isinstance(targets, Iterable) or not all(isinstance(target, str) for target in targets):
                 raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
             names = list(targets)
+            if not names:
+                raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
             if len(set(names)) < len(names):
                 raise ValueError(f"{what}s are {names}; expected each group once")
             targets = {group: group for group in names}
@@ -279,7 +281,7 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
     first = np.shape(next(iter(nodes.values())))
     for node, place in nodes.items():
         try:
-            xyz = np.array(place, dtype=float)
+            xyz = np.array(real_array(place, "coordinates"))
         except (TypeError, ValueError):
             xyz = np.empty(0)
         if xyz.shape not in ((2,), (3,)) or xyz.shape != first or not np.isfinite(xyz).all():

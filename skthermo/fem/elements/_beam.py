@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, is_real, real_array
 from skthermo.fem.elements._element import ROTATIONS, TRANSLATIONS, ByProperties, Dof, PhysicalElement
 
 DIRECTIONS = (*TRANSLATIONS, *ROTATIONS)
@@ -151,12 +151,20 @@ class Beam(PhysicalElement):
     _may_be_zero = ("density", "I_p")
 
     def __post_init__(self) -> None:
-        if self.I_p is None:
+        if self.I_p is None and is_real(self.I_yy) and is_real(self.I_zz):  # others are refused in the structure
             object.__setattr__(self, "I_p", self.I_yy + self.I_zz)
         for name in ("release_start", "release_end"):
-            unknown = [direction for direction in getattr(self, name) if direction not in DIRECTIONS]
+            released = getattr(self, name)
+            directions = released if isinstance(released, Collection) else [released]
+            unknown = [direction for direction in directions if direction not in DIRECTIONS]
             if unknown:
                 raise ValueError(f"{name} names {unknown}; expected a collection of local directions {DIRECTIONS}")
+        for name in ("orientation", "offset_start", "offset_end"):
+            vector = getattr(self, name)
+            if vector is not None or name != "orientation":
+                values = real_array(vector, name)
+                if values.shape != (3,) or not np.isfinite(values).all():
+                    raise ValueError(f"{name} is {vector!r:.100}; expected three finite numbers")
 
     @property
     def nodes(self) -> tuple[Hashable, Hashable]:

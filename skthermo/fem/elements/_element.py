@@ -5,13 +5,11 @@ a parameter.
 """
 
 from collections.abc import Hashable, Iterator, Mapping
-from math import isfinite
-from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, is_real
 
 Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]
@@ -20,6 +18,7 @@ TRANSLATIONS = ("x", "y", "z")
 ROTATIONS = ("rx", "ry", "rz")
 INTERFACE = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
 
+LARGEST = 1e40  # of a property in SI units: products of larger ones are infinite
 SHORTEST_MEMBER = 1e-6
 """Length of a member, as a share of the structure's extent, below which its ends count as the same point."""
 
@@ -154,8 +153,10 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(INTERFACE) else ""
         raise ValueError(f"member {name!r} is {element!r}{lacks}; expected an element such as Bar(...)")
     for node in element.nodes:
-        if node not in coordinates:
-            raise ValueError(f"member {name!r} ends at node {node!r}, which is not among the nodes")
+        if not isinstance(node, Hashable) or node not in coordinates:
+            raise ValueError(f"member {name!r} ends at node {node!r:.100}; expected one of the nodes")
+    if not isinstance(getattr(element, "lumped", False), bool):
+        raise ValueError(f"member {name!r} has lumped = {element.lumped!r:.100}; expected True or False")
     ends = element.ends(np.array([coordinates[node] for node in element.nodes]))
     if len(ends) == 2 and np.array_equal(*ends):
         first, last = element.nodes
@@ -168,5 +169,5 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         )
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
-        if not (isinstance(value, Real) and isfinite(value) and (value > 0 or (may_be_zero and value == 0))):
+        if not (is_real(value) and value < LARGEST and (value > 0 or (may_be_zero and value == 0))):
             raise ValueError(f"member {name!r} has {symbol} = {value!r}; expected {expected}")

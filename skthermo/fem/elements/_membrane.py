@@ -1,11 +1,11 @@
 """Membranes in plane stress."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, is_real
 from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -65,7 +65,9 @@ class Membrane(PhysicalElement):
     _may_be_zero = ("density",)
 
     def __post_init__(self) -> None:
-        if not -1 < self.nu < 0.5:
+        if isinstance(self.corners, str | type) or not isinstance(self.corners, Sequence):
+            raise ValueError(f"corners is {self.corners!r:.100}; expected four nodes")
+        if not is_real(self.nu) or not -1 < self.nu < 0.5:
             raise ValueError(f"nu is {self.nu!r}; expected a number between -1 and 0.5")
 
     @property

@@ -6,11 +6,11 @@ import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skthermo._arguments import check_path
 from skthermo._arrays import Array
 from skthermo._io import lock
 
@@ -32,7 +32,7 @@ class SampleCache:
     """
 
     def __init__(self, path: str | PathLike, parameter_names: Sequence[str], n_modes: int):
-        self.path = Path(path).absolute()
+        self.path = check_path(path, "cache").absolute()
         self._describes = {"parameter_names": list(parameter_names), "n_modes": int(n_modes)}
         self._header = json.dumps({"skthermo": "solved samples 1"} | self._describes).encode() + b"\n"
         sizes = {"theta": len(parameter_names), "frequencies": n_modes}

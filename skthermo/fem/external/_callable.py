@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_theta
+from skthermo._arguments import check_flag, check_theta
 from skthermo._arrays import Array, real_array
 from skthermo._warnings import warn_user
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
@@ -88,12 +88,12 @@ class CallableModel:
         vectorized: bool = False,
         cache: str | PathLike | None = None,
     ):
-        if not callable(function):
+        if not callable(function) or isinstance(function, type):
             raise ValueError(f"function is {function!r}; expected a callable")
         self.function = function
         self.parameter_names = check_different(parameter_names)
         self.n_modes = check_n_modes(n_modes)
-        self.vectorized = vectorized
+        self.vectorized = check_flag(vectorized, "vectorized")
         self._is_quiet = False
         self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
         if self._samples is not None:

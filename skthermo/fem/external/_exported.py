@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
+from skthermo._arguments import check_names, check_path
 from skthermo._arrays import Matrix
 from skthermo._io import read_named_matrices
 from skthermo.fem.affine import AffineModel
@@ -125,7 +126,10 @@ def load_affine(
     >>> model.frequencies([[1.0, 1.0]]).round(3)
     array([[1.967, 5.15 ]])
     """
-    file = Path(path)
+    file = check_path(path)
+    for what, one in (("mass", mass), ("total", None if total is False else total)):
+        if one is not None and (not isinstance(one, str) or not one):
+            raise ValueError(f"{what} is {one!r:.100}; expected the name of a matrix")
     named = None if stiffness is None else {*_keys(stiffness), mass, total}
     usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
     matrices = read_named_matrices(file, lambda name: named is None or name in named or name.lower() in usual)
@@ -253,6 +257,7 @@ def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path
 def _keys(stiffness: Collection[str] | Mapping[str, str | Key]) -> dict[str, Key]:
     """The parameters that multiply each term."""
     names = [stiffness] if isinstance(stiffness, str) else stiffness
+    names = names if isinstance(names, Mapping) else check_names(names, "stiffness")
     keys = names if isinstance(names, Mapping) else {name: name for name in names}
     return {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
 

@@ -87,7 +87,7 @@ def probe(
     """
     if not isinstance(n_checks, Integral) or isinstance(n_checks, bool) or n_checks < 0:
         raise ValueError(f"n_checks is {n_checks!r}; expected zero or a positive integer")
-    if not callable(assemble):
+    if not callable(assemble) or isinstance(assemble, type):
         raise ValueError(f"assemble is {assemble!r}; expected a callable that returns stiffness and mass")
     names = check_different(parameter_names)
     program = Program(assemble, names)

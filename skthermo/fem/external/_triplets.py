@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 
+import numpy as np
 import scipy.sparse
 
+from skthermo._arguments import check_path
 from skthermo._io import read_half
 
 
@@ -54,7 +55,12 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     array([[ 800., -400.],
            [-400.,  400.]])
     """
-    file = Path(path)
+    file = check_path(path)
     if not file.exists():
         raise FileNotFoundError(f"{file} does not exist; expected a text of row, column and value in each line")
-    return read_half(file)
+    if not file.is_file():
+        raise ValueError(f"{file} is a folder or a device; expected a text of row, column and value in each line")
+    matrix = read_half(file)
+    if not np.isfinite(matrix.data).all():
+        raise ValueError(f"{file} holds values that are not finite; expected finite ones")
+    return matrix

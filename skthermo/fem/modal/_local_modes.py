@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs, check_theta
+from skthermo._arguments import check_dofs, check_model, check_theta, integer_row
 from skthermo._arrays import Array
 from skthermo.fem._protocol import LocalModel
 from skthermo.fem._terms import AffineTerms
@@ -132,10 +132,10 @@ class LocalModes:
         and a remainder, the solution of (K - lambda_j M) x = b beside these modes, found by iteration. Where
         eigenvalues repeat, the parts along each other's modes are left out.
         """
-        columns = np.asarray(columns, dtype=np.intp)
+        columns = integer_row(columns, "columns").astype(np.intp)
         if ((columns < 0) | (columns >= len(self._eigenvalues))).any():
             raise ValueError(f"columns holds {columns.tolist()}; expected 0 to {len(self._eigenvalues) - 1}, the modes")
-        dofs = check_dofs(dofs, self._n_dof) if np.size(dofs) else np.empty(0, dtype=np.intp)
+        dofs = check_dofs(dofs, self._n_dof) if dofs is None or np.size(dofs) else np.empty(0, dtype=np.intp)
         stiffness, mass = self._stiffness, self._mass
         phi, eigenvalues = self._shapes[:, columns], self._eigenvalues[columns]
         forces = -stiffness.derivatives(self._theta, phi)
@@ -215,6 +215,7 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     """
     if not hasattr(model, "local_modes"):
         raise ValueError(f"{model!r} has no method 'local_modes'; expected a model with one, such as AffineModel")
+    check_model(model)
     row = check_theta(theta, model.parameter_names, one_row=True)
     modes = model.local_modes(row, follow=True)
     columns = modes.ranks if model.track else np.arange(model.n_modes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import real_array
+from skthermo._arrays import shape_array
 
 
 def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
@@ -49,10 +49,12 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:
-    array = np.asarray(phi, dtype=complex) if np.iscomplexobj(phi) else real_array(phi, name)
+    array = shape_array(phi, name, any_size=True)
     array = array[:, np.newaxis] if array.ndim == 1 else array
     if array.ndim != 2:
         raise ValueError(f"{name} has shape {array.shape}; expected (n_dof, n_modes)")
+    if np.isinf(array).any():
+        raise ValueError(f"{name} holds infinite values; expected finite ones")
     empty = np.flatnonzero(~array.any(axis=0))
     if empty.size:
         raise ValueError(f"{name}: shape {empty[0]} is zero at every degree of freedom")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from skthermo._arguments import check_model
-from skthermo._arrays import Array, real_array
+from skthermo._arrays import Array, real_array, shape_array
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal._mac import mac
@@ -84,13 +84,16 @@ def match_modes(
     if shapes is not None and dofs is not None:
         if local is None:
             raise ValueError(f"{model!r} has no method 'local_modes'; expected one where shapes are given")
+        shapes = shape_array(shapes, "shapes")
         expected = (np.size(dofs), len(measured))
         if np.shape(shapes) != expected:
             raise ValueError(
                 f"shapes have shape {np.shape(shapes)}; expected {expected}: a row for each of dofs and a column for "
                 "each measured mode"
             )
-        macs = mac(np.asarray(shapes), local.shapes(dofs))
+        if not np.isfinite(shapes).all():
+            raise ValueError("shapes hold values that are not finite; expected a measured shape in each column")
+        macs = mac(shapes, local.shapes(dofs))
         cost += 1 - macs
     ranks: NDArray[np.intp] = linear_sum_assignment(cost)[1]
     table = pd.DataFrame({"mode": ranks, "measured": measured, "model": candidates[ranks]}, index=names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, as_floats, real_array, without_mask
+from skthermo._arrays import Array, real_array, shape_array, without_mask
 
 
 def shape_components(shapes: ArrayLike, reference: ArrayLike) -> Array:
@@ -41,13 +41,14 @@ def shape_components(shapes: ArrayLike, reference: ArrayLike) -> Array:
            [  nan,   nan]])
     """
     shapes = without_mask(shapes)
-    measured = np.asarray(shapes, dtype=complex) if np.iscomplexobj(shapes) else as_floats(shapes)
-    expected = real_array(reference, "reference")
+    measured, expected = shape_array(shapes, "shapes"), real_array(reference, "reference")
     if measured.ndim != 3 or measured.shape[:0:-1] != expected.shape:
         raise ValueError(
             f"shapes are {measured.shape} and reference {expected.shape}; expected (n_samples, n_modes, n_sensors) and "
             "(n_sensors, n_modes)"
         )
+    if np.isinf(measured).any() or np.isinf(expected).any():
+        raise ValueError("shapes or reference hold infinite values; expected finite ones, or NaN")
     if not expected.any(axis=0).all():
         mode = np.flatnonzero(~expected.any(axis=0))[0]
         raise ValueError(f"reference is zero at all sensors in mode {mode}; expected a mode that moves them")

@@ -1,6 +1,6 @@
 """Checks for mechanisms and missing mass."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 
 import numpy as np
 import scipy.sparse.linalg
@@ -22,6 +22,8 @@ def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> No
     rounding of these entries is all that is left; the softest motion of a fine mesh has more.
     """
     diagonal = stiffness.diagonal()
+    if names is not None and (isinstance(names, str | bytes) or not isinstance(names, Sized)):
+        raise ValueError(f"dof_names is {names!r:.200}; expected a list of names, one for each row")
     if names is not None and len(names) != len(diagonal):
         raise ValueError(f"dof_names holds {len(names)} names; expected {len(diagonal)}, one for each row")
     if (diagonal <= 0).any():

@@ -3,14 +3,13 @@
 from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from functools import partial
-from numbers import Integral
 from typing import Any, TypeAlias
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_model, check_theta
+from skthermo._arguments import check_jobs, check_model, check_theta
 from skthermo._arrays import Array
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
@@ -22,8 +21,7 @@ Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
 def checked_rows(model: Any, theta: ArrayLike, n_jobs: int | None) -> Array:
     """Rows of theta, in which NaN is allowed, after checks of the model and the number of jobs."""
     check_model(model)
-    if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
-        raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
+    check_jobs(n_jobs)
     return check_theta(theta, model.parameter_names, allow_nan=True)
 
 

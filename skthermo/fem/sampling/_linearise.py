@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, central_differences
+from skthermo._arguments import check_flag
+from skthermo._arrays import Array, central_differences, is_real
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
@@ -58,14 +58,14 @@ def linearise(
     array([0.5, 0.5])
     """
     rows = checked_rows(model, theta, n_jobs)
+    _check_step(step)
     if hasattr(model, "linearised") or hasattr(model, "jacobian"):
         expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, rows.shape[1])}
         frequencies, jacobian = solve_rows(model, _linearised, rows, expected, n_jobs)
     else:
-        _check_step(step)
         frequencies = evaluate(model, rows, n_jobs=n_jobs)
         jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, step)
-    if relative:
+    if check_flag(relative, "relative"):
         jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
     return frequencies, jacobian
 
@@ -119,6 +119,7 @@ def linearise_modes(
     [(2, 6), (2, 6, 4), (2, 3, 6), (2, 3, 6, 4)]
     """
     rows = checked_rows(model, theta, n_jobs)
+    _check_step(step)
     if hasattr(model, "linearised_modes"):
         n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], np.size(dofs)
         expected = {
@@ -130,7 +131,6 @@ def linearise_modes(
         solve = partial(_linearised_modes, dofs=dofs)
         frequencies, jacobian, shapes, slopes = solve_rows(model, solve, rows, expected, n_jobs)
         return frequencies, jacobian, shapes, slopes
-    _check_step(step)
     frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
     shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
 
@@ -153,5 +153,5 @@ def _linearised_modes(model: Any, theta: Array, dofs: ArrayLike) -> tuple[Array,
 
 
 def _check_step(step: float) -> None:
-    if not isinstance(step, Real) or not 0 < step < 1:
+    if not is_real(step) or not 0 < step < 1:
         raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")

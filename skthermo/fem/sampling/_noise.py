@@ -44,8 +44,10 @@ def add_noise(
     >>> noisy.std(axis=0).round(2)
     array([0.  , 0.04])
     """
-    clean = real_array(frequencies, "frequencies")
+    clean, names = real_array(frequencies, "frequencies"), getattr(frequencies, "columns", None)
+    if np.isinf(clean).any():
+        raise ValueError("frequencies hold infinite values; expected finite ones, or NaN")
     if clean.ndim != 2:
         raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
-    deviation = check_noise(noise, clean.shape[1])
+    deviation = check_noise(noise, clean.shape[1], names)
     return clean * (1 + deviation * as_random_state(random_state).standard_normal(clean.shape))

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator
 
 from numpy.typing import NDArray
 
+from skthermo._arguments import check_flag
+
 SILENT_SECONDS = 1.0
 SECONDS_BETWEEN = 0.1
 WIDTH = 30
@@ -23,6 +25,8 @@ def with_progress(
     appears only on a terminal, after a second, and only in the main thread of the main process: bars of several workers
     would overwrite each other.
     """
+    if shown is not None:
+        check_flag(shown, "progress")
     if shown is None:
         shown = {"0": False, "1": True}.get(os.environ.get("SKTHERMO_PROGRESS", ""))
     if shown is False or (shown is None and not _on_terminal()):

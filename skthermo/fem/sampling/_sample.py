@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from skthermo._arguments import check_bounds, check_model
+from skthermo._arguments import check_bounds, check_flag, check_model
 from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
@@ -76,6 +76,8 @@ def sample(
     check_model(model)
     lowest, highest = check_bounds(bounds, model.parameter_names).T
     n_samples = positive_integer(n_samples, "n_samples")
+    if progress is not None:
+        check_flag(progress, "progress")
     theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
     theta *= highest - lowest
     theta += lowest

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import as_floats, real_array, without_mask
+from skthermo._arrays import as_floats, real_array, refuse_no_numbers, without_mask
 from skthermo._frames import check_same_rows
 
 FIELDS = ("frequencies", "damping", "shapes")
@@ -89,6 +89,8 @@ def _fields(X: Any) -> tuple[dict[str, Any], Any]:
     frequencies = X if isinstance(X, pd.Series) else fields["frequencies"]
     if isinstance(frequencies, pd.DataFrame | pd.Series):
         index = frequencies.index
+    if not isinstance(frequencies, Sequence | np.ndarray | pd.DataFrame | pd.Series):
+        raise ValueError(f"frequencies are {frequencies!r:.200}; expected a table, or a vector for each record")
     fields["index"] = pd.RangeIndex(len(frequencies)) if index is None else pd.Index(index)
     if len(fields["index"]) != len(frequencies):
         raise ValueError(f"the index has {len(fields['index'])} entries; expected {len(frequencies)}, one a record")
@@ -150,6 +152,8 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
 
 def _numbers(values: Any, what: str) -> NDArray:
     try:
+        if not np.iscomplexobj(values):
+            refuse_no_numbers(values)
         array = np.asarray(without_mask(values))
         if array.dtype.kind == "O":
             array = array.astype(complex)

@@ -9,7 +9,7 @@ import pandas as pd
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, real_array, rows_by_pattern
+from skthermo._arrays import Array, real_array, rows_by_pattern, shape_array
 from skthermo._warnings import warn_user
 
 
@@ -76,7 +76,7 @@ def read_reference(reference: Any) -> ReferenceModes:
 
 
 def _read_shapes(shapes: Any, n_modes: int) -> NDArray:
-    shapes = np.array(shapes, dtype=complex) if np.iscomplexobj(shapes) else real_array(shapes, "reference shapes")
+    shapes = shape_array(shapes, "reference shapes")
     if shapes.ndim != 2 or shapes.shape[1] != n_modes:
         hint = ": transpose them" if shapes.ndim == 2 and shapes.shape[0] == n_modes else ""
         raise ValueError(f"reference shapes have shape {shapes.shape}; expected (n_sensors, {n_modes}){hint}")

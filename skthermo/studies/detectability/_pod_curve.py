@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,8 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
-from skthermo._arrays import Array, real_array
+from skthermo._arguments import check_flag
+from skthermo._arrays import Array, is_real, real_array
 from skthermo._warnings import warn_user
 from skthermo.studies.detectability._intervals import clopper_pearson
 
@@ -111,8 +111,10 @@ class PODCurve:
             If a severity is not a number of this sign.
         """
         magnitudes = real_array(severity, "severity") * np.sign(self.severities[0])
-        if not (magnitudes >= 0).all():
-            raise ValueError(f"severity is {severity!r:.200}; expected the sign of those tested, {self.severities}")
+        if not ((magnitudes >= 0) & np.isfinite(magnitudes)).all() or (real_array(severity, "severity") >= 1).any():
+            raise ValueError(
+                f"severity is {severity!r:.200}; expected shares below 1 of the sign of those tested, {self.severities}"
+            )
         places = np.log(magnitudes) if self.log else magnitudes
         centre = self.intercept + self.slope * places
         deviation = np.sqrt(
@@ -212,6 +214,7 @@ def pod_curve(
     >>> print(f"{curve.a50:.2f} {curve.a90:.2f} {curve.a90_95:.2f}")
     0.18 0.27 0.33
     """
+    check_flag(log, "log")
     s, k, n = checked_counts(severities, n_detected, n_records)
     check_probability(confidence, "confidence")
     x, bracket = np.log(np.abs(s)) if log else np.abs(s), bracket_of(s, k / n, 0.9)
@@ -251,7 +254,7 @@ def pod_curve(
 
 def check_probability(value: Any, what: str) -> float:
     """A probability strictly between 0 and 1, or an error."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not 0 < float(value) < 1:
+    if not is_real(value) or not 0 < float(value) < 1:
         raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
     return float(value)
 

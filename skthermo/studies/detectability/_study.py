@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal, TypeAlias
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
+from skthermo._arguments import check_jobs
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Stages, _num_samples, last_step, seed_parts, seeded
@@ -199,6 +200,7 @@ class DetectabilityStudy(BaseEstimator):
         check_detector(self.detector)
         n_repeats = positive_integer(self.n_repeats, "n_repeats")
         check_probability(confidence, "confidence")
+        check_jobs(self.n_jobs)
         scenarios = self._checked_scenarios(reference)
         view, healthy = read_baseline(self.fem, self.detector, baseline)
         seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(n_repeats, 2))
@@ -253,7 +255,8 @@ class DetectabilityStudy(BaseEstimator):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        rows = self._families().get((family, source))
+        is_known = isinstance(family, str) and isinstance(source, str)
+        rows = self._families().get((family, source)) if is_known else None
         if rows is None:
             known = [f"{f!r} ({s})" for f, s in self._families()]
             raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
@@ -322,6 +325,9 @@ class DetectabilityStudy(BaseEstimator):
             If the study has no results.
         """
         rows = self._results()
+        for what, name, known in (("family", family, rows["family"]), ("source", source, rows["source"])):
+            if not isinstance(name, str) or name not in set(known):
+                raise ValueError(f"{what} is {name!r:.100}; expected one of {known.dropna().unique().tolist()}")
         rows = rows[rows["source"] == source]
         healthy = rows.loc[rows["measure"] == "PFA", "highest"].max()
         rates = rows.loc[(rows["measure"] == "POD") & (rows["family"] == family), "rate"]
@@ -378,6 +384,8 @@ class DetectabilityStudy(BaseEstimator):
 
     def _checked_scenarios(self, reference: Any) -> list[BaseScenario]:
         """The scenarios; an error if they or the names of the reference are wrong."""
+        if isinstance(self.scenarios, type) or not isinstance(self.scenarios, Iterable):
+            raise ValueError(f"scenarios is {self.scenarios!r:.200}; expected a list of scenarios, as sweep makes it")
         scenarios, groups = list(self.scenarios), getattr(self.fem.model, "groups", None)
         wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
         names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import clone
 
-from skthermo._arguments import check_noise
+from skthermo._arguments import check_noise, integer_row
 from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._frames import check_same_rows, column_names
 from skthermo._threads import single_blas_thread
@@ -136,16 +136,26 @@ def what_to_add(
     >>> bool(table["lowest"][0] < table["gain"][0] < table["mdd_now"][0])
     True
     """
+    if not isinstance(study, DetectabilityStudy):
+        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy that has been run")
     changes, fem, present = changes_by_severity(study), study.fem, study.arrangement_
-    factors = [float(real_array(factor, "baseline_factors")) for factor in baseline_factors]
-    if not all(1 < factor < np.inf for factor in factors):
-        raise ValueError(f"baseline_factors are {list(baseline_factors)}; expected numbers above 1, such as 2")
+    factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
+    if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):
+        raise ValueError(f"baseline_factors is {baseline_factors!r:.200}; expected numbers above 1, such as [2.0]")
     ranks = _further_modes(fem.model, modes)
     scatter = _scatter(study) if noise is None else noise
     candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
     candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
-    simulator = CampaignSimulator(fem, T, changes, study.noise, longest, ranks, check_noise(scatter, len(ranks)))
+    simulator = CampaignSimulator(
+        fem,
+        T,
+        changes,
+        study.noise,
+        longest,
+        ranks,
+        check_noise(scatter, len(ranks), [mode_name(rank) for rank in ranks]),
+    )
     n_repeats = positive_integer(study.n_repeats, "n_repeats")
     seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
@@ -201,6 +211,7 @@ def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
     measured = model.mode_ranks
     if modes is None:
         return list(range(max(measured) + 1, min(max(measured) + 1 + N_MODES, model.n_available)))
+    modes = integer_row(modes, "modes").tolist() if np.size(modes) else []
     again = [mode for mode in modes if mode in measured]
     if again:
         raise ValueError(f"modes {again} are measured already; expected others than {list(measured)}")
@@ -228,7 +239,7 @@ def _scatter(study: DetectabilityStudy) -> float:
     """Median relative scatter of the measured modes."""
     if isinstance(study.noise, str):
         return float(np.median(np.sqrt(np.nanmean(study.fem.residuals_.values**2, axis=0))))
-    return float(np.median(check_noise(study.noise, len(study.fem.mode_names_))))
+    return float(np.median(check_noise(study.noise, len(study.fem.mode_names_), study.fem.mode_names_)))
 
 
 def _with_sensors(

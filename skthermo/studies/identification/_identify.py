@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, as_floats, as_random_state
+from skthermo._arguments import check_flag, check_names
+from skthermo._arrays import Array, as_floats, as_random_state, is_real
 from skthermo._frames import check_same_rows
 from skthermo._validation import check_array
 from skthermo._warnings import warn_each, warn_user, warnings_once
@@ -122,7 +123,8 @@ def identify_damage(
     {'top': 0.0, 'diagonal': 0.1}
     """
     check_chain(fem)
-    if not 0 < significance < 1:
+    check_flag(merge, "merge")
+    if not is_real(significance) or not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
     if shapes is None and dofs is not None:
         raise ValueError("dofs came without shapes; expected both or neither")
@@ -202,7 +204,7 @@ def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] 
     elif isinstance(groups, Mapping):
         members = {str(name): [joined] if isinstance(joined, str) else list(joined) for name, joined in groups.items()}
     else:
-        members = {name: [name] for name in ([groups] if isinstance(groups, str) else groups)}
+        members = {name: [name] for name in check_names([groups] if isinstance(groups, str) else groups, "groups")}
     asked = [name for joined in members.values() for name in joined]
     unknown = [name for name in asked if name not in known]
     if unknown:

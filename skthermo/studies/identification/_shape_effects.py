@@ -70,11 +70,13 @@ class ShapeEffects:
                     f"the {which} shapes have shape {array.shape}; expected a row for each of {len(self.dofs)} sensors "
                     f"and a column for each of {self.reference.shape[1]} modes"
                 )
+            if np.isinf(array).any():
+                raise ValueError(f"the {which} shapes hold infinite values; expected NaN where not measured")
             if (array == 0).all(axis=0).any():
                 mode = int((array == 0).all(axis=0).argmax())
                 raise ValueError(f"the {which} shape of mode {mode} is zero; expected NaN where it was not measured")
             pair.append(self.scaled(array))
-        relative = check_noise(noise, self.reference.shape[1])
+        relative = check_noise(noise, self.reference.shape[1], what="shape_noise", most=1)
         if (relative == 0).any():
             raise ValueError(f"shape_noise is {noise!r}; expected standard deviations above 0")
         largest = np.abs(self.reference).max(axis=0)

@@ -70,7 +70,7 @@ def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> An
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
         return fem.residuals_.scatter
-    deviations = check_noise(noise, n_modes)
+    deviations = check_noise(noise, n_modes, fem.mode_names_)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
     return fem.residuals_.independent_scatter(deviations)

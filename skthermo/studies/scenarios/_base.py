@@ -2,13 +2,17 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from skthermo._arguments import as_mapping
 from skthermo._arrays import real_array
 from skthermo._validation import check_is_fitted
+
+LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
 
 
 class BaseScenario(ABC):
@@ -54,7 +58,9 @@ class BaseScenario(ABC):
         ValueError
             If damage begins at no record of T.
         """
-        return self._changes(T, repeat)
+        if not isinstance(repeat, Integral) or isinstance(repeat, bool) or repeat < 0:
+            raise ValueError(f"repeat is {repeat!r:.100}; expected the number of a repeat, from 0 on")
+        return self._changes(T, int(repeat))
 
     @abstractmethod
     def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
@@ -63,7 +69,7 @@ class BaseScenario(ABC):
 
 def check_chain(fem: Any) -> None:
     """Raise an error for what is not a fitted chain."""
-    if not hasattr(fem, "simulate"):
+    if isinstance(fem, type) or not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
 
@@ -83,9 +89,10 @@ def check_name(name: Any) -> None:
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
     """Severity by group as floats."""
-    if not isinstance(damage, Mapping):
-        raise ValueError(f"damage of scenario {name!r} is {damage!r:.200}; expected {{group: severity}}")
+    damage = mapping_of(damage, f"damage of scenario {name!r}", "{group: severity}")
     for group, severity in damage.items():
+        if not isinstance(group, str):
+            raise ValueError(f"scenario {name!r} has the damage group {group!r:.100}; expected a text")
         if np.ndim(severity):
             raise ValueError(
                 f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}; expected one number, or "
@@ -98,11 +105,20 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
 def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
     """Raise an error for severities that no structure can have."""
     values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
-    if not (np.isfinite(values) & (values < 1)).all():
+    wrong = values[~(np.isfinite(values) & (values < 1) & (values >= LOWEST_SEVERITY))]
+    if wrong.size:
         raise ValueError(
-            f"scenario {name!r} has severities of {group!r} up to {np.max(values):g}; expected finite shares of the "
-            "stiffness below 1, not percent"
+            f"scenario {name!r} has severities of {group!r} such as {wrong[0]:g}; expected finite shares of the "
+            f"stiffness below 1, not percent (0.2 means 20 %), and not below {LOWEST_SEVERITY:g}"
         )
+
+
+def mapping_of(values: Any, what: str, expected: str) -> Mapping[str, Any]:
+    """A mapping, or a Series with names as one; None becomes an empty one."""
+    mapping = {} if values is None else as_mapping(values)
+    if not isinstance(mapping, Mapping):
+        raise ValueError(f"{what} is {values!r:.200}; expected {expected}")
+    return mapping
 
 
 def only_group(damage: Mapping[str, float]) -> tuple[str | None, float]:

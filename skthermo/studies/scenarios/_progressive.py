@@ -72,7 +72,7 @@ class ProgressiveDamage(BaseScenario):
     def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
         times, onset = row_times(T), time_of(T, self.onset, "onset")
         end = onset if self.end is None else time_of(T, self.end, "end")
-        if end < onset or onset > times.max():
+        if not np.isfinite(end) or end < onset or onset > times.max():
             raise ValueError(
                 f"scenario {self.name!r} has onset {self.onset!r} and end {self.end!r} for {len(times)} records; "
                 "expected an onset that is not after the last record, and an end that is not before it"

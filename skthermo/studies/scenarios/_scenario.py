@@ -8,8 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import real_array
-from skthermo.studies.scenarios._base import BaseScenario, check_groups, check_name, only_group, severities_of
+from skthermo._arguments import check_names
+from skthermo._arrays import HUGE, is_real, real_array
+from skthermo.studies.scenarios._base import (
+    BaseScenario,
+    check_groups,
+    check_name,
+    check_severities,
+    mapping_of,
+    only_group,
+    severities_of,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,11 +68,21 @@ class Scenario(BaseScenario):
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        damage = severities_of(self.damage or {}, self.name)
-        factors = {name: float(real_array(factor, name)) for name, factor in (self.parameters or {}).items()}
-        wrong = [name for name, factor in factors.items() if not (np.isfinite(factor) and factor > 0)]
+        damage = severities_of(self.damage, self.name)
+        given = mapping_of(self.parameters, f"parameters of scenario {self.name!r}", "{parameter: factor}")
+        wrong = [f for f in given.values() if not is_real(f) or not 0 < f < HUGE]
         if wrong:
-            raise ValueError(f"scenario {self.name!r} has the factors {factors}; expected finite and positive ones")
+            raise ValueError(
+                f"scenario {self.name!r} has the factor {wrong[0]!r:.99}; expected finite and positive ones"
+            )
+        factors = {name: float(factor) for name, factor in given.items()}
+        if self.family is not None and (not isinstance(self.family, str) or not self.family):
+            raise ValueError(f"family of scenario {self.name!r} is {self.family!r:.100}; expected a text")
+        if self.severity is not None:
+            if not is_real(self.severity):
+                raise ValueError(f"severity of scenario {self.name!r} is {self.severity!r:.100}; expected a number")
+            if not np.isnan(self.severity):
+                check_severities(self.severity, self.family, self.name)
         alone = not (factors or self.stiffness is not None or self.mass is not None)
         family, severity = only_group(damage) if alone else (None, np.nan)
         object.__setattr__(self, "damage", damage)
@@ -136,8 +155,19 @@ def sweep(
     known = getattr(model, "groups", None)
     if not known:
         raise ValueError(f"{model!r:.200} has no damage groups; expected a model with 'groups', such as AffineModel")
-    chosen = list(known) if groups is None else list(groups)
+    if isinstance(model, type):
+        raise ValueError(f"model is {model!r:.200}; expected an FE model, not its class")
+    chosen = list(known) if groups is None else check_names(groups, "groups")
     check_groups(chosen, known)
+    shares = real_array(severities, "severities")
+    if shares.ndim != 1 or not chosen or len(np.unique(shares)) < shares.size:
+        raise ValueError(
+            f"severities is {severities!r:.200} and groups {groups!r:.200}; expected different severities, such as "
+            "(0.1, 0.2), and groups"
+        )
+    if (shares == 0).any():
+        raise ValueError(f"severities is {severities!r:.200}; expected none of 0, which is the healthy structure")
+    severities = shares.tolist()
     has_both = min(severities, default=0) < 0 < max(severities, default=0)
 
     def scenario(group: str, severity: float) -> Scenario:

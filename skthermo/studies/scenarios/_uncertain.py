@@ -51,6 +51,8 @@ class UncertainDamage(BaseScenario):
         check_name(self.name)
         if not isinstance(self.draws, pd.DataFrame) or not self.draws.size:
             raise ValueError(f"draws is {self.draws!r:.200}; expected a frame with a column for each damage group")
+        if self.draws.columns.has_duplicates:
+            raise ValueError(f"draws has the columns {list(self.draws.columns)}; expected each damage group once")
         for group, severities in self.draws.items():
             check_severities(severities, group, self.name)
         means = {str(group): float(mean) for group, mean in self.draws.mean().items()}

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._arguments import check_noise
-from skthermo._arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, real_array
+from skthermo._arguments import as_mapping, check_flag, check_noise, integer_row
+from skthermo._arrays import HUGE, Array, MatrixLike, as_columns, as_floats, as_random_state, is_real, real_array
 from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
 from skthermo._regressors import check_takes_weights, fit_weighted
 from skthermo._saved_frames import SavesFrames
@@ -340,6 +340,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             weather, out of fold, in Hz. They contain the scatter of the measurement, and what a missing temperature
             costs.
         """
+        check_flag(return_std, "return_std")
         frequencies = self._simulate(X)
         predicted = frame_like(X, frequencies, self.mode_names_)
         if not return_std:
@@ -402,7 +403,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         True
         """
         check_is_fitted(self)
-        if not isinstance(confidence, Real) or isinstance(confidence, bool) or not 0 < confidence < 1:
+        if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         frequencies = self._simulate(X)
         margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
@@ -530,8 +531,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
             weather, order = self._weather(X), np.argsort(row_times(X), kind="stable")
             return self.residuals_.draw(weather[order], random)[np.argsort(order)]
-        shape = (np.shape(X)[0], len(self.mode_names_))
-        return check_noise(noise, shape[1]) * random.standard_normal(shape)
+        shape = (len(self._temperatures(X)[0]), len(self.mode_names_))
+        return check_noise(noise, shape[1], self.mode_names_) * random.standard_normal(shape)
 
     def simulate_modes(
         self,
@@ -569,6 +570,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             As in `simulate`; if the model has no such modes.
         """
         check_is_fitted(self)
+        integer_row(modes, "modes")
         return self._simulate(X, modes, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
 
     @overload
@@ -600,6 +602,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             Only with ``return_number``: effective sample size of the mean of ``expected`` over the rows, lower than the
             number of training records if the rows have little variety of weather.
         """
+        check_flag(return_number, "return_number")
         weather = self._weather(X)
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
@@ -820,10 +823,13 @@ def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
 def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
     """The factor of every parameter, 1 where none is given."""
     factors = dict.fromkeys(names, 1.0)
-    for name, factor in (parameters or {}).items():
+    parameters = {} if parameters is None else as_mapping(parameters)
+    if not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    for name, factor in parameters.items():
         if name not in factors:
             raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
-        if not isinstance(factor, Real) or not 0 < factor < np.inf:
+        if not is_real(factor) or not 0 < factor < HUGE:
             raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
         if factor > LARGE_FACTOR:
             warn_user(
@@ -839,6 +845,7 @@ def split_damage(
     damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
 ) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
     """Severities that are the same in all rows, and those with a value for each row."""
+    damage = as_mapping(damage)
     if damage is not None and not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     fixed: dict[str, Any] = {}

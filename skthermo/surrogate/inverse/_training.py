@@ -40,7 +40,7 @@ class SimulatedTraining:
     def of(cls, inverse: Any, random: np.random.RandomState) -> "SimulatedTraining":
         """Samples within the bounds of an `InverseSurrogate`, with warnings about modes that cannot be told apart."""
         model, names = inverse.model, tuple(inverse.model.parameter_names)
-        check_noise(inverse.noise, model.n_modes)
+        check_noise(inverse.noise, model.n_modes, getattr(inverse, "feature_names_in_", None))
         if len(names) > model.n_modes:
             warn_user(
                 f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "

@@ -54,7 +54,7 @@ class Refinement:
         names = inverse.model.parameter_names
         width = None if inverse.prior is None else check_prior(inverse.prior, names)
         prior = Prior.of_box(check_bounds(inverse.bounds, names), width)
-        noise = check_noise(inverse.noise, inverse.model.n_modes)
+        noise = check_noise(inverse.noise, inverse.model.n_modes, getattr(inverse, "feature_names_in_", None))
         return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_)
 
     def refined(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:

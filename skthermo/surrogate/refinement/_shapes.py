@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs
+from skthermo._arguments import by_mode, check_dofs
 from skthermo._arrays import Array, real_array
 from skthermo.fem import evaluate_modes, shape_components
 
@@ -39,7 +39,7 @@ class ShapeInputs:
                 f"mode {largest.argmin()} does not move the degrees of freedom {places.tolist()}; expected one that "
                 "it moves, or model.with_modes without this mode"
             )
-        deviations = real_array(noise, "shape_noise")
+        deviations = real_array(by_mode(noise, model.n_modes, None, "shape_noise"), "shape_noise")
         if deviations.shape not in ((), (model.n_modes,)) or not ((deviations > 0) & (deviations < 1)).all():
             raise ValueError(
                 f"shape_noise is {deviations}; expected a standard deviation between 0 and 1 (0.01 means 1 % of the "
