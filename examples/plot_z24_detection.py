@@ -122,14 +122,14 @@ print(pd.concat([alarm_table(inputs), both]).round(1).to_string())
 # .. code-block:: none
 #
 #                                                   false alarms  damage found
-#    none            raw frequencies                         0.2           5.4
-#    broken lines    residuals                               0.0          52.3
+#    none            raw frequencies                         0.0           0.0
+#    broken lines    residuals                               0.0          89.2
+#                    residuals whitened by weather           0.9          90.8
+#    boosted trees   residuals                               0.2          20.8
+#                    residuals whitened by weather           1.1          82.3
+#    chain           residuals                               0.0          90.0
 #                    residuals whitened by weather           0.7          90.8
-#    boosted trees   residuals                               0.7          25.4
-#                    residuals whitened by weather           1.8          90.8
-#    chain           residuals                               0.0          61.5
-#                    residuals whitened by weather           0.7          90.8
-#    lines and trees mean of their indices                   0.9          90.8
+#    lines and trees mean of their indices                   0.5          90.8
 #
 # The damage index over time, for three of them. Raw frequencies hide the damage in the range that frost has opened.
 # Residuals show it, and whitened residuals lift nearly all damaged records above the threshold.
@@ -174,18 +174,18 @@ print(pd.concat(tables).round(1).to_string())
 # .. code-block:: none
 #
 #                                    false alarms  damage found
-#    quantile         broken lines            0.9          90.8
-#                     boosted trees           1.8          90.8
+#    quantile         broken lines            1.4          90.8
+#                     boosted trees           1.6          86.2
+#                     chain                   1.4          90.8
+#    conformal        broken lines            0.9          90.8
+#                     boosted trees           1.1          82.3
 #                     chain                   0.7          90.8
-#    conformal        broken lines            0.7          90.8
-#                     boosted trees           1.8          90.8
-#                     chain                   0.7          90.8
-#    chi2             broken lines            3.8          94.6
-#                     boosted trees           6.2          91.5
-#                     chain                   4.3          95.4
-#    isolation forest broken lines            1.2          84.6
-#                     boosted trees           2.5          88.5
-#                     chain                   1.4          82.3
+#    chi2             broken lines            6.2          97.7
+#                     boosted trees           7.5          91.5
+#                     chain                   6.8          97.7
+#    isolation forest broken lines            1.2          78.5
+#                     boosted trees           2.0          86.2
+#                     chain                   1.4          80.0
 #
 # In which weather?
 # -----------------
@@ -209,12 +209,12 @@ print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 #                  records               residuals               residuals whitened by weather
 #                 baseline later damaged  baseline later damaged                      baseline later damaged
 #    pavement, °C
-#    (-inf, -0.2]      450     0       0       7.1   NaN     NaN                           3.6   NaN     NaN
-#    (-0.2, 2.9]       447     0       0       2.5   NaN     NaN                           2.5   NaN     NaN
-#    (2.9, 4.9]        447     4       0       0.0   0.0     NaN                           1.8   0.0     NaN
-#    (4.9, 6.9]        448    45       0       0.0   0.0     NaN                           0.9   0.0     NaN
-#    (6.9, 14.6]       448   204       0       0.0   0.0     NaN                           0.7   0.5     NaN
-#    (14.6, inf]         0   307     130       NaN   0.0    52.3                           NaN   1.0    90.8
+#    (-inf, -0.2]      450     0       0       4.0   NaN     NaN                           2.0   NaN     NaN
+#    (-0.2, 2.9]       447     0       0       2.9   NaN     NaN                           2.7   NaN     NaN
+#    (2.9, 4.9]        447     4       0       0.4   0.0     NaN                           0.9   0.0     NaN
+#    (4.9, 6.9]        448    45       0       0.2   0.0     NaN                           0.7   0.0     NaN
+#    (6.9, 14.6]       448   204       0       0.0   0.0     NaN                           0.9   0.5     NaN
+#    (14.6, inf]         0   307     130       NaN   0.0    89.2                           NaN   1.3    90.8
 #
 # A day's records together
 # ------------------------
@@ -244,20 +244,20 @@ print(pd.DataFrame(rows).T.to_string())
 #
 #                                                 false days damaged days found hours to detection
 #    broken lines                  single records    0 of 32            9 of 10               38.0
-#                                  24h, mean         0 of 32            8 of 10               46.0
-#                                  24h, m-of-n       0 of 32            8 of 10               46.0
-#                                  24, mean          0 of 32            7 of 10               70.0
+#                                  24h, mean         0 of 32            8 of 10               52.0
+#                                  24h, m-of-n       0 of 32            8 of 10               52.0
+#                                  24, mean          0 of 32            7 of 10               82.0
 #                                  24, m-of-n        0 of 32            7 of 10               70.0
 #    boosted trees                 single records    0 of 32            9 of 10               14.0
-#                                  24h, mean         0 of 32            8 of 10               46.0
-#                                  24h, m-of-n       0 of 32            8 of 10               53.0
-#                                  24, mean          0 of 32            7 of 10               78.0
-#                                  24, m-of-n        0 of 32            8 of 10               65.0
-#    broken lines, forward in time single records    0 of 32            8 of 10               38.0
-#                                  24h, mean         0 of 32            8 of 10               44.0
-#                                  24h, m-of-n       0 of 32            8 of 10               48.0
-#                                  24, mean          0 of 32            7 of 10               76.0
-#                                  24, m-of-n        0 of 32            7 of 10               70.0
+#                                  24h, mean         0 of 32            7 of 10               86.0
+#                                  24h, m-of-n       0 of 32            3 of 10               86.0
+#                                  24, mean          0 of 32            6 of 10               99.0
+#                                  24, m-of-n        0 of 32            4 of 10               91.0
+#    broken lines, forward in time single records    0 of 32            7 of 10               41.0
+#                                  24h, mean         0 of 32            8 of 10               52.0
+#                                  24h, m-of-n       0 of 32            8 of 10               52.0
+#                                  24, mean          0 of 32            1 of 10               88.0
+#                                  24, m-of-n        0 of 32            4 of 10               77.0
 
 plot_indices(
     {
@@ -306,10 +306,10 @@ print(pd.DataFrame(rows).T.rename_axis("baseline").round(1).to_string())
 #
 #               false alarms, residuals  false alarms, residuals whitened by weather  records beyond known weather
 #    baseline
-#    first 40%                     24.8                                         23.4                          36.4
-#    first 50%                      9.5                                          9.1                          48.2
-#    first 60%                      0.0                                          1.2                          34.5
-#    first 70%                      0.0                                          0.5                          28.2
+#    first 40%                     22.1                                         24.8                          36.4
+#    first 50%                      8.9                                         10.5                          48.2
+#    first 60%                      0.2                                          0.5                          34.5
+#    first 70%                      0.0                                          0.0                          28.2
 #
 # :doc:`plot_z24_damage` asks where the damage is, and whether a simulation would have told the same;
 # :doc:`/guide/detection` explains the detectors.

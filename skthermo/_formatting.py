@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +12,7 @@ import pandas as pd
 
 SPACE = "\N{NO-BREAK SPACE}"
 UNKNOWN = "not known"
+TURNING = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # letters that turn the direction of text
 
 
 def percent(share: float, digits: str = ".4g") -> str:
@@ -48,6 +51,15 @@ def probability_text(value: float) -> str:
 def counted(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun."""
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
+
+
+def printable(text: Any) -> str:
+    """Text in which control characters are seen as their escapes and harm no reader; white space becomes one space."""
+    spaced = re.sub(r"[\t\n\v\f\r\x85\u2028\u2029]+", " ", str(text))
+    return "".join(
+        letter if unicodedata.category(letter) not in ("Cc", "Cs") and letter not in TURNING else ascii(letter)[1:-1]
+        for letter in spaced
+    )
 
 
 def listed(names: Sequence[Any]) -> str:

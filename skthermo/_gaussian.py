@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,6 +17,7 @@ MOST_STEPS = 100  # of expectation maximisation
 TOLERANCE = 1e-9  # it ends when no mean or covariance of standardised modes moves by more
 SETTLED = 0.01  # size of the last of the most steps, beside the sampling error, above which it warns
 GAPS_TOLERANCE = 1e-7  # variance below which a combination of standardised modes with gaps counts as constant
+IN_COMBINATION = 0.1  # coefficient of a standardised mode from which it counts as part of a constant combination
 JITTER = 1e-12  # added to variances of standardised modes: copies of a mode have inverses until `check_invertible`
 
 
@@ -109,14 +111,23 @@ def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
     return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
 
 
-def check_not_empty(rows: Array) -> None:
+def check_not_empty(rows: Array, names: Sequence[str] | None = None) -> None:
     """Refuse modes that no row has."""
     empty = np.isnan(rows).all(axis=0)
     if empty.any():
-        raise ValueError(f"modes {np.flatnonzero(empty).tolist()} (counted from 0) are NaN in all {len(rows)} rows")
+        raise ValueError(f"{modes_text(empty, names)} are NaN in all {len(rows)} rows")
 
 
-def check_invertible(covariance: Array, rows: Array, size: Array | None = None) -> Array:
+def modes_text(chosen: Mask, names: Sequence[str] | None) -> str:
+    """Some modes by their names or, without names, by their positions."""
+    if names is None:
+        return f"modes {np.flatnonzero(chosen).tolist()} (counted from 0)"
+    return f"modes {[str(name) for name in np.asarray(names)[chosen]]}"
+
+
+def check_invertible(
+    covariance: Array, rows: Array, size: Array | None = None, names: Sequence[str] | None = None
+) -> Array:
     """Standard deviations of the modes, more than rounding beside their size, if no mode depends on others."""
     size = np.fmax.reduce(np.abs(rows)) if size is None else size
     deviations = np.sqrt(np.diag(covariance))
@@ -127,7 +138,11 @@ def check_invertible(covariance: Array, rows: Array, size: Array | None = None) 
     rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), tolerance, hermitian=True)
     if rank < len(covariance):
         n_rows = int((~np.isnan(rows)).any(axis=1).sum())
-        which = f", modes {np.flatnonzero(constant).tolist()} (counted from 0) are constant" if constant.any() else ""
+        which = f", {modes_text(constant, names)} are constant" if constant.any() else ""
+        if not which and n_rows > len(covariance):
+            combination = np.linalg.eigh(covariance / np.outer(scale, scale))[1][:, 0]
+            part = modes_text(np.abs(combination) > IN_COMBINATION, names)
+            which = f", {part} are copies or combinations of each other"
         raise ValueError(
             f"the covariance of {n_rows} baseline rows and {len(covariance)} modes is singular (rank {rank}){which}; "
             f"expected more than {len(covariance)} rows, and no mode that is constant or a copy of others (or, in "

@@ -35,6 +35,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fem.affine": {"fem.modal"},
     "fem.assembly": {"fem.elements", "fem.affine"},
     "fem.external": {"fem.affine"},
+    "preprocessing.checks": set(),
     "preprocessing.tracking": set(),
     "detection.compensation": set(),
     "detection.windows": set(),

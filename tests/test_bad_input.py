@@ -1176,6 +1176,8 @@ ARRAYS = [  # what the message names, a call that takes an array of numbers, and
     ("", lambda bad: InverseSurrogate().fit([[1.0]], bad), ()),
     ("", lambda bad: TemperatureMapper(LINEAR).fit(bad, [[1.0]]), ()),
     ("", lambda bad: TemperatureMapper(LINEAR).fit([[1.0]], bad), ()),
+    ("sample_weight", lambda bad: HingeFeatures().fit(T, sample_weight=bad), ("nothing",)),
+    ("sample_weight", lambda bad: chain().fit(T, F, sample_weight=bad), ("nothing",)),
     ("", lambda bad: chain().fit(bad, F), ()),
     ("", lambda bad: chain().fit(T, bad), ()),
     ("", lambda bad: CHAIN.predict(bad), ()),

@@ -19,7 +19,6 @@ SHORT_FILES = {  # private files of fewer lines, and why they stand alone
     "_optional.py": "packages import it wherever something optional is needed",
     "_dependence.py": "detectors, surrogates and studies share it",
     "_times.py": "metrics, surrogates and studies share it",
-    "detection/_thresholds.py": "four detectors share it, in two packages",
     "fem/sampling/_samples.py": "it imports scikit-learn, which importing fem must not",
 }
 

@@ -69,6 +69,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
+        ("parameters told apart", "values > np.sqrt(NO_INFORMATION) * values[0]", "values >= 0"),
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
@@ -108,6 +109,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
+    ("surrogate/chain/_estimates.py", "surrogate/test_sample_weight.py"): [
+        ("a user's weights beside those of gaps", "return weights * self.weights", "return weights"),
+    ],
+    ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
+        ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
+    ],
+    ("_frames.py", "surrogate/test_sample_weight.py"): [
+        ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
+    ],
+    ("_regressors.py", "surrogate/test_sample_weight.py"): [
+        ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
+    ],
     ("surrogate/_standardiser.py", "surrogate/test_coordinates.py"): [
         ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
         ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
@@ -126,16 +139,20 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
         ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
     ],
+    ("surrogate/chain/_data_informed.py", "surrogate/test_uncertainty.py"): [
+        ("cost of filled temperatures", "variances[rows] += (", "variances[rows] += 0 * ("),
+    ],
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "spread of the same period",
             "self._spread(self.weather[test], ~test)",
             "self._spread(self.weather[test], test)",
         ),
-        ("spread beyond the range", "spread * (1 + excess)[:, np.newaxis]", "spread"),
+        ("spread beyond the range", " * (1 + excess)[:, np.newaxis]", ""),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
         ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
+        ("blocks as long as residuals remember", "max(WEEK, least *", "max(WEEK, 0 * least *"),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_weather.py", "surrogate/test_uncertainty.py"): [
@@ -155,6 +172,21 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("datasets/_kw51_truth.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
+    ],
+    ("preprocessing/checks/_stuck.py", "preprocessing/test_checks.py"): [
+        ("stuck sensors beside rounding", "length >= USUAL * usual", "length >= usual"),
+        ("stuck sensors beside resting values", "length < USUAL * same[USUAL_RANK]", "False"),
+        ("stuck sensors at all", "SHORTEST = 5", "SHORTEST = 500"),
+    ],
+    ("preprocessing/checks/_shift.py", "preprocessing/test_checks.py"): [
+        ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
+        ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
+    ],
+    ("preprocessing/checks/_swaps.py", "preprocessing/test_checks.py"): [
+        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < BETTER:", "        if True:"),
+    ],
+    ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
+        ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
     ],
     ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
@@ -176,23 +208,22 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("factors by chance", "- chi2.ppf(CHANCE, len(values) - 1)", ""),
     ],
     ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
-        ("leave-one-out distances", "(n_rows - 1 - distances**2)", "(n_rows - distances**2)"),
-        (
-            "records behind a mode",
-            "present.sum(axis=0), len(F)).min(axis=1)",
-            "present.sum(axis=0), len(F)).max(axis=1)",
-        ),
-        (
-            "periods of a covariance estimator",
-            "clone(self.covariance).fit(F[complete[rest]])",
-            "clone(self.covariance).fit(F[complete])",
-        ),
+        ("records that a covariance estimator learns from", "clone(self.covariance).fit(others)", "self.covariance_"),
+    ],
+    ("detection/_neighbourhoods.py", "detection/test_thresholds.py"): [
+        ("size of a neighbourhood", "REACH = 2 ", "REACH = 1 "),
+        ("neighbours in time", "np.median(steps)", "1.0"),
+        ("mean of the others", "mean = -_sums(", "mean = _sums("),
+        ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
+    ],
+    ("detection/_base.py", "detection/test_mahalanobis.py"): [
+        ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
-        ("rank of the threshold", "(n_independent + 1) * (1 - contamination)", "n_independent * (1 - contamination)"),
+        ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
     ],
     ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
-        ("neighbours in time", ">= NEAR_IN_TIME", ">= 0"),
+        ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
     ],
@@ -210,7 +241,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("edge of a window of time", 'side="right"', 'side="left"'),
     ],
     ("detection/windows/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
-        ("periods of windows", "self._law(windows, rest)", "self._law(windows, np.arange(n_rows))"),
+        ("periods of windows", "baseline.away_from(np.isin(np.arange(n_rows), fold))", "np.arange(n_rows)"),
+        ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
     ("_warnings.py", "surrogate/test_report.py"): [
@@ -219,8 +251,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_threads.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
-    ("studies/identification/_shift.py", "studies/test_identify_parts.py"): [
-        ("pseudo-periods of the shift's correlation", "PSEUDO_PERIODS = 24", "PSEUDO_PERIODS = 0"),
+    ("surrogate/chain/_scatter.py", "surrogate/test_scatter.py"): [
+        ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
+        ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
@@ -237,6 +270,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
+    ],
+    ("plotting/_limits.py", "plotting/test_limits.py"): [
+        ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
+        ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
+    ],
+    ("plotting/structures/_view.py", "plotting/test_structures.py"): [
+        ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
 }
 

@@ -20,6 +20,9 @@ LEAST_KEPT = 0.5  # share of the records that stays when a neighbourhood is left
 BLOCK = 5  # least length of a block of time that is left out as a whole, in correlation times
 N_BLOCKS = 50  # into which the records are divided where they depend on each other for less than that
 NUMBERS_AT_ONCE = 2_000_000  # held in memory
+YEAR = 365.25 * 24 * 3600e9  # nanoseconds
+MOST_ROWS = 1e12  # spans below are numbers of rows, and not nanoseconds
+LEAST_YEAR = 300  # days or rows from which records can show a season
 SINGULAR = 1e-9  # share of the smallest variance of all records below which the others have none
 
 
@@ -40,8 +43,9 @@ class Neighbourhoods:
 
     @cached_property
     def correlation_time(self) -> float:
-        """Mean over the columns, in records."""
-        return float(np.mean([correlation_time(column) for column in self.records[self.order].T]))
+        """Mean over the columns, in records, of what the season does not explain: it comes again, and is no memory."""
+        rows, season = self.records[self.order], _season(self.times[self.order])
+        return float(np.mean([correlation_time(_without(column, season)) for column in rows.T]))
 
     @property
     def n_independent(self) -> float:
@@ -102,6 +106,24 @@ class Neighbourhoods:
             few = _distances_left_out(standard, correlation, standard[which], first[which], stop[which])
             distances[self.order[which]] = few
         return distances
+
+
+def _season(times: Array) -> Array:
+    """A constant and the yearly and half-yearly waves, (n_records, 5); the constant alone for less than a year.
+
+    A long table without stamps counts as one year.
+    """
+    span = np.ptp(times)
+    year = YEAR if span > MOST_ROWS else span + 1
+    is_year = span >= LEAST_YEAR / 365.25 * YEAR if span > MOST_ROWS else len(times) >= LEAST_YEAR
+    phases = 2 * np.pi / year * np.outer(times, [1, 2] if is_year else [])
+    return np.hstack([np.ones((len(times), 1)), np.cos(phases), np.sin(phases)])
+
+
+def _without(column: Array, season: Array) -> Array:
+    """A column less what the season explains of it."""
+    known = ~np.isnan(column)
+    return column - season @ np.linalg.lstsq(season[known], column[known])[0]
 
 
 def _distances_left_out(rows: Array, correlation: Array, some: Array, first: Rows, stop: Rows) -> Array:

@@ -12,6 +12,7 @@ from skthermo._arguments import is_labelled
 from skthermo._arrays import real_array
 from skthermo._frames import check_same_rows
 from skthermo._times import row_times, time_of
+from skthermo._warnings import warn_user
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
@@ -20,9 +21,9 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     Parameters
     ----------
     damage_index : array-like of shape (n_samples,)
-        Damage index of records of the healthy structure that are not in the baseline; NaN is
-        ignored. `~skthermo.detection.MahalanobisDetector` gives the unsquared distance, and its ``threshold_`` is one
-        of that.
+        Damage index of records of the healthy structure that are not in the baseline; NaN where nothing can be
+        judged, which counts neither as healthy nor as an alarm. `~skthermo.detection.MahalanobisDetector` gives the
+        unsquared distance, and its ``threshold_`` is one of that.
     threshold : float
         A damage index above it is an alarm.
 
@@ -36,11 +37,16 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ValueError
         If the index is not a vector or the threshold not finite.
 
+    Warns
+    -----
+    UserWarning
+        How many records are not judged, if any.
+
     Examples
     --------
     >>> from skthermo.metrics import probability_of_false_alarm
-    >>> probability_of_false_alarm([1.0, 2.0, 4.0, float("nan")], threshold=3.0)
-    0.3333333333333333
+    >>> probability_of_false_alarm([1.0, 2.0, 4.0, 1.5], threshold=3.0)
+    0.25
     """
     return _share_above(damage_index, threshold)
 
@@ -51,7 +57,8 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
     Parameters
     ----------
     damage_index : array-like of shape (n_samples,)
-        Damage index of records of the damaged structure; NaN is ignored.
+        Damage index of records of the damaged structure; NaN where nothing can be judged, which counts neither as
+        found nor as missed.
     threshold : float
         A damage index above it is an alarm.
 
@@ -64,6 +71,11 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
     ------
     ValueError
         If the index is not a vector or the threshold not finite.
+
+    Warns
+    -----
+    UserWarning
+        How many records are not judged, if any.
 
     Examples
     --------
@@ -147,7 +159,8 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     Parameters
     ----------
     damage_index : array-like or Series of shape (n_samples,)
-        Damage index of records in order of time; NaN is no alarm.
+        Damage index of records in order of time. A record with NaN is not judged: it raises no alarm, and the wait goes
+        on.
     threshold : float
         A damage index above it is an alarm.
     onset : int or time, optional
@@ -198,4 +211,10 @@ def _checked(damage_index: ArrayLike, threshold: float) -> tuple[NDArray[np.floa
 def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     index, limit = _checked(damage_index, threshold)
     present = index[~np.isnan(index)]
+    if len(present) < len(index):
+        warn_user(
+            f"{len(index) - len(present)} of {len(index)} records are not judged, their damage index is NaN: the rate "
+            f"is that of the other {len(present)}",
+            "records not judged",
+        )
     return float((present > limit).mean()) if present.size else float("nan")

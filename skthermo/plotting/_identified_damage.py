@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ NEEDED = {
     "shifts": {"measured", "explained", "standard_error"},
 }
 N_ERRORS = 2  # standard errors on either side of an estimate
+LINE = 120  # number of letters of a line of the heading
 SHORT_NAME = 8  # number of letters up to which names of modes fit beside each other
 
 
@@ -30,7 +32,8 @@ class IdentifiedDamageDisplay:
     identified : IdentifiedDamage
         With the frames ``table`` (groups in rows; severity, standard_error, significant), ``shifts`` (modes in rows;
         measured, explained, standard_error; relative) and ``similarity`` (cosine between groups), and perhaps the names
-        ``unseen`` of groups that are left out.
+        ``unseen`` of groups that are left out. The first sentence of its ``answer()``, if it has one, heads a figure of
+        its own.
 
     Attributes
     ----------
@@ -39,7 +42,8 @@ class IdentifiedDamageDisplay:
     figure_ : Figure
         Their figure.
     severities_, shifts_ : ErrorbarContainer
-        Severities and measured shifts in percent, with two standard errors.
+        Severities and measured shifts in percent, with two standard errors. A severity that is not determined is a
+        dotted line from end to end.
     explained_ : Line2D
         Explained shifts in percent.
     image_ : AxesImage
@@ -119,6 +123,9 @@ class IdentifiedDamageDisplay:
         self.axes_[2].set_title("cosine between groups")
         if len(similarity) > 3:
             lean(self.axes_[2])
+        answer = getattr(self.identified, "answer", None)
+        if ax is None and answer is not None:
+            self.figure_.suptitle(textwrap.fill(answer()[0], LINE), fontsize="medium")
         self.figure_.colorbar(self.image_, ax=self.axes_[2], shrink=0.8)
         return self
 
@@ -128,15 +135,16 @@ class IdentifiedDamageDisplay:
         severity = 100 * table["severity"].to_numpy(dtype=float)
         errors = N_ERRORS * 100 * table["standard_error"].to_numpy(dtype=float)
         known = np.isfinite(errors)
-        drawn = ax.errorbar(
-            *(severity, places), xerr=np.where(known, errors, 0), linestyle="", color=GREY, capsize=3, elinewidth=1.2
-        )
+        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2}
+        drawn = ax.errorbar(severity[known], places[known], xerr=errors[known], **style)
         significant = table["significant"].to_numpy(dtype=bool)
         for is_found, face, label in ((True, ORANGE, "significant"), (False, "white", "not significant")):
-            rows = significant == is_found
+            rows = (significant == is_found) & known
             style = {"marker": "o", "color": ORANGE, "markerfacecolor": face, "markersize": 7, "label": label}
             if rows.any():
                 ax.plot(severity[rows], places[rows], linestyle="", **style)
+        for place in places[~known]:  # it may be anything
+            ax.axhline(place, color=GREY, linestyle=":", linewidth=1.2)
         ax.axvline(0, color=BLACK, linewidth=0.8)
         names = [
             shortened(name) + ("" if one else "\n(not determined)")
@@ -144,7 +152,7 @@ class IdentifiedDamageDisplay:
         ]
         ax.set_yticks(places, names)
         ax.set(title=f"severity ± {N_ERRORS} standard errors", xlabel="severity (%)", ylim=(len(table) - 0.5, -0.5))
-        ax.legend(frameon=False, fontsize="small")
+        ax.legend(framealpha=0.8, edgecolor="none", fontsize="small")
         unseen = list(getattr(self.identified, "unseen", ()))
         if unseen:
             text = f"left out, as these modes do not show them: {', '.join(map(shortened, unseen))}"

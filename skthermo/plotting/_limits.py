@@ -15,7 +15,9 @@ MARGIN = 0.05  # empty share of the axis next to its edges
 BEYOND = "beyond"
 """Name (gid) of the marks at the edges."""
 
-EDGES = {  # marker, coordinates of the edge in shares of the axes, and how its text stands
+EDGES: dict[
+    tuple[str, bool], tuple[str, float, dict[str, Any]]
+] = {  # marker, coordinates of the edge in shares of the axes, and how its text stands
     ("y", False): ("v", 0.0, {"x": 0.99, "y": 0.03, "ha": "right", "va": "bottom"}),
     ("y", True): ("^", 1.0, {"x": 0.99, "y": 0.96, "ha": "right", "va": "top"}),
     ("x", False): ("<", 0.0, {"x": 0.02, "y": 0.5, "ha": "left", "va": "center", "rotation": 90}),

@@ -4,6 +4,7 @@ import re
 from collections.abc import Hashable
 from types import ModuleType
 
+from skthermo._formatting import printable
 from skthermo._optional import import_optional
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
@@ -30,7 +31,7 @@ def pyplot() -> ModuleType:
 
 def shortened(name: Hashable) -> str:
     """A name for a legend, a title or a tick: a very long one loses its middle, dollar signs stay as they are."""
-    text = str(name)
+    text = printable(name)
     if len(text) > LONGEST_NAME:
         text = f"{text[: LONGEST_NAME // 2].rstrip()} ... {text[-LONGEST_NAME // 3 :].lstrip()}"
     return plain(text)
@@ -38,7 +39,7 @@ def shortened(name: Hashable) -> str:
 
 def plain(text: Hashable) -> str:
     """A text whose dollar signs matplotlib draws as they are, in lines where they enclose no formula."""
-    return "\n".join(_plain_line(line) for line in str(text).split("\n"))
+    return "\n".join(_plain_line(printable(line)) for line in str(text).split("\n"))
 
 
 def _plain_line(line: str) -> str:

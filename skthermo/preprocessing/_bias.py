@@ -31,7 +31,8 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
     ----------
     reference : array-like of shape (n_modes,), FE model or None, default=None
         Means of the frequencies after `transform`: a vector in Hz, or an FE model, which stands for
-        its nominal frequencies. None stands for zeros, or for ones with ``method="scale"``.
+        its nominal frequencies. None stands for the model of the `~skthermo.surrogate.DataInformedFEM` whose aligner
+        this is; elsewhere for zeros, or for ones with ``method="scale"``.
     method : {"shift", "scale"}, default="shift"
         ``F - mean(F) + reference``, or ``F / mean(F) * reference``, which keeps relative changes.
 

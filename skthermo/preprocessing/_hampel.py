@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._arrays import Array, as_floats
-from skthermo._columns import check_positions_are_names, positions_of
-from skthermo._frames import frame_like
+from skthermo._frames import check_positions_are_names, frame_like, positions_of
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import (
     Estimator,
@@ -176,7 +175,9 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
         return frame_like(X, cleaned)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+        n_least = 1 if self.targets is None else 2
+        options = {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan", "ensure_min_features": n_least}
+        return validate_data(self, X, reset=reset, **options)
 
     def _distances(self, X: Any, values: NDArray) -> tuple[Array, Array]:
         """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""
@@ -195,7 +196,7 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
             return int(self.window)
         if not has_stamps(X):
             raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")
-        return pd.Timedelta(as_duration(self.window, "freq"))
+        return pd.Timedelta(as_duration(self.window, "window"))
 
 
 def distances_from_neighbours(values: Array, times: Array, window: int | pd.Timedelta) -> tuple[Array, Array]:

@@ -22,6 +22,7 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo._warnings import warn_user
 from skthermo.preprocessing._stamps import as_duration, as_stamps
 
 DEFAULT_TOLERANCE = 6  # times freq
@@ -61,6 +62,9 @@ class LagFeatures(TransformerMixin, Estimator):
         Their stamps, in UTC where they have a time zone.
     time_zone_ : str or None
         Time zone of the stamps.
+    first_rows_ : ndarray
+        First records of `fit`, as many as lags reach back and one more: the padding of records that begin with them
+        is known from `fit`, and no warning says so again.
     n_features_in_ : int
         Number of sensors.
     feature_names_in_ : ndarray of str
@@ -69,8 +73,8 @@ class LagFeatures(TransformerMixin, Estimator):
     Notes
     -----
     On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of
-    `fit` are not used in `transform`. An index of periods, or of other objects that are stamps, is taken as a
-    DatetimeIndex, a period as its start.
+    `fit` are not used in `transform`: give the rows before new records, too, and leave their results out. An
+    index of periods, or of other objects that are stamps, is taken as a DatetimeIndex, a period as its start.
 
     On a DatetimeIndex, lag k is the last record at or before t - k freq, or NaN if that record is older
     than the tolerance. Records of `fit` and of `transform` are searched together; for a stamp in both, the
@@ -162,6 +166,7 @@ class LagFeatures(TransformerMixin, Estimator):
             self.history_ = values.copy()
             self.stamps_ = stamps.as_unit("ns").asi8.view("datetime64[ns]")
             self.time_zone_ = _time_zone(stamps)
+        self.first_rows_ = values[: max(self.lags_) + 1].copy()
         return self
 
     @overload
@@ -185,6 +190,13 @@ class LagFeatures(TransformerMixin, Estimator):
         ------
         ValueError
             If the number or names of sensors, or the kind of index, differ from `fit`.
+
+        Warns
+        -----
+        UserWarning
+            If lags reach before the first row of records without a DatetimeIndex that do not begin as those of `fit`
+            do; if, on a DatetimeIndex, more than half of the rows have lags before the first record that was given and
+            find none.
         """
         check_is_fitted(self)
         values = self._validated(X, reset=False)
@@ -193,7 +205,11 @@ class LagFeatures(TransformerMixin, Estimator):
             kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
-        lagged = self._by_row(values, self.lags_) if stamps is None else self._by_time(stamps, values)
+        if stamps is None:
+            self._warn_of_padding(values)
+            lagged = self._by_row(values, self.lags_)
+        else:
+            lagged = self._by_time(stamps, values)
         return frame_like(X, lagged, self._lag_names(getattr(X, "columns", ())))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -218,6 +234,28 @@ class LagFeatures(TransformerMixin, Estimator):
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
+    def _warn_of_padding(self, values: NDArray) -> None:
+        """Warn of first rows whose lags are not known, unless they are those of `fit`."""
+        reach, n_rows = max(self.lags_), len(values)
+        begins = values[: reach + 1]
+        if reach and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
+            done = "are padded with the first record" if self.padding == "edge" else "lack lags"
+            warn_user(
+                f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
+                f"{reach} rows before, too, or a frame on a DatetimeIndex",
+                "padded lags",
+            )
+
+    def _warn_of_no_history(self, stamps: pd.DatetimeIndex, unknown: NDArray[np.bool_]) -> None:
+        """Warn if more than half of the rows have lags that reach before the first of them and find no record."""
+        if 2 * unknown.sum() > len(unknown):
+            reach = _in_words(max(self.lags_) * self.freq_)
+            warn_user(
+                f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
+                f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
+                "no records for lags",
+            )
+
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
         lagged = np.empty((len(sensors), len(lags), n_rows), dtype=values.dtype)
@@ -239,14 +277,17 @@ class LagFeatures(TransformerMixin, Estimator):
         known = np.concatenate([old[only_old], own])
         order = np.argsort(known)
         ascending = known[order]
-        sources = []
+        sources, unknown = [], np.zeros(len(own), dtype=bool)
         for lag in self.lags_:
             wanted = own - lag * freq
             at = np.searchsorted(ascending, wanted, side="right") - 1
             stale = wanted - ascending[at] > tolerance
             before = at < 0
+            unknown |= (stale | before) & (wanted < own.min())
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
+        if not np.isin(own, old).all():
+            self._warn_of_no_history(stamps, unknown)
         return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources)
 
 
@@ -307,6 +348,12 @@ def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
         raise ValueError("X has 1 sample, whose stamp gives no step between records; expected freq, such as '1h'")
     lengths, counts = np.unique(steps, return_counts=True)
     return np.timedelta64(lengths[counts.argmax()], "ns")
+
+
+def _in_words(duration: np.timedelta64) -> str:
+    """A duration in hours, or in days from two days on."""
+    hours = duration / np.timedelta64(1, "h")
+    return f"{hours:.3g} h" if hours < 48 else f"{hours / 24:.3g} days"
 
 
 def _time_zone(stamps: pd.DatetimeIndex) -> str | None:

@@ -23,7 +23,7 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     words = paragraphs(
         "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
         "learned from measurements how temperature moves this structure, simulated it in the same weather without "
-        "damage and with damage. The alarm system judged every simulated record."
+        f"damage and with damage. {_judged(study)}"
     )
     meaning = paragraphs(
         "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
@@ -64,6 +64,19 @@ def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[s
     return [name for family in tested["family"].unique() if (name := str(family)) not in found]
 
 
+def _judged(study: Any) -> str:
+    """How many simulated records the alarm system judged."""
+    unjudged = {name: index.isna() for (name, source), index in study.indices_.items() if source == SIMULATED}
+    number, total = (int(sum(count)) for count in zip(*((u.sum(), len(u)) for u in unjudged.values()), strict=True))
+    if not number:
+        return "The alarm system judged every simulated record."
+    return (
+        f"The alarm system could not judge {number:,} of {counted(total, 'record')} of the first simulation, because "
+        "they lack what it needs (see the warnings under Settings). These count neither as healthy nor as alarms: "
+        "nothing is known of them."
+    )
+
+
 def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
@@ -76,7 +89,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
             element("span", described(scenarios.get(row["scenario"])), class_="text"),
             bar(row["rate"], share_text(row["rate"])),
             bounds_text(row["lowest"], row["highest"]),
-            f"{row['n_records']:,}",
+            f"{row['n_records']:,}{_share_not_judged(study, row)}",
             duration_text(row["time_to_detection"]),
         ]
         for _, row in results.iterrows()
@@ -110,6 +123,12 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         ),
     ]
     return section("found", "What would be found and what not", *(part for part in parts if part))
+
+
+def _share_not_judged(study: Any, row: pd.Series) -> str:
+    """What share of the records of a scenario was not judged; nothing if all were."""
+    share = float(study.indices_[row["scenario"], row["source"]].isna().mean())
+    return f" ({share_text(share)} not judged)" if share else ""
 
 
 def _beginning(study: Any) -> str:

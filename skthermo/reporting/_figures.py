@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._arrays import as_floats
-from skthermo._formatting import percent, share_text, significant
+from skthermo._formatting import counted, percent, printable, share_text, significant
 from skthermo._optional import import_optional
 from skthermo.plotting import (
     DamageIndexDisplay,
@@ -45,7 +45,9 @@ def draw(
             own_width, own_height = display.figure_.get_size_inches()
             display.figure_.set_size_inches(width, own_height / own_width * width if height is None else height)
             if title:
-                display.figure_.axes[0].set_title(textwrap.shorten(title, 50, placeholder=" ..."), fontsize="medium")
+                display.figure_.axes[0].set_title(
+                    textwrap.shorten(printable(title), 50, placeholder=" ..."), fontsize="medium"
+                )
             return image(_svg(display.figure_), alt)
     finally:
         for number in set(plt.get_fignums()) - others:
@@ -141,6 +143,7 @@ def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) ->
     threshold = study.threshold_
     above = "; ".join(
         f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
+        + (f", {counted(int(index.isna().sum()), 'record')} not judged" if index.isna().any() else "")
         for name, index in shown.items()
     )
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+from skthermo._formatting import printable
+
 
 class Html(str):
     """Text that is HTML already; any other text is escaped when it becomes part of an element."""
@@ -71,9 +73,9 @@ code { font-size: 0.88em; overflow-wrap: anywhere; }
 def element(tag: str, *content: Any, **attributes: Any) -> Html:
     """An element with its content; an underscore at the end of an attribute's name is left out, others are hyphens."""
     named = "".join(
-        f' {name.rstrip("_").replace("_", "-")}="{escape(str(value))}"' for name, value in attributes.items()
+        f' {name.rstrip("_").replace("_", "-")}="{escape(printable(value))}"' for name, value in attributes.items()
     )
-    inner = "".join(part if isinstance(part, Html) else escape(str(part)) for part in content)
+    inner = "".join(part if isinstance(part, Html) else escape(printable(part)) for part in content)
     return Html(f"<{tag}{named}>" if tag in VOID else f"<{tag}{named}>{inner}</{tag}>")
 
 

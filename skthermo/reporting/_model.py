@@ -119,6 +119,8 @@ def training_tables(fem: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _doubts(report: Any) -> list[str]:
     """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
+    if report.findings is not None:
+        doubts += [f"{message}." for _, message in report.findings.warnings()]
     doubts += [f"{message}." for kind, message in report.warnings() if kind != "worse than the mean"]
     for mode, error in report.errors.iterrows():
         if not error["MAPE"] < error["MAPE of the mean"]:

@@ -121,8 +121,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         if complete.sum() < 2:
             weighted = "" if sample_weight is None else " with a weight"
             raise ValueError(
-                f"{type(self).__name__} got {complete.sum()} complete rows{weighted} of {len(X)} samples; expected at "
-                "least 2"
+                f"{type(self).__name__} got {complete.sum()} complete rows of {len(X)} samples; expected at least 2"
+                f"{weighted}"
             )
         X, y = X[complete], y[complete]
         weights = None if sample_weight is None else sample_weight[complete]

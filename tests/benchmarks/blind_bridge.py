@@ -46,7 +46,15 @@ MODES = [f"f{i}" for i in range(1, 7)]
 SENSORS = ["air", "girder", "cable"]
 PER_DAY = 12
 NOISE = 0.003  # relative standard deviation of one record
-CONDITIONS = ("as in training", "10 % gaps", "1 % outliers", "dead girder", "girder drifts 4 K", "creep")
+CONDITIONS = (
+    "as in training",
+    "10 % gaps",
+    "1 % outliers",
+    "the same, filtered",
+    "dead girder",
+    "girder drifts 4 K",
+    "creep",
+)
 DEAD = "2023-06-01"  # from when on the girder thermometer gives NaN
 ASKED = 0.02
 BEFORE = 15
@@ -125,6 +133,11 @@ class Bridge:
         wrong = random.random((len(theta), len(MODES))) < 0.01
         self.wrong = np.where(wrong, random.choice([-1, 1], wrong.shape) * random.uniform(0.03, 0.08, wrong.shape), 0)
 
+    @property
+    def n_wrong_in_training(self):
+        """Outliers that are no gaps."""
+        return int(((self.wrong[: self.n] != 0) & ~self.gaps[: self.n]).sum())
+
     def frequencies(self, rows, damage, theta):
         model = self.model.damaged(damage) if damage else self.model
         clean = model.frequencies(theta) * (1 + self.slow[rows])
@@ -148,8 +161,9 @@ class Bridge:
         F = self.frequencies(rows, damage, theta)
         if condition == "10 % gaps":
             F, T = F.mask(self.gaps[rows]), T.mask(self.lost[rows])
-        elif condition == "1 % outliers":
+        elif condition in ("1 % outliers", "the same, filtered"):
             F = F * (1 + self.wrong[rows])
+            F = F if condition == "1 % outliers" else without_outliers(F)
         elif condition == "dead girder":
             T.loc[DEAD:, "girder"] = np.nan
         elif condition == "girder drifts 4 K":
@@ -177,13 +191,9 @@ def chain():
     )
 
 
-def cleaned(records):
-    """Frequencies without outliers, where the library has a filter for them."""
-    if not hasattr(preprocessing, "HampelFilter"):
-        return records
-    F = preprocessing.HampelFilter().fit_transform(records[MODES])
-    print(f"  HampelFilter: {int((F.isna() & records[MODES].notna()).sum().sum())} values taken for outliers")
-    return records[SENSORS].join(F)
+def without_outliers(F):
+    """Frequencies with NaN for outliers, where the library has a filter for them."""
+    return preprocessing.HampelFilter().fit_transform(F) if hasattr(preprocessing, "HampelFilter") else F
 
 
 METHODS = {
@@ -332,8 +342,15 @@ def print_method(name, bridge, years, dirty, n_days):
     """All conditions of one method: a row each, warnings, and days one by one."""
     start, heard = time.perf_counter(), Heard()
     print(f"\n{name}, trained on {'records with gaps and outliers' if dirty else 'clean records'}")
+    baseline = bridge.training(dirty)
+    if dirty:
+        print_unfiltered(name, baseline, years)
+        filtered = without_outliers(baseline[MODES])
+        n_removed = int((filtered.isna() & baseline[MODES].notna()).sum().sum())
+        print(f"  HampelFilter removes {n_removed} values; {bridge.n_wrong_in_training} are wrong")
+        baseline = baseline[SENSORS].join(filtered)
     with heard:
-        detectors = Detectors(METHODS[name](), cleaned(bridge.training(dirty)) if dirty else bridge.training(dirty))
+        detectors = Detectors(METHODS[name](), baseline)
     heard.print("of fit")
     rows, said, silent = {}, Heard(), 0
     for condition in CONDITIONS:
@@ -367,13 +384,24 @@ def print_method(name, bridge, years, dirty, n_days):
     return table, silent
 
 
+def print_unfiltered(name, baseline, years):
+    """What outliers in the training records do, if nobody removes them."""
+    heard = Heard()
+    with heard:
+        detectors = Detectors(METHODS[name](), baseline)
+        rates = {damage: Decisions(detectors.single, years[damage, "as in training"]).rate for damage in DAMAGES}
+    shown = ", ".join(f"{damage} {rate:.1f}" for damage, rate in rates.items())
+    print(f"  without a filter, records in alarm, %: {shown}")
+    heard.print("of fit without a filter")
+
+
 def print_competitors(bridge, years, dirty):
     rows = {}
     for name, kind in COMPETITORS.items():
         competitor = kind().fit(bridge.training(dirty))
         for condition in CONDITIONS:
             rows[name, condition] = {d: competitor.rate(years[d, condition]) for d in DAMAGES}
-    print(f"\nSimple competitors, trained on {'records with gaps and outliers' if dirty else 'clean records'}, %")
+    print(f"\nSimple competitors, trained on {'raw records with gaps and outliers' if dirty else 'clean records'}, %")
     print(pd.DataFrame(rows).T.round(1).to_string())
 
 

@@ -1,19 +1,24 @@
-"""False alarms and detection on simulated residuals, whose law is known: thresholds, windows, missing modes, charts,
-drift.
+"""False alarms and detection on simulated residuals, whose law is known: thresholds, dependence in time, windows,
+missing modes, charts, drift, trend.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_thresholds.py
 
-``--parts`` chooses some of the five.
+``--parts`` chooses some of the seven. The exit code is 1 where "dependence" gives more false alarms than it should.
 """
 
 import argparse
+import warnings
 from itertools import product
 
 import numpy as np
 import pandas as pd
 from control_charts import correlated, cusum, whitened
+from sklearn.covariance import LedoitWolf
+from sklearn.ensemble import IsolationForest
+from sklearn.neighbors import LocalOutlierFactor
+from sklearn.svm import OneClassSVM
 
-from skthermo.detection import MahalanobisDetector, WindowedAlarm
+from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.metrics import time_to_detection
 
 THRESHOLDS = ("quantile", "conformal", "chi2")
@@ -54,6 +59,54 @@ def print_finite_samples(options):
         aim = f", at most {100 * asked:.0f} and sampling error" if threshold == "conformal" else ""
         print(f"{asked:.0%} asked, {threshold}{aim}: {mean:.2f}, standard error {error:.2f}")
     print()
+
+
+def print_dependence(options):
+    """False alarms where records depend on each other in time, and whether they are few enough."""
+    detectors = {
+        "Mahalanobis": MahalanobisDetector(ASKED),
+        "Mahalanobis, a fifth missing": MahalanobisDetector(ASKED),
+        "Ledoit-Wolf": MahalanobisDetector(ASKED, covariance=LedoitWolf()),
+        "mean of 7": WindowedAlarm(7, contamination=ASKED),
+        "local outlier factor": OutlierDetector(LocalOutlierFactor(novelty=True), ASKED),
+        "support vectors": OutlierDetector(OneClassSVM(), ASKED),
+        "isolation forest": OutlierDetector(IsolationForest(n_estimators=30, random_state=0), ASKED),
+    }
+    rows, n_missed = {}, 0
+    print(f"False alarms, %, {100 * ASKED:.0f} asked, baselines of 6 modes with a correlation of neighbours\n")
+    for correlation, n_records in product((0.0, 0.5, 0.9), (100, 365, 2000)):
+        random, rates = np.random.default_rng(0), {name: [] for name in detectors}
+        for _ in range(max(options.dependent * 100 // n_records, 10)):
+            baseline, new = (correlated(random, (n, 6), correlation) for n in (n_records, 2000))
+            for name, found in rates.items():
+                seen = with_gaps(random, baseline, 0.2) if "missing" in name else baseline
+                found.append(rate(detectors[name].fit(seen), new))
+        rows[correlation, n_records] = {
+            name: "{:.2f} +- {:.2f}".format(*mean_and_error(r)) for name, r in rates.items()
+        }
+        mean, error = mean_and_error(rates["Mahalanobis"])
+        n_missed += mean > 100 * ASKED + 0.3 + 2 * error
+    table = pd.DataFrame(rows).T
+    table.index.names = ["correlation", "records"]
+    print(table.to_string(), end="\n\n")
+    print(f"Mahalanobis, cases with more than {100 * ASKED:.0f} % and sampling error: {n_missed} of {len(rows)}\n")
+    return n_missed
+
+
+def print_trend(options):
+    """False alarms of windows after a baseline with a trend, which goes on or stays where it ended."""
+    rows = {}
+    for trend, rule in product((0.0, 0.5, 1.0), RULES):
+        random, rates = np.random.default_rng(4), {"stays": [], "goes on": []}
+        for _ in range(options.repeats):
+            baseline, new = (correlated(random, (YEAR // 4, N_MODES), CORRELATION) for _ in range(2))
+            rise = trend * np.linspace(-0.5, 0.5, len(new))[:, np.newaxis]
+            alarm = WindowedAlarm(24, rule=rule, contamination=ASKED).fit(baseline + rise)
+            for how, found in rates.items():
+                found.append(rate(alarm, new + trend / 2 + (rise + trend / 2 if how == "goes on" else 0)))
+        rows[f"{trend} deviations", RULES[rule]] = {how: np.mean(100 * np.array(found)) for how, found in rates.items()}
+    print("False alarms of windows of 24, %, after a quarter of a year with a trend in every mode, which then\n")
+    print(pd.DataFrame(rows).T.round(1).to_string(), end="\n\n")
 
 
 def with_gaps(random, records, share):
@@ -213,10 +266,12 @@ def print_drift(options):
 
 PARTS = {
     "finite-samples": print_finite_samples,
+    "dependence": print_dependence,
     "windows": print_windows,
     "missing-modes": print_missing_modes,
     "charts": print_charts,
     "drift": print_drift,
+    "trend": print_trend,
 }
 
 
@@ -224,6 +279,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--parts", nargs="*", default=[*PARTS], choices=PARTS)
     parser.add_argument("--baselines", type=int, default=2000, help="short baselines")
+    parser.add_argument("--dependent", type=int, default=200, help="dependent baselines of 100 records")
     parser.add_argument("--repeats", type=int, default=30, help="baselines of correlated residuals")
     parser.add_argument("--lengths", type=int, nargs="*", default=[1000, 3000, 10_000], help="their lengths")
     parser.add_argument("--new-in-time", type=int, default=20_000, help="new records for each of them")
@@ -231,9 +287,9 @@ def main():
     parser.add_argument("--calibration", type=int, default=200_000, help="healthy records that set charts' thresholds")
     parser.add_argument("--streams", type=int, default=200, help="streams with a shift")
     options = parser.parse_args()
-    for name in options.parts:
-        PARTS[name](options)
+    warnings.filterwarnings("ignore", ".*(depend on each other|are too few for a rate)")
+    return sum(PARTS[name](options) or 0 for name in options.parts) > 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

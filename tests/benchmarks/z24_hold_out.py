@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from sklearn.ensemble import ExtraTreesRegressor, GradientBoostingRegressor
-from sklearn.model_selection import KFold
 from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo.datasets import load_z24, make_z24
@@ -118,7 +117,7 @@ def false_alarms(records, fem, regressor, n_draws):
     T, F, T_test = records.T_train, records.F_train, records.T_test
     baseline, compensator = F, None
     if regressor is not None:
-        compensator = TemperatureCompensator(regressor, targets=list(F), cv=KFold(5))
+        compensator = TemperatureCompensator(regressor, targets=list(F))
         baseline = compensator.fit_transform(T.join(F))
     detector = MahalanobisDetector(threshold="quantile").fit(baseline)
 

@@ -35,6 +35,7 @@ from tests.detection.compensated import (
 pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside"),
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ records of fold"),
+    pytest.mark.filterwarnings(r"ignore:the \d+ baseline records depend on each other"),
 ]
 
 
@@ -67,6 +68,7 @@ def test_folds_given_as_an_iterable_serve():
     pd.testing.assert_frame_equal(compensator(cv=folds).fit_transform(X), compensator(cv=4).fit_transform(X))
 
 
+@pytest.mark.filterwarnings("ignore:frequencies are far from their neighbours")
 def test_a_folds_targets_enter_only_their_own_residuals():
     periods = compensator(cv="contiguous")
     before, changed, fold = periods.fit_transform(X), X.copy(), slice(80, 120)
@@ -113,6 +115,7 @@ def test_one_target_is_a_vector_for_estimators_that_want_one():
 # What they are for
 
 
+@pytest.mark.filterwarnings("ignore:the 730 baseline records depend on each other")  # raw frequencies follow the season
 def test_out_of_fold_thresholds_keep_their_promise_and_in_sample_ones_do_not():
     healthy, later, damaged = (
         make_truss_campaign(2, random_state=seed, damage=damage)

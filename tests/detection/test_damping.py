@@ -73,6 +73,7 @@ def test_missing_and_negative_ratios_are_taken():
     assert np.isfinite(MahalanobisDetector().fit(residuals).damage_index(residuals)).all()
 
 
+@pytest.mark.filterwarnings(r"ignore:3 of 730 rows are not judged \(predict gives 0\), the first row 0 ")
 def test_a_week_together_finds_what_single_records_hardly_show():
     week = detector(FREQUENCIES + DAMPING, last=WindowedAlarm(7))
     assert week(records(1)) < 0.06

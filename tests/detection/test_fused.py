@@ -73,7 +73,11 @@ def test_what_one_detector_cannot_judge_the_others_do():
     alone = mixed.detectors_[0]
     index = mixed.damage_index(holed)
     np.testing.assert_allclose(index[:5], -alone.score_samples(holed)[:5] / alone[-1].threshold_)
-    assert np.isnan(mixed.damage_index(holed.assign(**dict.fromkeys(MODES, np.nan)))).all()
+    with pytest.warns(match="730 of 730 rows are not judged") as given:
+        found = mixed.predict(holed.assign(**dict.fromkeys(MODES, np.nan)))
+    assert (found == 0).all()
+    causes = ["no column has a value there", "this detector needs every column", "none of the 2 detectors can judge"]
+    assert [cause in str(one.message) for cause, one in zip(causes, given, strict=True)] == [True] * 3
 
 
 def test_parameters_are_set_through_it_and_pickles_keep_indices():
@@ -87,6 +91,7 @@ def test_parameters_are_set_through_it_and_pickles_keep_indices():
 def test_windows_and_records_can_be_fused():
     week = behind(LinearRegression(), WindowedAlarm(7))
     mixed = FusedDetector([("records", behind(LinearRegression())), ("weeks", week)]).fit(BASELINE)
+    assert (mixed.predict(DAMAGED) != 0).all()  # the first rows by single records alone
     assert (mixed.predict(DAMAGED) == -1).mean() > (FITTED.predict(DAMAGED) == -1).mean()
 
 

@@ -67,7 +67,7 @@ def test_any_covariance_estimator_serves(covariance):
     assert not hasattr(covariance, "covariance_")
 
 
-def test_rows_without_any_mode_give_no_index_and_no_alarm():
+def test_rows_without_any_mode_are_neither_healthy_nor_in_alarm():
     frame = pd.DataFrame(F, columns=["f1", "f2", "f3"], index=pd.date_range("2025", periods=400, freq="h"))
     holed = frame.copy()
     holed.iloc[[3, 7]] = np.nan
@@ -77,9 +77,21 @@ def test_rows_without_any_mode_give_no_index_and_no_alarm():
     index = detector.damage_index(holed)
     assert index.index.equals(holed.index)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows lack values and have no damage index"):
+    with pytest.warns(UserWarning, match=r"2 of 400 rows are not judged \(predict gives 0\), the first row 3"):
         alarms = detector.predict(holed)
-    np.testing.assert_array_equal(alarms[[3, 7, 8, 9]], [1, 1, -1, -1])
+    np.testing.assert_array_equal(alarms[[3, 7, 8, 9]], [0, 0, -1, -1])
+    np.testing.assert_array_equal(alarms == 0, index.isna())
+
+
+@pytest.mark.parametrize("ask", ["damage_index", "decision_function", "predict"])
+def test_a_call_in_which_nothing_can_be_judged_says_so_once(ask):
+    detector = MahalanobisDetector().fit(F)
+    with pytest.warns(UserWarning, match="are not judged") as given:
+        found = getattr(detector, ask)(np.full((24, 3), np.nan))
+    assert [str(one.message).partition(":")[0] for one in given] == [
+        "24 of 24 rows are not judged (predict gives 0), the first row 0"
+    ]
+    assert (found == 0).all() if ask == "predict" else np.isnan(found).all()
 
 
 def test_rows_without_any_mode_do_not_enter_the_baseline():

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.covariance import EllipticEnvelope, MinCovDet
 from sklearn.ensemble import IsolationForest
@@ -39,11 +40,19 @@ class FromZero(OutlierMixin, BaseEstimator):
         return -np.abs(X[:, 0])
 
 
-def test_index_is_minus_the_score_and_the_threshold_its_quantile():
-    baseline = np.arange(101.0)[:, np.newaxis]
-    detector = OutlierDetector(FromZero(), contamination=0.05).fit(baseline)
-    np.testing.assert_array_equal(detector.damage_index(baseline), np.arange(101.0))
-    assert detector.threshold_ == 95
+ROWS = np.random.default_rng(0).permutation(np.arange(101.0))[:, np.newaxis]
+
+
+@pytest.mark.parametrize(("threshold", "expected"), [("quantile", 95), ("conformal", 96)])
+def test_index_is_minus_the_score_and_the_threshold_its_quantile_or_order_statistic(threshold, expected):
+    detector = OutlierDetector(FromZero(), 0.05, threshold=threshold).fit(ROWS)
+    np.testing.assert_array_equal(detector.damage_index(ROWS), ROWS[:, 0])
+    np.testing.assert_array_equal(detector.baseline_index_, ROWS[:, 0])  # a score that is not learned
+    assert detector.threshold_ == expected
+
+
+def test_scores_form_one_chain():
+    detector = OutlierDetector(FromZero(), 0.05, threshold="quantile").fit(ROWS)
     assert detector.offset_ == -95
     np.testing.assert_array_equal(detector.score_samples([[-96.0]]), [-96])
     np.testing.assert_array_equal(detector.decision_function([[-96.0], [90.0]]), [-1, 5])
@@ -62,15 +71,14 @@ class AsInPyOD(BaseEstimator):
 
 
 def test_detectors_that_score_as_those_of_pyod_serve():
-    baseline = np.arange(101.0)[:, np.newaxis]
-    ours, theirs = (OutlierDetector(estimator, 0.05).fit(baseline) for estimator in (FromZero(), AsInPyOD()))
-    assert theirs.threshold_ == ours.threshold_ == 95
-    np.testing.assert_array_equal(theirs.predict([[95.0], [-96.0]]), [1, -1])
+    ours, theirs = (OutlierDetector(estimator, 0.05).fit(ROWS) for estimator in (FromZero(), AsInPyOD()))
+    assert theirs.threshold_ == ours.threshold_ == 96
+    np.testing.assert_array_equal(theirs.predict([[96.0], [-97.0]]), [1, -1])
 
 
 @pytest.mark.parametrize("estimator", DETECTORS, ids=lambda e: type(e[-1] if hasattr(e, "steps") else e).__name__)
 def test_any_outlier_detector_serves(estimator):
-    detector = OutlierDetector(estimator).fit(F)
+    detector = OutlierDetector(estimator, threshold="quantile").fit(F)
     assert detector.estimator_ is not estimator
     np.testing.assert_array_equal(detector.damage_index(F), -detector.estimator_.score_samples(F.to_numpy()))
     assert (detector.predict(F) == -1).mean() == 0.02
@@ -84,24 +92,65 @@ def test_the_estimators_own_threshold_is_not_used():
 
 
 def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance():
-    envelope = OutlierDetector(EllipticEnvelope(random_state=0)).fit(F)
+    envelope = OutlierDetector(EllipticEnvelope(random_state=0), threshold="quantile").fit(F)
     robust = MahalanobisDetector(covariance=MinCovDet(random_state=0), threshold="quantile").fit(F)
     np.testing.assert_allclose(envelope.damage_index(DAMAGED), robust.damage_index(DAMAGED) ** 2, rtol=1e-12)
     np.testing.assert_array_equal(envelope.predict(F), robust.predict(F))
 
 
-def test_missing_modes_give_no_index_and_no_alarm():
+def test_rows_with_missing_modes_are_not_judged():
     holed = DAMAGED.copy()
     holed.iloc[[3, 7], 1] = np.nan
     detector = OutlierDetector(IsolationForest(random_state=0)).fit(F)
     index = detector.damage_index(holed)
     assert index.index.equals(STAMPS)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match="2 of 400 rows lack values and have no damage index"):
+    message = (
+        r"2 of 400 rows are not judged \(predict gives 0\), the first row 3 \(2025-01-01 03:00:00\): this detector "
+        "needs every column, and f2 in 2 of them are missing"
+    )
+    with pytest.warns(UserWarning, match=message):
         alarms = detector.predict(holed)
-    np.testing.assert_array_equal(np.flatnonzero(alarms == 1), [3, 7])
+    np.testing.assert_array_equal(np.flatnonzero(alarms == 0), [3, 7])
+    assert (np.delete(alarms, [3, 7]) == -1).all()
     without = OutlierDetector(IsolationForest(random_state=0)).fit(holed.drop(index=STAMPS[[3, 7]]))
     assert OutlierDetector(IsolationForest(random_state=0)).fit(holed).threshold_ == without.threshold_
+
+
+class Recorder(FromZero):
+    """Remembers the rows that its clones were fitted on, by the number in the second column."""
+
+    seen = []
+
+    def fit(self, X, y=None):
+        self.seen.append(X[:, 1].astype(int))
+        return self
+
+
+@pytest.mark.filterwarnings("ignore:the 1000 baseline records depend on each other")
+def test_each_record_is_judged_by_a_clone_that_was_fitted_on_records_far_in_time():
+    memory = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=1000))
+    Recorder.seen.clear()
+    detector = OutlierDetector(Recorder()).fit(np.column_stack([memory, np.arange(1000)]))
+    everything, *others = Recorder.seen
+    assert len(everything) == 1000
+    assert len(others) == 5
+    left_out = np.concatenate([np.setdiff1d(everything, rest) for rest in others])
+    assert len(np.unique(left_out)) == 1000  # the column of numbers is one long trend
+    assert detector.n_independent_ < 50
+
+
+def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
+    """More estimators and lengths: tests/benchmarks/detection_thresholds.py."""
+    rates = {"conformal": [], "quantile": []}
+    for seed in range(6):
+        noise = np.random.default_rng(seed).normal(size=(50 + 1000 + 2000, 4))
+        baseline, later = np.split(lfilter([1.0], [1.0, -0.7], noise, axis=0)[50:], [1000])
+        for threshold, found in rates.items():
+            detector = OutlierDetector(LocalOutlierFactor(novelty=True), 0.05, threshold=threshold).fit(baseline)
+            found.append((detector.damage_index(later) > detector.threshold_).mean())
+    assert np.mean(rates["conformal"]) < 0.05 + 2 * np.std(rates["conformal"]) / np.sqrt(6)
+    assert np.mean(rates["quantile"]) > 0.08
 
 
 def test_residuals_of_a_compensator_are_scored_in_a_pipeline():

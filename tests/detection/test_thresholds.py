@@ -3,17 +3,20 @@
 import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 from scipy.stats import chi
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
-from sklearn.model_selection import KFold
 
+from skthermo._dependence import correlation_time
 from skthermo.detection import MahalanobisDetector
-from skthermo.detection._patterns import as_if_complete
+from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 
+REMEMBERED = pytest.mark.filterwarnings("ignore:the .* baseline records depend on each other in time")
 TOO_FEW = pytest.mark.filterwarnings("ignore:.* independent baseline records are too few")
 
 
@@ -104,20 +107,78 @@ def test_the_closed_form_equals_refits_without_each_row():
     np.testing.assert_allclose(MahalanobisDetector().fit(rows).baseline_index_, left_out(rows), rtol=1e-10)
 
 
-def test_leave_one_out_distances_of_rows_with_gaps_are_close_to_refits(monkeypatch):
-    """Their closed form counts the records that have the rarest mode of a row; refits without a row are the truth."""
-    monkeypatch.setattr(
-        "skthermo.detection._mahalanobis.PatternScale.__call__", lambda _, present: np.ones(len(present))
-    )
-    rows = with_gaps(records(200))
-    present, detector = ~np.isnan(rows), MahalanobisDetector().fit(rows)
-    in_sample = detector.damage_index(rows)
-    closed = as_if_complete(detector._left_out(rows, detector._distances(rows)), present.sum(axis=1), 4)
-    there, expected = present.any(axis=1), left_out(rows)
-    errors, before = (np.abs(index / expected - 1)[there] for index in (closed, in_sample))
-    assert np.median(errors) < 0.003
-    assert errors.max() < 0.05
-    assert np.median(before) > 0.01
+def autoregressive(n_rows, correlation, seed=0, n_modes=4):
+    """Records of unit variance that remember those before them."""
+    noise = np.random.default_rng(seed).normal(size=(n_rows + 200, n_modes))
+    return lfilter([np.sqrt(1 - correlation**2)], [1.0, -correlation], noise, axis=0)[200:]
+
+
+def distances_without(rows, near):
+    """Mahalanobis distance of every row from all that are not near it, by a fit without them."""
+    found = []
+    for row, out in zip(rows, near, strict=True):
+        mean, covariance = rows[~out].mean(axis=0), np.cov(rows[~out].T, bias=True)
+        found.append(np.sqrt((row - mean) @ np.linalg.solve(covariance, row - mean)))
+    return np.array(found)
+
+
+def within(places, reach):
+    """Which records are near each."""
+    return np.abs(np.subtract.outer(places, places)) <= reach
+
+
+def two_correlation_times(rows):
+    return np.ceil(2 * (np.mean([correlation_time(column) for column in rows.T]) - 1))
+
+
+@REMEMBERED
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.8])
+def test_the_closed_form_leaves_out_two_correlation_times_on_either_side(correlation):
+    rows = autoregressive(240, correlation) @ np.tri(4)
+    reach = two_correlation_times(rows)
+    assert (reach == 0) == (correlation == 0)
+    index = MahalanobisDetector().fit(rows).baseline_index_
+    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(240), reach)), rtol=1e-9)
+
+
+@REMEMBERED
+def test_neighbours_are_those_in_time_where_there_are_stamps():
+    """Rows in any order, and a month without records: those on its other side are no neighbours."""
+    rows, hours = autoregressive(240, 0.7), np.arange(240) + 24 * 30 * (np.arange(240) >= 120)
+    frame = pd.DataFrame(rows, pd.Timestamp("2025") + pd.to_timedelta(hours, "h")).rename(columns=str)
+    index = MahalanobisDetector().fit(frame).baseline_index_
+    np.testing.assert_allclose(index, distances_without(rows, within(hours, two_correlation_times(rows))), rtol=1e-9)
+    order = np.random.default_rng(0).permutation(240)
+    np.testing.assert_allclose(MahalanobisDetector().fit(frame.iloc[order]).baseline_index_, index[order], rtol=1e-9)
+
+
+@REMEMBERED
+def test_half_of_the_records_stay_however_long_they_remember():
+    rows = autoregressive(80, 0.98)
+    index = MahalanobisDetector().fit(rows).baseline_index_
+    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(80), 20)), rtol=1e-9)
+
+
+@REMEMBERED
+@pytest.mark.parametrize("case", ["gaps", "shrunk covariance"])
+def test_false_alarms_are_as_asked_where_records_remember_those_before(case):
+    """More lengths and memories: tests/benchmarks/detection_thresholds.py."""
+    rates, covariance = {"conformal": [], "quantile": []}, None if case == "gaps" else LedoitWolf()
+    for seed in range(12):
+        baseline, later = np.split(autoregressive(1365, 0.9, seed), [365])
+        for threshold, found in rates.items():
+            detector = MahalanobisDetector(0.05, threshold=threshold, covariance=covariance)
+            detector.fit(with_gaps(baseline) if case == "gaps" else baseline)
+            found.append((detector.damage_index(later) > detector.threshold_).mean())
+    assert np.mean(rates["conformal"]) < 0.05 + 2 * np.std(rates["conformal"]) / np.sqrt(12)
+    assert np.mean(rates["quantile"]) > 0.09
+
+
+def test_few_independent_records_are_told_of_with_their_number():
+    with pytest.warns(UserWarning, match="the 365 baseline records depend on each other in time and count as [123]. "):
+        detector = MahalanobisDetector().fit(autoregressive(365, 0.9))
+    assert 10 <= detector.n_independent_ < 40
+    assert MahalanobisDetector().fit(records(365)).n_independent_ > 300
 
 
 def test_the_papers_quantile_is_one_word_away():
@@ -156,13 +217,22 @@ def test_false_alarms_on_new_records_are_as_asked_where_the_baseline_is_small():
     assert np.mean(rates["quantile"]) > 0.05
 
 
-def test_a_covariance_estimator_is_fitted_on_the_other_periods():
+@pytest.mark.parametrize("case", ["gaps", "shrunk covariance"])
+def test_distances_without_a_closed_form_are_from_the_records_of_other_blocks(case):
+    """A block of five records after the other to ten folds in turn."""
+    rows, folds, index = records(123), np.arange(123) // 5 % 10, np.empty(123)
+    if case == "gaps":
+        rows[::3, 0] = np.nan
+    detector = MahalanobisDetector(covariance=None if case == "gaps" else LedoitWolf(), threshold="chi2")
+    for fold in range(10):
+        index[folds == fold] = detector.fit(rows[folds != fold])._distances(rows[folds == fold])
+    found = detector.fit(rows)._left_out(Neighbourhoods(np.arange(123.0), rows))
+    np.testing.assert_allclose(found, index, rtol=1e-9)
+
+
+def test_a_covariance_estimator_is_fitted_on_all_rows():
     rows = records(123)
-    index = np.empty(123)
-    for rest, fold in KFold(10).split(rows):
-        index[fold] = np.sqrt(LedoitWolf().fit(rows[rest]).mahalanobis(rows[fold]))
     detector = MahalanobisDetector(covariance=LedoitWolf()).fit(rows)
-    assert detector.threshold_ == pytest.approx(conformal_threshold(index, 0.02), rel=1e-12)
     np.testing.assert_allclose(detector.covariance_.covariance_, LedoitWolf().fit(rows).covariance_, rtol=1e-12)
 
 

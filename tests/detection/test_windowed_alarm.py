@@ -41,6 +41,10 @@ X, LATER = stream(), stream(seed=1)
 HOLED = LATER.mask(np.random.default_rng(0).random(LATER.shape) < 0.4)
 
 
+# A call does not know the records before its first ones, whose windows therefore hold too few.
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows are not judged \(predict gives 0\), the first row 0 ")
+
+
 # The mean of a window
 
 
@@ -58,6 +62,7 @@ def test_equal_records_raise_the_index_by_the_root_of_their_number():
     record = X.iloc[[5]]
     same = pd.concat([record] * 20).set_axis(X.index[:20])
     expected = single.damage_index(record).iloc[0] * np.sqrt(np.minimum(np.arange(1, 21), 9))
+    expected[:4] = np.nan  # less than half a window
     np.testing.assert_allclose(alarm.damage_index(same), expected, rtol=1e-9)
 
 
@@ -125,8 +130,11 @@ def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
 def test_the_farther_the_records_the_higher_the_index_of_windows_with_gaps(rule):
     alarm = WindowedAlarm(8, rule=rule).fit(X)
     indices = [alarm.damage_index(HOLED[:200] + scale * X.std()).to_numpy() for scale in (3, 6, 12, 50, 200, 1e5)]
-    assert np.isfinite(indices).all()
-    assert (np.diff(indices, axis=0)[:, 8:] > 0).all()
+    indices = np.array(indices)[:, 8:]
+    judged = np.isfinite(indices).all(axis=0)
+    np.testing.assert_array_equal(judged, HOLED[:200].notna().any(axis=1).rolling(8).sum()[8:] >= alarm.fewest_)
+    assert judged.sum() > 150
+    assert (np.diff(indices[:, judged], axis=0) > 0).all()
 
 
 @settings(max_examples=8, deadline=None)
@@ -177,21 +185,33 @@ def test_a_window_of_time_holds_the_records_that_fall_into_it(rule):
     as_gaps.iloc[100:110] = np.nan
     index = alarm.damage_index(kept)
     np.testing.assert_allclose(index, alarm.damage_index(as_gaps)[kept.index], rtol=1e-9)
-    np.testing.assert_allclose(index.iloc[100], alarm.damage_index(LATER.iloc[110:]).iloc[0], rtol=1e-9)
+    np.testing.assert_allclose(index.iloc[102], alarm.damage_index(LATER.iloc[110:]).iloc[2], rtol=1e-9)
+    assert np.isnan(index.iloc[101])
 
 
 @each_rule
-def test_only_windows_without_any_mode_have_no_index(rule):
-    holed = HOLED.copy()
+def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_judged(rule):
+    holed = LATER.copy()
     holed.iloc[200:230] = np.nan
-    holed.iloc[215, 1] = 9.0
-    index = WindowedAlarm(6, rule=rule).fit(X).damage_index(holed)
-    empty = holed.isna().all(axis=1).rolling(6, min_periods=1).min() == 1
-    np.testing.assert_array_equal(index.isna(), empty)
-    assert empty.sum() == 9 + 10
-    with pytest.warns(UserWarning, match="19 of 1500 rows lack values and have no damage index"):
-        alarms = WindowedAlarm(6, rule=rule).fit(X).predict(holed)
-    assert (alarms[empty] == 1).all()
+    holed.iloc[213:216, 1] = 9.0  # one mode is enough for a record to count
+    alarm = WindowedAlarm(6, rule=rule).fit(X)
+    judged = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
+    np.testing.assert_array_equal(alarm.damage_index(holed).notna(), judged)
+    assert (~judged).sum() == 2 + (215 - 203) + (232 - 219)
+    message = f"{(~judged).sum()} of 1500 rows are not judged .* their windows hold fewer than 3 records with a value"
+    with pytest.warns(UserWarning, match=message):
+        alarms = alarm.predict(holed)
+    np.testing.assert_array_equal(alarms == 0, ~judged)
+
+
+@each_rule
+def test_gaps_of_the_baseline_are_no_reason_not_to_judge(rule):
+    """Every third record has a value, in the baseline as later."""
+    baseline, later = (records.copy() for records in (X, LATER))
+    baseline[np.arange(1500) % 3 > 0] = later[np.arange(1500) % 3 > 0] = np.nan
+    alarm = WindowedAlarm(24, rule=rule).fit(baseline)
+    assert alarm.fewest_ == 4
+    assert (alarm.predict(later)[12:] != 0).all()
 
 
 def test_sums_over_windows_are_those_of_pandas():
@@ -250,8 +270,9 @@ def test_false_alarms_are_as_asked_in_spite_of_the_correlation_in_time(rule):
 
 @each_rule
 def test_damage_is_found_that_single_records_miss(rule):
-    damaged = stream(500, 3, shift=1.6)
-    single, windowed = MahalanobisDetector().fit(X), WindowedAlarm(24, rule=rule).fit(X)
+    damaged = stream(1500, 3, shift=1.6)
+    baseline = stream(3000)
+    single, windowed = MahalanobisDetector().fit(baseline), WindowedAlarm(24, rule=rule).fit(baseline)
     shares = [(detector.predict(damaged) == -1).mean() for detector in (single, windowed)]
     assert shares[0] < 0.25
     assert shares[1] > 0.75

@@ -52,7 +52,7 @@ def test_mirrored_groups_are_named(symmetric):
         found = identify_damage(fem, T, F, ["left", "middle", "right"], random_state=0)
     assert found.confused == [("left", "right")]
     assert found.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
-    assert "left and right cannot be told apart by these modes." in found.summary()
+    assert "left and right cannot be told apart by these modes: only their common effect is known." in found.summary()
     assert not found.table.loc[["left", "right"], "significant"].any()
     assert found.p_value < 0.01
     merged = identify_damage(fem, T, F, ["left", "middle", "right"], merge=True, random_state=0)
@@ -102,7 +102,8 @@ def test_a_shift_that_no_group_makes(fem):
         found = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
     assert found.misfit_p_value < 0.01
     assert found.is_unexplained
-    assert "does not explain all shifts: mode f" in found.summary()
+    assert "Something has changed (" in found.summary()
+    assert "damage of these groups does not explain all of it" in found.summary()
 
 
 def test_higher_frequencies_are_no_damage(fem):
@@ -130,8 +131,8 @@ def test_frequencies_in_radians_per_second_are_named(fem, damage):
     F = simulated(fem, WEATHER, damage) * 2 * np.pi
     with pytest.warns(UserWarning, match="about 2 pi times the predicted ones, perhaps in rad/s; expected Hz"):
         found = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
-    assert found.summary().endswith(
-        "\nThe measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz."
+    assert "the measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz." in (
+        found.summary()
     )
 
 
@@ -202,7 +203,7 @@ def test_bad_records(fem):
     zero.iloc[3, 2] = 0.0
     with pytest.raises(ValueError, match="row 3 of the frequencies has a value of 0 or less"):
         identify_damage(fem, WEATHER, zero, GROUPS)
-    with pytest.raises(ValueError, match="none of 37 records has a frequency and all temperatures"):
+    with pytest.raises(ValueError, match=r"none of 37\srecords can be compared .*: 37 without a frequency; expected"):
         identify_damage(fem, WEATHER, F * np.nan, GROUPS)
 
 

@@ -13,12 +13,14 @@ from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import KFold, cross_val_predict, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.fem import CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate.chain._parts import clone_parts
 from tests.surrogate.chains import TRUSS, F, T, chain, inverse, mapper
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
@@ -284,3 +286,11 @@ def test_bad_damage_and_noise_are_named():
         FITTED.simulate(T, noise=-1)
     with pytest.raises(ValueError, match="model"):
         DataInformedFEM(CallableModel).fit(T, F)
+
+
+def test_an_aligner_without_a_reference_gets_the_models():
+    named, bare = (DataInformedFEM(TRUSS, aligner=aligner) for aligner in (BiasAligner(TRUSS), BiasAligner()))
+    inside = DataInformedFEM(TRUSS, aligner=make_pipeline(FunctionTransformer(check_inverse=False), BiasAligner()))
+    aligners = [clone_parts(chain)[2] for chain in (named, bare)] + [clone_parts(inside)[2][-1]]
+    assert all(aligner.reference is TRUSS for aligner in aligners)
+    assert bare.aligner.reference is None

@@ -82,6 +82,7 @@ def lines_of(text):
     return re.findall(r"\[(\w+)\] \.+ (\(.*), total= +\d+\.\d[a-z]+", text)
 
 
+@pytest.mark.filterwarnings("ignore:the 122 baseline records depend on each other")
 def test_verbose_tells_the_stages(capsys):
     quiet = chain().fit(T, F)
     assert capsys.readouterr().out == ""

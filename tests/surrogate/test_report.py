@@ -72,13 +72,13 @@ class TestTheReport:
         lagged = make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))
         refined = chain(mapper=lagged).fit(air, measured).report_
         assert refined.n_trained == 365 - 3 - 1
-        temperatures = {f"temperature {name!r} is missing": 3 for name in T}
-        assert refined.left_out.to_dict() == temperatures | {"a lag reaches into a gap": 1}
+        temperatures = {f"temperature {name!r} is missing, 2025-01-06 to 2025-01-08": 3 for name in T}
+        lag = {"a lag reaches into a gap, 2025-01-09": 1}
+        assert refined.left_out.to_dict() == temperatures | lag
         report = chain(inverse=InverseSurrogate(refine=0), mapper=lagged).fit(air, measured).report_
-        assert report.left_out.to_dict() == temperatures | {
-            "frequency 'f4' is missing": 2,
-            "frequency 'f5' is missing": 1,
-            "a lag reaches into a gap": 1,
+        assert report.left_out.to_dict() == temperatures | lag | {
+            "frequency 'f4' is missing, 2025-01-21 to 2025-01-22": 2,
+            "frequency 'f5' is missing, 2025-01-22": 1,
         }
         assert report.n_trained == 365 - 3 - 2 - 1
         assert report.filled.empty
@@ -101,6 +101,14 @@ class TestTheReport:
         assert any(
             text.startswith("the temperature 'T2' is missing in 200 of 365 rows and was filled") for text in texts
         )
+
+    def test_lagged_columns_count_as_one_sensor(self):
+        girder = T.rename(columns={"T1": "girder"}).astype(float)
+        girder.loc["2025-06", "girder"] = np.nan
+        lagged = LagFeatures([0, 2]).fit_transform(girder)
+        filled = chain(mapper=TemperatureMapper(Ridge())).fit(lagged, F).report_.filled
+        assert filled.index.tolist() == ["girder"]
+        assert filled.loc["girder", ["rows", "when"]].tolist() == [32, "2025-06-01 to 2025-07-02"]
 
     def test_it_reads_as_text_and_as_html(self, fitted):
         text, html = repr(fitted.report_), fitted.report_._repr_html_()
@@ -165,7 +173,7 @@ class TestWarningsOfFit:
         absurd = F.copy()
         absurd.iloc[5, 2] = 999.0
         texts = [str(w.message) for w in caught(chain(mapper=TemperatureMapper(Ridge())).fit, T, absurd)]
-        message = r"1 frequencies are more than 2 times .* first 'f3' in row 5: 999 Hz"
+        message = "frequencies are far from their neighbours .*: 'f3' in 1 of 365 rows, the first 999 Hz in 2025-01-06"
         assert any(re.match(message, text) for text in texts)
 
     def test_only_modes_that_are_far_off_are_taken_for_others(self):

@@ -321,6 +321,8 @@ def test_a_failed_sensor_is_counted():
     assert message.startswith("0 of 600 measured modes have a component of their shape at each of the 4 sensors")
 
 
+# The parameters are random: no weather moves them.
+@pytest.mark.filterwarnings("ignore:the temperatures explain nothing")
 def test_modes_may_have_numbers_as_names():
     frequencies, shapes = MEASURED
     air = pd.DataFrame({"air": np.linspace(-5, 30, len(THETA))})

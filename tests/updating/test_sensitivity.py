@@ -125,6 +125,8 @@ def test_what_only_some_parameters_share_leaves_the_others_known():
     )
     known = identifiability(model, noise=0.001)
     assert np.isinf(known.deviations[["a", "twin"]]).all()
+    assert known.rank == 2
+    assert "At most 2 of the 3 parameters can be found together." in known.summary()
     assert known.deviations["b"] == pytest.approx(2 * 0.001 / np.sqrt(2))
     assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
 

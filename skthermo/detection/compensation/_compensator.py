@@ -12,12 +12,12 @@ from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._arrays import Array, as_floats
-from skthermo._columns import check_positions_are_names, positions_of
 from skthermo._frames import (
     check_columns,
+    check_positions_are_names,
     check_temperatures,
     frame_like,
-    warn_of_absurd,
+    positions_of,
     warn_of_disorder,
     warn_of_markers,
 )
@@ -33,12 +33,14 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
-from skthermo._warnings import warn_user, warnings_once
+from skthermo._warnings import warn_each, warn_user, warnings_once
 from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._gaps import FillError, fill_temperatures
+from skthermo.detection.compensation._local_covariance import rows_near_in_time
 from skthermo.detection.compensation._whitening import Spread
+from skthermo.preprocessing import check_records
 
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
@@ -115,9 +117,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
-    given the others, records fewer than two correlation times of the residuals apart (at least 24 rows) left out; such
-    records are left out too where the baseline itself
-    is scaled. A new record takes S from the baseline record with the most similar weather; without any temperature,
+    given the others, records of the same day (at least 24 rows around each) left out; such records are left out too
+    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather;
+    where a value is missing that no sensor tells,
     from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
     the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
 
@@ -209,10 +211,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999, or
-            frequencies absurdly far from the others; if stamps are not in order; if temperatures are missing, with what
-            they were filled with; if a fold has weather that the others do not know; if rows without stamps have lags
-            inside an estimator.
+            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999; for
+            each kind of fault that `~skthermo.preprocessing.check_records` finds; if stamps are not in order; if
+            temperatures are missing, with what they were filled with; if a fold has weather that the others do not
+            know; if rows without stamps have lags inside an estimator.
         """
         self._learn(*self._read_baseline(X))
         return self
@@ -276,7 +278,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            As in `fit`, if temperatures are missing, and if they are far outside those of `fit`.
+            As in `fit`; if temperatures are far outside those of `fit`; if lags find no record.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
@@ -285,7 +287,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
         if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
             warn_user(message, "weather outside the training range")
-        residuals = as_floats(frequencies) - self.regression_.predict(filled)
+        predicted = self.regression_.predict(filled)
+        self.regression_.warn_of_lags(filled, predicted)
+        residuals = as_floats(frequencies) - predicted
         residuals[np.isnan(weather).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (
@@ -335,14 +339,15 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _read_baseline(self, X: Any) -> tuple[Any, Any]:
         if isinstance(self.estimator, type):
             raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
-        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2)
+        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
         check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
         names = _check_feature_names_in(self, None)[self.targets_]
         check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
         temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
-        warn_of_absurd(pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1))
+        named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
+        warn_each(check_records(pd.DataFrame(temperatures), named).warnings())
         return temperatures, frequencies
 
     def _learn(self, temperatures: Any, frequencies: Any) -> Array:
@@ -374,7 +379,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local")
+        near = rows_near_in_time(filled)
+        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local", near=near)
+        if not len(fills.rows):
+            return white
         untaught = np.isnan(taught).all(axis=1)
         return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
 

@@ -25,7 +25,7 @@ BLOCKS_OF_ROWS = 52  # into which records without stamps are divided
 CORRELATION_TIMES = 5  # of the residuals (the mean over modes) that a block is longer than
 LEAST_BLOCKS = 2  # of each fold, in different seasons
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which a record's weather is unknown to them
-UNSEEN = 0.1  # share of a fold's records in unknown weather from which it is warned of
+UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unknown weather from which it is warned of
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Folds:
             known = TrainingRange.of(weather, train)
             excess = np.nan_to_num(known.excess(values[test]))
             unseen = (excess > BEYOND).any(axis=1)
-            if unseen.mean() > worst:
+            if unseen.mean() > worst and unseen.sum() >= LEAST_UNSEEN:
                 worst, column = unseen.mean(), int(excess.max(axis=0).argmax())
                 seen = values[test, column]
                 text = (

@@ -42,18 +42,25 @@ class FillError:
 
 
 def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
-    """Temperatures in which the other sensors fill the gaps; one warning names the sensors that had some."""
+    """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
     filled, deviations = sensors.fill(temperatures)
-    values, n_rows = as_floats(temperatures), len(filled)
-    missing, empty = np.isnan(values), np.isnan(values).all(axis=1)
+    missing, n_rows = np.isnan(as_floats(temperatures)), len(filled)
+    empty = missing.all(axis=1)
     said = [
-        f"{name!r} is missing in {rows.sum()} of {n_rows} rows: filled from the other sensors, standard deviation "
-        f"{np.sqrt(np.mean(deviations[rows, column] ** 2)):.2g}"
-        for column, name in enumerate(column_names(temperatures, "x"))
-        if (rows := missing[:, column] & ~np.isnan(filled[:, column])).any()
+        f"{name!r} in {rows.sum()} of {n_rows} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
+        for name, rows, sizes in zip(
+            column_names(temperatures, "x"), (missing & ~np.isnan(filled)).T, deviations.T, strict=True
+        )
+        if rows.any()
     ]
-    if empty.any():
-        said.append(f"{empty.sum()} of {n_rows} rows have no temperature at all: they are not judged")
     if said:
-        warn_user("; ".join(said), "filled temperatures")
+        warn_user(
+            f"missing temperatures were filled from the other sensors: {', '.join(said)}; the spread of residuals is "
+            "widened by what that costs",
+            "filled temperatures",
+        )
+    if empty.any():
+        warn_user(
+            f"{empty.sum()} of {n_rows} rows have no temperature at all: they are not judged", "without temperature"
+        )
     return frame_like(temperatures, filled)

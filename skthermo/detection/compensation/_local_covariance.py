@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
 from skthermo._gaussian import Gaussian, Mask, whitenings
+from skthermo._times import has_stamps, row_times
 from skthermo._weather import nearest
 
-CORRELATION_TIMES = 2  # of the residuals: the covariance of a record is learned from records at least so far away
-LEAST_NEAR, MOST_NEAR = 24, 0.05  # records, a day of hourly ones, and share of all of them, between which that is
+NEAR_IN_TIME = 24  # rows, a day of hourly ones: the covariance of a record is learned from records at least so far away
+DAY = 86_400e9  # nanoseconds
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 
 
@@ -57,7 +57,7 @@ class History:
     places: Array
     residuals: Array
     overall: Gaussian
-    near: int = LEAST_NEAR
+    near: int = NEAR_IN_TIME
 
     def neighbours(self, size: int, places: Array, order: NDArray[np.intp] | None = None) -> Neighbours:
         """The records nearest to each place, without those near ``order`` in time."""
@@ -81,10 +81,12 @@ class History:
         return [None, *candidates][int(np.argmax(likelihoods))]
 
 
-def reach_in_time(residuals: Array) -> int:
-    """How many records remember each other."""
-    longest = max(correlation_time(mode) for mode in residuals.T)
-    return int(max(min(np.ceil(CORRELATION_TIMES * longest), MOST_NEAR * len(residuals)), LEAST_NEAR))
+def rows_near_in_time(X: Any) -> int:
+    """Number of records in a day, if they have stamps and are more than hourly."""
+    if not has_stamps(X) or len(X) < 2:
+        return NEAR_IN_TIME
+    step = np.median(np.diff(np.sort(row_times(X))))
+    return int(np.clip(DAY / max(step, 1.0), NEAR_IN_TIME, max(NEAR_IN_TIME, len(X) // 20)))
 
 
 @dataclass(frozen=True)

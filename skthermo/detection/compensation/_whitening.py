@@ -14,10 +14,10 @@ from skthermo._weather import TrainingRange, nearest, weather_coordinates
 from skthermo.detection.compensation._gaps import FillError
 from skthermo.detection.compensation._local_covariance import (
     CANDIDATES,
+    NEAR_IN_TIME,
     NUMBERS_AT_ONCE,
     History,
     Smoothing,
-    reach_in_time,
     whitened,
 )
 
@@ -49,7 +49,9 @@ class Spread:
         return cls(overall, overall.covariance[np.newaxis], None)
 
     @classmethod
-    def of(cls, weather: Array, residuals: Array, size: Array, *, local: bool) -> tuple[Spread, Array]:
+    def of(
+        cls, weather: Array, residuals: Array, size: Array, *, local: bool, near: int = NEAR_IN_TIME
+    ) -> tuple[Spread, Array]:
         """Learn from a baseline in order of time; whiten each of its records by others, which are not near in time.
 
         ``size`` holds magnitudes of the frequencies.
@@ -65,7 +67,7 @@ class Spread:
         coordinates = weather_coordinates(weather[usable])
         chosen = spread_evenly(usable, MOST_PLACES)
         places = coordinates.transform(weather[chosen])
-        covariance = History(chosen, places, residuals[chosen], overall, reach_in_time(residuals)).likeliest()
+        covariance = History(chosen, places, residuals[chosen], overall, near).likeliest()
         if covariance is None:
             return plain, white
         step = max(NUMBERS_AT_ONCE // covariance.numbers_per_record, 1)

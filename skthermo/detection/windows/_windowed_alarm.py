@@ -93,8 +93,9 @@ class WindowedAlarm(DamageDetector):
     >>> healthy = make_truss_campaign(3, random_state=0).frequencies
     >>> damaged = make_truss_campaign(damage={"top": 0.1}, random_state=1).frequencies
     >>> single, week = MahalanobisDetector().fit(healthy), WindowedAlarm(7).fit(healthy)
-    >>> print(f"{(single.predict(damaged) == -1).mean():.0%}, {(week.predict(damaged) == -1).mean():.0%} alarms")
-    11%, 70% alarms
+    >>> shares = [(one.damage_index(damaged) > one.threshold_).mean() for one in (single, week)]
+    >>> print("{:.0%} alarms by records, {:.0%} by weeks".format(*shares))
+    11% alarms by records, 70% by weeks
     """
 
     _parameter_constraints: dict = {

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._frames import check_same_rows, column_names
+from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
 from skthermo._times import row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
@@ -27,9 +27,12 @@ MOST_FITTED = 20_000  # rows, evenly spread, that a trend is fitted to
 NOTHING = 0.02  # share of a mode's variance that counts as explained by chance
 WINDOW = 25  # rows that are neighbours of a value
 OUTLYING = 8.0  # robust deviations from the neighbours, and from what the weather explains, of an outlier
+INERTIA = 24  # rows by which a structure may follow the weather late, where their times are not known
+SHORTEST_TREND = pd.Timedelta(days=90)  # of records; in fewer it may be the season
 CERTAIN = 5.0  # standard errors of a trend
 LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that matters changes them
 LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
+ABSURD = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
 PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
 
 
@@ -87,7 +90,8 @@ class RecordFindings:
         kind, text : str
             What the warning is about, and what it says.
         """
-        for kind, rows in self.table.groupby("what", sort=False):
+        for kind in map(str, self.table["what"].unique()):
+            rows = self.table[self.table["what"] == kind]
             details = "; ".join(rows["detail"])
             if kind in ("stuck sensor", "stuck mode"):
                 yield kind, f"values of a sensor or a mode only repeat: {details}; expected NaN where it is stuck"
@@ -145,12 +149,13 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
       of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every mode.
     - *Time shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
       less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
+      Temperatures of up to a day before (24 rows without a ``DatetimeIndex``) are no finding: that may be inertia.
     - *Exchanged modes*: in some rows, at least three, the values of two columns lie nearer to what the weather explains
       of the other column, and ordering them at least halves what it leaves.
     - *Outliers*: values more than eight robust standard deviations away from the median of the 25 rows around, and from
       what the weather explains.
     - *Trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
-      the scatter of a single record.
+      the scatter of a single record; not in fewer than 90 days, nor beside a stuck sensor.
 
     Examples
     --------
@@ -166,9 +171,8 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
     """
     check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
     records = _Records.of(temperatures, frequencies)
-    findings = [*_stuck(records)]
-    if records.n_usable >= LEAST_ROWS:
-        findings += _against_weather(records)
+    findings = [*_stuck(records)]  # its rows then are NaN, and so on
+    findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _absurd(records)
     return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(records.order))
 
 
@@ -178,23 +182,36 @@ class _Records:
 
     T: Array
     F: Array
-    sensors: list[Hashable]
+    sensors: dict[Hashable, list[int]]
     modes: list[Hashable]
     order: NDArray[np.intp]
-    labels: Any
     index: Any
+    has_stuck_sensors: bool = False
 
     @classmethod
     def of(cls, temperatures: Any, frequencies: Any) -> _Records:
         order = np.argsort(row_times(temperatures), kind="stable")
         index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
         T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
-        return cls(T, F, column_names(temperatures, "T"), column_names(frequencies, "f"), order, index, index[order])
+        T, F = (np.where(np.isin(table, MARKERS), np.nan, table) for table in (T, F))  # others tell of these
+        return cls(T, F, columns_by_sensor(temperatures), column_names(frequencies, "f"), order, index[order])
 
     @property
     def n_usable(self) -> int:
         """Number of rows with a temperature and a frequency."""
         return int((~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)).sum())
+
+    @property
+    def hours(self) -> float | None:
+        """Median time between records; None where they have no stamps."""
+        if not isinstance(self.index, pd.DatetimeIndex):
+            return None
+        return max(pd.Series(self.index).diff().median().total_seconds() / 3600, 1e-6)
+
+    @property
+    def inertia(self) -> int:
+        """Number of rows by which a structure may follow the weather late: a day, at least one."""
+        return INERTIA if self.hours is None else max(int(24 / self.hours), 1)
 
     def label(self, row: int) -> str:
         """How a row is called in a sentence."""
@@ -213,13 +230,18 @@ class _Records:
 
 
 def _stuck(records: _Records) -> Iterator[list[Any]]:
-    tables = (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes))
-    for what, table, names in tables:
-        for name, column in zip(names, table.T, strict=True):
+    first = [(name, columns[0]) for name, columns in records.sensors.items()]  # lags repeat what a sensor shows
+    modes = [(name, column) for column, name in enumerate(records.modes)]
+    for what, table, columns in (("stuck sensor", records.T, first), ("stuck mode", records.F, modes)):
+        for name, position in columns:
+            column = table[:, position]
             for rows in stuck_runs(column):
+                if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
+                    continue  # a lag of another column, which begins with copies of its first value
                 detail = f"{name!r} is {column[rows[0]]:.6g} in {len(rows)} rows, {records.period(rows)}"
                 yield records.finding(what, name, rows, detail)
                 column[rows] = np.nan
+                records.has_stuck_sensors |= table is records.T
 
 
 def _against_weather(records: _Records) -> Iterator[list[Any]]:
@@ -231,18 +253,19 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
     yield from _outliers(records, lines, folds)
     share = explained(lines, records.F, folds)
     usable = np.flatnonzero(~np.isnan(records.F).all(axis=1) & ~np.isnan(places).any(axis=1))
-    shift = best_shift(lines, past, places, records.F, folds)
+    shift = best_shift(lines, past, places, records.F, folds, records.inertia)
     if shift is not None:
         yield records.finding("time shift", "", *_shifted(records, shift))
         return
-    if (share < NOTHING).all():
+    if len(share) and (share < NOTHING).all():
         detail = (
             f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows; "
             "expected temperatures that belong to the frequencies, row by row"
         )
         yield records.finding("weather", "", usable, detail)
         return
-    yield from _trends(records, np.hstack([lines, past]))
+    if not records.has_stuck_sensors:
+        yield from _trends(records, np.hstack([lines, past]))
 
 
 def _with_stamps(records: _Records) -> Any:
@@ -267,9 +290,23 @@ def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Itera
     local = np.fmax(np.fmax(local, robust_deviation(distances)), floor)
     with np.errstate(invalid="ignore"):
         far = (np.abs(distances) > OUTLYING * local) & (np.abs(rest - median(rest)) > OUTLYING * deviation)
+    yield from _outliers_found(records, far & (deviation > 0))
+
+
+def _absurd(records: _Records) -> Iterator[list[Any]]:
+    """Values of twice or half the median of their mode, which need no weather to be doubtful."""
+    middle, deviation = median(records.F), robust_deviation(records.F)
+    with np.errstate(invalid="ignore"):
+        far = (ABSURD * middle < records.F) | (middle / ABSURD > records.F)
+        far &= (middle > 0) & (np.abs(records.F - middle) > OUTLYING * deviation)
+    yield from _outliers_found(records, far)
+
+
+def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[Any]]:
+    F = records.F
     for name, column, is_far in zip(records.modes, F.T, far.T, strict=True):
         rows = np.flatnonzero(is_far)
-        if len(rows) and deviation[records.modes.index(name)] > 0:
+        if len(rows):
             n_known = int((~np.isnan(column)).sum())
             detail = (
                 f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g} Hz in "
@@ -282,8 +319,8 @@ def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Itera
 def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:
     rows = np.arange(max(shift.rows, 0), len(records.F) + min(shift.rows, 0))
     length, direction = "", "before" if shift.rows > 0 else "after"
-    if isinstance(records.index, pd.DatetimeIndex):
-        hours = abs(shift.rows) * pd.Series(records.index).diff().median().total_seconds() / 3600
+    if records.hours is not None:
+        hours = abs(shift.rows) * records.hours
         length = f" (about {hours:.3g} hours)" if hours < 48 else f" (about {hours / 24:.3g} days)"
     detail = (
         f"those of {abs(shift.rows)} rows {direction}{length} explain {shift.explained:.0%} of the variance out of "
@@ -296,6 +333,8 @@ def _trends(records: _Records, inputs: Array) -> Iterator[list[Any]]:
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)
+    if timed and index[-1] - index[0] < SHORTEST_TREND:
+        return
     table = trend_table(inputs[rows], F, row_times(pd.DataFrame(index=index)), records.modes, timed)
     for mode, (name, row) in enumerate(table.iterrows()):
         change, error = row["change"], row["standard_error"]

@@ -15,8 +15,9 @@ MOST_ROWS = 4000  # that are predicted for each shift
 FARTHEST = 1 / 4  # of the records, by which they may be shifted
 N_PEAKS = 3  # shifts that each kind of correlation proposes
 PAST = (6, 24, 168)  # rows of means of the past: a structure follows the weather late
-LEAST_MEANS = 20  # times that such a period must fit into the records
+LEAST_MEANS = 10  # times that such a period must fit into the records
 BETTER = 0.9  # ratio of what shifted temperatures leave to what those of the row leave, below which they are better
+LEAST_GAIN = 0.02  # share of the variance that shifted temperatures explain beyond those of the row
 LEAST_EXPLAINED = 0.1  # share of the variance that shifted temperatures explain
 
 
@@ -28,28 +29,37 @@ class Shift(NamedTuple):
     unshifted: float
 
 
-def best_shift(lines: Array, past: Array, places: Array, F: Array, folds: NDArray[np.intp]) -> Shift | None:
-    """The shift at which temperatures explain most, if they explain clearly more than those of the row and its past."""
+def best_shift(
+    lines: Array, past: Array, places: Array, F: Array, folds: NDArray[np.intp], inertia: int
+) -> Shift | None:
+    """The shift at which temperatures explain most, if they explain clearly more than those of the row and its past.
+
+    A structure may follow the weather late, by up to ``inertia`` rows, without a fault.
+    """
     n_rows, inputs, found = len(F), np.hstack([lines, past]), []
-    for shift in proposed_shifts(places, F):
+    for shift in proposed_shifts(places, F, inertia):
         rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), MOST_ROWS)
         own, other = (unexplained(table, F[rows], folds[rows]) for table in (inputs[rows], inputs[rows - shift]))
-        ratio = np.exp(np.nanmean(np.log(other / own)))
+        varying = ~np.isnan(own) & ~np.isnan(other) & (own > 0)
+        if not varying.any():
+            continue
+        ratio = float(np.exp(np.log(np.maximum(other, 1e-300)[varying] / own[varying]).mean()))
         found.append((ratio, Shift(shift, *(float(1 - np.nanmean(part)) for part in (other, own)))))
     if not found:
         return None
-    ratio, shift = min(found)
-    if ratio > BETTER or shift.explained < LEAST_EXPLAINED:
+    ratio, best = min(found)
+    if ratio > BETTER or best.explained < max(LEAST_EXPLAINED, best.unshifted + LEAST_GAIN):
         return None
-    rows = np.arange(max(shift.rows, 0), n_rows + min(shift.rows, 0))  # means of the past may follow a season by chance
-    own, other = (explained(lines[part], F[rows], folds[rows]) for part in (rows, rows - shift.rows))
-    return shift if other.mean() > max(own.mean(), LEAST_EXPLAINED / 2) else None
+    rows = np.arange(max(best.rows, 0), n_rows + min(best.rows, 0))  # means of the past may follow a season by chance
+    own, other = (explained(lines[part], F[rows], folds[rows]) for part in (rows, rows - best.rows))
+    return best if other.sum() > max(own.sum(), len(other) * LEAST_EXPLAINED / 2) else None
 
 
 def explained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> Array:
-    """Share of each mode's variance that inputs explain out of fold; at most zero where they explain nothing."""
+    """Share of the variance of each mode that varies, which inputs explain out of fold; at most zero for nothing."""
     rows = spread_evenly(np.arange(len(inputs)), MOST_ROWS)
-    return np.nan_to_num(1 - unexplained(inputs[rows], frequencies[rows], folds[rows]))
+    left = unexplained(inputs[rows], frequencies[rows], folds[rows])
+    return 1 - left[~np.isnan(left)]
 
 
 def unexplained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> Array:
@@ -63,18 +73,18 @@ def unexplained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> A
 
 
 def with_past(places: Array) -> Array:
-    """Means of coordinates of the weather over some rows of the past, (n_samples, n_periods * n_coordinates)."""
+    """Coordinates of the weather a row before, and their means over more of the past, side by side."""
     n_rows, filled = len(places), np.nan_to_num(places)
     sums = np.vstack([np.zeros((1, places.shape[1])), np.cumsum(filled, axis=0)])
-    ends, columns = np.arange(1, n_rows + 1), []
+    ends, columns = np.arange(1, n_rows + 1), [np.vstack([filled[:1], filled[:-1]])]
     for period in PAST:
         if period * LEAST_MEANS <= n_rows:
             starts = np.maximum(ends - period, 0)
             columns.append((sums[ends] - sums[starts]) / (ends - starts)[:, np.newaxis])
-    return np.hstack([np.empty((n_rows, 0)), *columns])
+    return np.hstack(columns)
 
 
-def proposed_shifts(places: Array, frequencies: Array) -> list[int]:
+def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int]:
     """Shifts at which coordinates of the weather and frequencies, or their changes, are most correlated."""
     n_rows = len(places)
     farthest, found = int(FARTHEST * n_rows), set()
@@ -83,11 +93,12 @@ def proposed_shifts(places: Array, frequencies: Array) -> list[int]:
         correlations = (scipy.fft.irfft(modes * row.conj(), 2 * n_rows, axis=1) for row in weather)
         strength = sum((one**2).sum(axis=0) for one in correlations)
         strength = np.concatenate([strength[-farthest:], strength[: farthest + 1]])
+        strength[farthest - 1 : farthest + inertia + 1] = 0
         for _ in range(N_PEAKS):
             peak = int(strength.argmax())
             found.add(peak - farthest)
             strength[max(peak - 2, 0) : peak + 3] = 0
-    return sorted(found - {0})
+    return sorted(found)
 
 
 def _spectra(table: Array, length: int) -> Array:

@@ -52,7 +52,7 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
     >>> noise = np.random.default_rng(0).normal(0, 0.01, (1000, 1))
     >>> residual_trend(noise + np.linspace(0, 0.02, 1000)[:, np.newaxis])[["change", "standard_error"]].round(4)
         change  standard_error
-    r1  0.0196          0.0011
+    r1  0.0184          0.0011
     """
     values, times = as_columns(residuals), row_times(residuals)
     names = column_names(residuals, "r") if values.ndim == np.ndim(residuals) else ["r1"]

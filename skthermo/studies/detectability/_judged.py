@@ -51,6 +51,7 @@ class JudgedRecords:
             "band_highest": band_highest,
             "n_alarms": rate.n_alarms,
             "n_records": rate.n_records,
+            "n_not_judged": decisions[:, order].size - rate.n_records,
             "n_effective": rate.n_effective,
             "n_repeats": len(decisions),
             "time_to_detection": _mean_wait(decisions[:, order] < 0, times[order] - start, self.rows),

@@ -181,6 +181,7 @@ class DetectabilityStudy(BaseEstimator):
               95 %: the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN);
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can judge;
+            - ``n_not_judged``: number of records that it cannot judge, which count neither as healthy nor as alarms;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
               a ``DatetimeIndex``, in time; the mean over those repeats that have an alarm.
 

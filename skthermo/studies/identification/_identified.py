@@ -11,9 +11,9 @@ import pandas as pd
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array
 from skthermo._formatting import SPACE
-from skthermo.studies.identification import _sentences as sentences
 from skthermo.studies.identification._bounded_fit import HIGHEST_SEVERITY
 from skthermo.studies.identification._compared import ComparedRecords
+from skthermo.studies.identification._sentences import answer, damaged, limits
 from skthermo.studies.scenarios import UncertainDamage
 
 NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
@@ -114,7 +114,7 @@ class IdentifiedDamage:
     @property
     def damaged(self) -> pd.Series:
         """Whether each group is damaged: yes, no, doubtful, or yes if nothing else has changed."""
-        return sentences.damaged(self)
+        return damaged(self)
 
     @property
     def is_unexplained(self) -> bool:
@@ -183,7 +183,7 @@ class IdentifiedDamage:
         list of str
             Sentences. The first says whether there is a change, and with which probability it would be chance.
         """
-        return list(sentences.answer(self))
+        return list(answer(self))
 
     def limits(self) -> list[str]:
         """What cannot be said.
@@ -193,7 +193,7 @@ class IdentifiedDamage:
         list of str
             Sentences; none if damage explains all shifts and all groups can be seen and told apart.
         """
-        return list(sentences.limits(self))
+        return list(limits(self))
 
     def summary(self) -> str:
         """What was found, what cannot be said, and which records were compared.

@@ -53,8 +53,8 @@ def identify_damage(
         Damage groups of the model; a mapping joins several under a new name, with one severity. By default all groups
         of the model, without those that other groups make up.
     noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
-        Where the error of the mean shift comes from: contiguous periods of the training records, each judged by the
-        others, so that serial correlation counts; or independent records with a relative standard deviation.
+        Where the error of the mean shift comes from: the residuals of the training records, with their correlations
+        from mode to mode and from record to record; or independent records with a relative standard deviation.
     merge : bool, default=False
         Whether groups that cannot be told apart get one severity together.
     shapes : (array-like, array-like), optional
@@ -78,26 +78,34 @@ def identify_damage(
     Raises
     ------
     ValueError
-        If fem is not a fitted chain, T and F differ in rows, a group is unknown, no record can be compared, no group
-        can be seen, or the model cannot be damaged.
+        If fem is not a fitted chain, T and F differ in rows, a group is unknown, no record can be compared (each lacks
+        all frequencies, a temperature, or similar weather in the training records), no group can be seen, or the
+        model cannot be damaged.
 
     Warns
     -----
     UserWarning
-        Once for each kind: if the weather is outside the training range, temperatures have other names than in
-        fit, groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain
-        the shifts.
+        Once for each kind: if records cannot be compared, with their number and the reasons; if the records, or the
+        training records, are worth few independent ones; if temperatures have other names than in fit,
+        groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
+        shifts.
 
     Notes
     -----
     The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. Its covariance comes from periods of the training records, each of the new records' length if
-    there are enough of them, judged by the other periods, and counts how many training records have weather like
-    that of the new ones. Severities follow from non-negative least squares in standard errors of the shifts,
+    similar weather. It is a difference of two means, and its covariance counts that of both: of the new records, and
+    of the training records that have weather like theirs. Records are correlated with those before, so that a mean of
+    n of them scatters more than that of n independent ones. Correlations are learned from the residuals of the
+    training records, as those of an independent part and of one that fades exponentially with time; 30 new records
+    would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between records counts, else
+    their number. Modes that scatter clearly more than in training count as scattering so. The covariance is known
+    from few independent records, so that the laws are Student's, Hotelling's and Fisher's instead of the normal law.
+    Severities follow from non-negative least squares in standard errors of the shifts,
     repeated with exact derivatives on the damaged model until they no longer change. Their standard errors are
     those of the bounded estimate, from fits to redrawn shifts, and not below half of what a severity can grow by
     until the fit is worse by two standard errors, however the other groups adapt. A group is significant if the
-    best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the groups). What
+    best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the groups) and if all
+    groups together explain more than chance would. What
     groups have in common is judged at the model's nominal state, too, because a chain may have drifted out of the
     symmetry of its structure; the standard error of a group in such a set covers what the others could take from
     it.
@@ -126,9 +134,10 @@ def identify_damage(
     T = _named_as_in_fit(fem, T)
     with warnings_once():
         theta = as_floats(fem.predict_parameters(T))
-        left_out = left_out_rows(fem, T, theta, frequencies)
-        is_compared = ~np.any(list(left_out.values()), axis=0)
-        frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
+    left_out = left_out_rows(fem, T, theta, frequencies)
+    is_compared = ~np.any(list(left_out.values()), axis=0)
+    frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
+    with warnings_once():
         shift = measured_shift(fem, T, theta, frequencies, noise)
     records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
     incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])

@@ -12,7 +12,6 @@ from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
 from skthermo._times import has_stamps, row_times
 from skthermo.studies.identification._frequency_effects import healthy_frequencies
-from skthermo.studies.identification._scatter import PSEUDO_RECORDS, Scatter
 
 WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
 
@@ -50,7 +49,7 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
-    shares, judged, factor = fem.training_shares(T), ~np.isnan(mean), 1.0
+    shares, judged, factor = fem.training_shares(T, (~np.isnan(shifts)).any(axis=1)), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
@@ -59,21 +58,22 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     parts = new + scatter.of_sums(shares, np.arange(len(shares)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        known_from = freedom + PSEUDO_RECORDS
-        factor = known_from / max(known_from - judged.sum() + 1, 1.0)
+        n_judged, of_correlations = judged.sum(), freedom + scatter.n_pseudo
+        factor = of_correlations / max(of_correlations - n_judged + 1, 1.0)
+        freedom = max(freedom - n_judged + 1, 1.0)
     covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
     return Shift(mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_)
 
 
-def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Scatter:
+def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Any:
     if isinstance(noise, str):
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        return Scatter.of(fem.residuals_)
+        return fem.residuals_.scatter
     deviations = check_noise(noise, n_modes, fem.mode_names_)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-    return Scatter.independent(deviations, len(fem.residuals_.values))
+    return fem.residuals_.independent_scatter(deviations)
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:

@@ -34,6 +34,7 @@ from skthermo._warnings import warn_each, warn_user
 from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
+from skthermo.preprocessing import check_records
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
@@ -65,7 +66,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         M2. By default ``TemperatureMapper()``; with thermal inertia, for example
         ``make_pipeline(LagFeatures(), TemperatureMapper())``.
     aligner : transformer or "passthrough", default="passthrough"
-        Maps measured frequencies onto the model's and back, such as ``BiasAligner(model)``.
+        Maps measured frequencies onto the model's and back, such as ``BiasAligner()``; one without a reference gets
+        this model.
     imputer : transformer or "passthrough", default="passthrough"
         Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only.
         Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
@@ -211,10 +213,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in ``report_``: few rows, rows left out, modes that
-            are far from the model's or look swapped, parameters far outside the bounds of the inverse.
+            One warning, with counts, for each kind of doubtful data in ``report_``: what
+            `~skthermo.preprocessing.check_records` finds, few rows, rows left out, modes that are far from the model's
+            or look like others of its modes, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
+        findings = check_records(T, F)
         tolerance(self.model, self.reduce)
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
@@ -226,7 +230,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        warn_each(mode_warnings(self.model, F))
+        warn_each([*findings.warnings(), *mode_warnings(self.model, F)])
         stages = Stages(self, 4, X, y)
         with stages.stage("inverse surrogate", self.inverse_):
             aligned = self._fit_inverse(T, F, shapes)
@@ -244,7 +248,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
             self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
             self.simulator_ = Simulator.around(self.model, learned, self.reduce)
-            self.report_ = report_of(self, estimates)
+            self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
         return self
@@ -603,20 +607,23 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
 
-    def training_shares(self, X: ArrayLike) -> Array:
+    def training_shares(self, X: ArrayLike, rows: ArrayLike | None = None) -> Array:
         """Share of each training record in the mean of `expected_residuals` over some rows.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
+        rows : array-like of bool of shape (n_samples,), optional
+            Which rows to average over; all by default. Lags are of all rows.
 
         Returns
         -------
         ndarray of shape (n_records, n_modes)
             For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
         """
-        return self.residuals_.shares(self._weather(X))
+        weather = self._weather(X)
+        return self.residuals_.shares(weather if rows is None else weather[np.asarray(rows)])
 
     @property
     def training_records_(self) -> tuple[Any, Any]:

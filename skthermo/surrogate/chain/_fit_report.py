@@ -9,15 +9,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._frames import column_names
+from skthermo._frames import column_names, columns_by_sensor
 from skthermo._saved_frames import SavesFrames
+from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
 from skthermo._weather import SensorRegression
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
+from skthermo.preprocessing import RecordFindings
 from skthermo.surrogate.chain._estimates import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
@@ -30,7 +33,6 @@ WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean
 UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
 LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
 SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
-ABSURD = 2.0  # times the median of its mode, or its inverse, from which a frequency counts as absurd
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
@@ -45,8 +47,8 @@ class FitReport(SavesFrames):
     left_out : Series
         Rows that did not train the mapper, by reason; a row may have several reasons.
     filled : DataFrame
-        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, and the
-        ``standard deviation`` of what was filled, in degrees.
+        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, the
+        ``standard deviation`` of what was filled, in degrees, and ``when`` they are missing.
     offsets : Series
         Mean measured frequency against the model's nominal one, by mode, in percent.
     n_outside : int or None
@@ -68,6 +70,8 @@ class FitReport(SavesFrames):
         where the inverse does not give it.
     scatter : Series or None
         Standard deviation of measured over predicted frequencies, by mode, in percent.
+    findings : RecordFindings or None
+        What `~skthermo.preprocessing.check_records` has found in the records.
 
     Examples
     --------
@@ -93,6 +97,7 @@ class FitReport(SavesFrames):
     n_unconverged: int | None = None
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
+    findings: RecordFindings | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -106,8 +111,9 @@ class FitReport(SavesFrames):
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         lines += [
-            f"Filled from the other sensors: {rows:.0f} temperatures of {name!r} (standard deviation {deviation:.2g})."
-            for name, rows, deviation in self.filled.itertuples()
+            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
+            f"{when}."
+            for name, rows, deviation, when in self.filled.itertuples()
         ]
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
@@ -119,6 +125,8 @@ class FitReport(SavesFrames):
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
             lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
+        if self.findings is not None and len(self.findings.table):
+            lines.append(self.findings.summary())
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
 
     def _modes(self) -> pd.DataFrame:
@@ -155,11 +163,12 @@ class FitReport(SavesFrames):
                 f"{ROWS_PER_PARAMETER} rows for each",
             )
         mostly = self.filled[2 * self.filled["rows"] > self.n_rows]
-        for name, rows, deviation in mostly.itertuples():
+        for name, rows, deviation, when in mostly.itertuples():
             yield (
                 f"mostly filled {name}",
-                f"the temperature {name!r} is missing in {rows:.0f} of {self.n_rows} rows and was filled from the "
-                f"others (standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
+                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the "
+                f"others ({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it "
+                "out",
             )
         chain, mean = self.errors.mean()
         if chain > WORSE_THAN_MEAN * mean:
@@ -182,7 +191,7 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates) -> FitReport:
+def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> FitReport:
     """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
@@ -209,6 +218,7 @@ def report_of(chain: Any, estimates: Estimates) -> FitReport:
         n_unconverged=estimates.n_unconverged,
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
+        findings=findings,
     )
 
 
@@ -219,28 +229,51 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
 
 
 def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
-    """How many temperatures were filled, and their standard deviation, by sensor."""
-    deviations = sensors.fill(T)[1]
-    rows = (deviations > 0).sum(axis=0)
-    table = {"rows": rows, "standard deviation": np.nansum(deviations, axis=0) / np.maximum(rows, 1)}
-    return pd.DataFrame(table, index=column_names(T, "T"), dtype=float)[rows > 0]
+    """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
+    deviations, found = sensors.fill(T)[1], {}
+    for sensor, columns in columns_by_sensor(T).items():
+        values = deviations[:, columns]
+        if (rows := (values > 0).any(axis=1)).any():
+            found[sensor] = [int(rows.sum()), float(values[values > 0].mean()), periods(T, rows)]
+    return pd.DataFrame.from_dict(found, orient="index", columns=["rows", "standard deviation", "when"])
 
 
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
-    """Rows that do not train the mapper, by reason."""
-    T, F, inputs, trained = records.temperatures, records.frequencies, records.inputs, records.trained
-    reasons = {}
+    """Rows that do not train the mapper, by reason: a sensor or a mode that is missing, with the periods."""
+    T, F, trained = records.temperatures, records.frequencies, records.trained
     without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
-    for what, table, default, rows in (("temperature", T, "T", ~trained), ("frequency", F, "f", without_theta)):
-        missing = np.isnan(as_floats(table)[rows]).sum(axis=0)
-        for name, count in zip(column_names(table, default), missing, strict=True):
-            reasons[f"{what} {name!r} is missing"] = int(count)
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
-    reasons["a lag reaches into a gap"] = int((complete_T & np.isnan(inputs).any(axis=1)).sum())
-    reasons["their weight is 0"] = int((~records.counted).sum())
-    reasons["no parameters were found"] = int((complete_F & without_theta).sum())
-    counts = pd.Series(reasons, dtype=int)
-    return counts[counts > 0]
+    missing = {
+        f"temperature {sensor!r} is missing": np.isnan(as_floats(T)[:, columns]).any(axis=1) & ~trained
+        for sensor, columns in columns_by_sensor(T).items()
+    }
+    for name, column in zip(column_names(F, "f"), as_floats(F).T, strict=True):
+        missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
+    missing["a lag reaches into a gap"] = complete_T & np.isnan(records.inputs).any(axis=1)
+    missing["their weight is 0"] = ~records.counted
+    missing["no parameters were found"] = complete_F & without_theta
+    counts = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
+    return pd.Series(counts, dtype=int)
+
+
+def periods(T: Any, rows: NDArray[np.bool_]) -> str:
+    """When some rows of a table were taken: their period, or the longest one and how many there are."""
+    order = np.argsort(row_times(T), kind="stable")
+    places = np.flatnonzero(rows[order])
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    longest = max(runs, key=len)
+    label = _labels(T, order[longest[[0, -1]]])
+    text = label[0] if label[0] == label[1] else f"{label[0]} to {label[1]}"
+    return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
+
+
+def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
+    """What rows are called: their stamps, or their numbers."""
+    if not has_stamps(T):
+        return [f"row {row}" for row in rows]
+    stamps = T.index[rows]
+    at_midnight = (T.index == T.index.normalize()).all()
+    return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 
 def mode_offsets(model: FEModel, F: Any) -> pd.Series:
@@ -252,17 +285,6 @@ def mode_offsets(model: FEModel, F: Any) -> pd.Series:
 def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
     """Warnings about the order and the units of the modes: kind and text of each."""
     offsets = mode_offsets(model, F)
-    values = as_floats(F)
-    with np.errstate(invalid="ignore"):
-        absurd = np.abs(np.log(values / np.nanmedian(values, axis=0))) > np.log(ABSURD)
-    if absurd.any():
-        row, column = np.argwhere(absurd)[0]
-        yield (
-            "absurd frequencies",
-            f"{absurd.sum()} frequencies are more than {ABSURD:g} times the median of their mode, or less than "
-            f"1/{ABSURD:g} of it, first {offsets.index[column]!r} in row {row}: {values[row, column]:g} Hz; expected "
-            "NaN where a mode was not identified",
-        )
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
     if len(ratios) > 1:

@@ -12,6 +12,7 @@ from skthermo._arguments import check_model
 from skthermo._arrays import as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
+from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate.inverse import InverseSurrogate
 
@@ -56,6 +57,9 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
     mapper = default_part(chain, "mapper") if chain.mapper is None else clone(chain.mapper)
     aligner = unchanged if chain.aligner == "passthrough" else clone(chain.aligner)
     imputer = None if chain.imputer == "passthrough" else clone(chain.imputer)
+    for part in (aligner, *aligner.get_params().values()):
+        if isinstance(part, BiasAligner) and part.reference is None:
+            part.set_params(reference=chain.model)
     names = list(chain.model.parameter_names)
     for part in surrogates_in(inverse):
         if part.model is None:

@@ -22,6 +22,7 @@ from skthermo._validation import last_step
 from skthermo._warnings import warn_user
 from skthermo._weather import TrainingRange, nearest_in_parts, one_in_each_part, order_statistic, weather_coordinates
 from skthermo.preprocessing import BlockedKFold
+from skthermo.surrogate.chain._scatter import Scatter
 
 N_FOLDS = 5
 CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
@@ -32,7 +33,7 @@ UNSEEN = 0.1  # share of the records of a fold in unseen weather that gives a wa
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
-OVERFITTED = 0.9  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
+OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
@@ -96,11 +97,20 @@ class WeatherResiduals:
         """Values of the records, (n_records, n_columns), less the mean of those in similar weather."""
         return values - self._similar_mean(values, self.weather, self._all)
 
+    @cached_property
+    def scatter(self) -> Scatter:
+        """How records scatter around what similar weather explains, and how long they remember it."""
+        return Scatter.of(self)
+
+    def independent_scatter(self, deviations: Array) -> Scatter:
+        """The same for independent records and modes of stated relative standard deviations, (n_modes,)."""
+        return Scatter.independent(deviations, len(self.values))
+
     @property
     def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
         own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
-        return bool((own < OVERFITTED * out_of_fold).any())
+        return bool(own.mean() < OVERFITTED * out_of_fold.mean())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""

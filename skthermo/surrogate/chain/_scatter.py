@@ -41,7 +41,7 @@ class Scatter:
         """Learn from the residuals of a chain what weather similar to theirs does not explain.
 
         Residuals of records that the mapper has learned are too small, those out of fold too large; products of one
-        with the other are neither. What the comparison with similar weather takes away is known from simulated records.
+        with the other lie between. What the comparison with similar weather takes away is known from simulated records.
         """
         of_fold = residuals.less_similar(residuals.values)
         own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
@@ -61,6 +61,11 @@ class Scatter:
         """Independent records and modes of known standard deviations, (n_modes,)."""
         covariance = np.diag(deviations**2)
         return cls(np.array([covariance, 0 * covariance]), 0.0, np.full(len(deviations), n_records))
+
+    @property
+    def n_pseudo(self) -> int:
+        """Weight of the correlations of single records beside those of a part, in independent records."""
+        return PSEUDO_RECORDS
 
     @property
     def variances(self) -> Array:
@@ -108,7 +113,7 @@ def covariances(first: Array, second: Array, n_lags: int) -> Array:
     filled = [np.nan_to_num(table) for table in (first, second)]
     found = np.empty((n_lags, first.shape[1], first.shape[1]))
     for lag in range(n_lags):
-        sums, pairs = (a[lag:].T @ b[: len(b) - lag] + (b[lag:].T @ a[: len(a) - lag]) for a, b in (filled, known))
+        sums, pairs = (a[lag:].T @ b[: len(b) - lag] + b[lag:].T @ a[: len(a) - lag] for a, b in (filled, known))
         found[lag] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
     return found
 

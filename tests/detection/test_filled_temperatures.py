@@ -1,0 +1,140 @@
+"""Records in which a thermometer is missing are judged, and as strictly as others."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.preprocessing import LagFeatures
+
+MODES = ["f1", "f2"]
+EFFECT = np.array([[-0.02, 0.01], [-0.03, -0.04], [0.0, -0.02]])
+FILLED = pytest.mark.filterwarnings("ignore:missing temperatures were filled from the other")
+
+
+def campaign(n_rows=4000, seed=0, noise=0.02):
+    """Hourly records of three thermometers and two modes that follow them."""
+    random = np.random.default_rng(seed)
+    air = 10 + 8 * np.sin(2 * np.pi * np.arange(n_rows) / 24) + random.normal(0, 4, n_rows)
+    girder = 0.7 * air + random.normal(0, 1, n_rows)
+    T = np.column_stack([air, girder, 0.5 * air + 0.4 * girder + random.normal(0, 1, n_rows)])
+    F = [4.0, 9.0] + T @ EFFECT + random.normal(0, noise, (n_rows, 1)) + random.normal(0, noise, (n_rows, 2))
+    stamps = pd.date_range("2025", periods=n_rows, freq="h")
+    return pd.DataFrame(np.hstack([T, F]), stamps, ["air", "girder", "deck", *MODES])
+
+
+BASELINE, LATER = campaign(), campaign(20_000, seed=1)
+SCALES = (None, "global", "local")
+
+
+@pytest.fixture(scope="module")
+def detectors():
+    return {
+        scale: make_pipeline(
+            TemperatureCompensator(LinearRegression(), targets=MODES, scale=scale), MahalanobisDetector(0.02)
+        ).fit(BASELINE)
+        for scale in SCALES
+    }
+
+
+@FILLED
+@pytest.mark.parametrize("dead", [["girder"], ["girder", "deck"]], ids=str)
+@pytest.mark.parametrize("scale", SCALES)
+def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detectors, scale, dead):
+    records = LATER.assign(**dict.fromkeys(dead, np.nan))
+    assert (detectors[scale].predict(records) == -1).mean() == pytest.approx(0.02, abs=0.006)
+    compensator, detector = detectors[None]
+    filled = compensator.sensors_.fill(records.drop(columns=MODES))[0]
+    unaware = records[MODES] - compensator.estimator_.predict(pd.DataFrame(filled, columns=list(LATER)[:3]))
+    assert (detector.predict(unaware) == -1).mean() > 0.05
+
+
+@FILLED
+@pytest.mark.parametrize("scale", SCALES)
+def test_damage_is_still_found_with_a_dead_thermometer(detectors, scale):
+    damaged = LATER.assign(f1=LATER["f1"] - 0.3, girder=np.nan)
+    assert (detectors[scale].predict(damaged) == -1).mean() > 0.9
+
+
+@FILLED
+@pytest.mark.parametrize("scale", SCALES)
+def test_residuals_have_one_covariance_with_and_without_a_thermometer(detectors, scale):
+    compensator = detectors[scale][0]
+    alive, dead = (compensator.transform(records) for records in (LATER, LATER.assign(girder=np.nan)))
+    np.testing.assert_allclose(alive.cov(), dead.cov(), rtol=0.1, atol=0.1 * np.diag(alive.cov()).max())
+
+
+@FILLED
+@pytest.mark.parametrize("scale", SCALES)
+def test_rows_that_have_every_temperature_are_untouched(detectors, scale):
+    compensator, holed = detectors[scale][0], LATER.copy()
+    holed.iloc[::7, 1] = np.nan
+    whole = np.arange(len(LATER)) % 7 > 0
+    found, expected = (compensator.transform(records).to_numpy()[whole] for records in (holed, LATER))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_the_error_of_a_linear_regression_is_its_slope_times_what_is_not_known():
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES, scale="global").fit(BASELINE)
+    record = LATER.iloc[[0]].assign(girder=np.nan, deck=np.nan)
+    with pytest.warns(UserWarning, match="'girder' in 1 of 1 rows"):
+        white = compensator.transform(record).to_numpy()[0]
+    temperatures = BASELINE.drop(columns=MODES)
+    air, others = temperatures[["air"]], temperatures[["girder", "deck"]]
+    unknown = np.cov((others - LinearRegression().fit(air, others).predict(air)).T, bias=True)
+    slopes = compensator.estimator_.coef_[:, 1:]
+    covariance = compensator.spread_.overall.covariance + slopes @ unknown @ slopes.T
+    filled = pd.DataFrame(compensator.sensors_.fill(record.drop(columns=MODES))[0], columns=temperatures.columns)
+    residual = record[MODES].to_numpy()[0] - compensator.estimator_.predict(filled)[0]
+    centred = residual - compensator.spread_.overall.mean
+    assert white @ white == pytest.approx(centred @ np.linalg.solve(covariance, centred), rel=1e-6)
+
+
+@FILLED
+def test_lags_of_a_filled_temperature_count_too():
+    lagged = make_pipeline(LagFeatures([0, 3], freq="1h", padding="nan"), LinearRegression())
+    compensator = TemperatureCompensator(lagged, targets=MODES, scale="global").fit(BASELINE)
+    holed = LATER[:100].copy()
+    holed.index = BASELINE.index[-1] + pd.to_timedelta(np.arange(1, 101), "h")
+    whole = compensator.transform(holed)
+    holed.iloc[50, 1] = np.nan
+    changed = ~np.isclose(compensator.transform(holed), whole, rtol=0, atol=1e-12).all(axis=1)
+    assert set(np.flatnonzero(changed)) <= {50, 53}
+    assert changed[50]
+
+
+def test_one_warning_names_sensors_and_counts():
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES).fit(BASELINE)
+    day = LATER[:24].copy()
+    day["girder"] = np.nan
+    day.iloc[3:5, :3] = np.nan
+    with pytest.warns(UserWarning, match="missing temperatures|no temperature at all") as given:
+        residuals = compensator.transform(day)
+    assert [str(warning.message) for warning in given] == [
+        "missing temperatures were filled from the other sensors: 'girder' in 22 of 24 rows (standard deviation 0.93); "
+        "the spread of residuals is widened by what that costs",
+        "2 of 24 rows have no temperature at all: they are not judged",
+    ]
+    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [3, 4])
+
+
+@FILLED
+@pytest.mark.parametrize("scale", SCALES)
+def test_gaps_in_the_baseline_cost_no_false_alarms(scale):
+    holed = BASELINE.copy()
+    holed.iloc[np.random.default_rng(2).random(len(holed)) < 0.2, 1] = np.nan
+    detector = make_pipeline(
+        TemperatureCompensator(LinearRegression(), targets=MODES, scale=scale), MahalanobisDetector(0.02)
+    ).fit(holed)
+    assert (detector.predict(LATER) == -1).mean() == pytest.approx(0.02, abs=0.006)
+    assert (detector.predict(LATER.assign(girder=np.nan)) == -1).mean() == pytest.approx(0.02, abs=0.006)
+
+
+def test_nothing_of_the_records_given_to_fit_is_shared():
+    values = BASELINE.to_numpy(copy=True)
+    compensator = TemperatureCompensator(LinearRegression(), targets=[3, 4], scale="local").fit(values)
+    before = compensator.transform(LATER.to_numpy())
+    values[:] = 0
+    np.testing.assert_array_equal(compensator.transform(LATER.to_numpy()), before)

@@ -1,0 +1,219 @@
+"""Faults of records are named, and healthy records have none."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.datasets import make_kw51_campaign, make_truss_campaign
+from skthermo.preprocessing import LagFeatures, check_records, residual_trend
+from skthermo.preprocessing.checks._stuck import stuck_runs
+
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+
+
+def hourly(seed=0, n_days=120):
+    """A slow temperature by the hour, as smooth as soil."""
+    random = np.random.default_rng(seed)
+    hours = np.arange(24 * n_days)
+    return 10 + 3 * np.sin(2 * np.pi * hours / 24) + 0.05 * np.cumsum(random.standard_normal(len(hours)))
+
+
+def one(findings):
+    """The only finding."""
+    assert len(findings.table) == 1, findings
+    return findings.table.iloc[0]
+
+
+def exchanged(rows):
+    values = F.to_numpy().copy()
+    values[np.ix_(rows, [2, 3])] = values[np.ix_(rows, [3, 2])]
+    return F.copy().assign(f3=values[:, 2], f4=values[:, 3])
+
+
+class TestHealthyRecords:
+    @pytest.mark.parametrize("seed", range(4))
+    def test_they_have_no_finding(self, seed):
+        random, year = np.random.default_rng(seed), make_truss_campaign(random_state=seed)
+        temperatures, frequencies = year.temperatures, year.frequencies
+        gaps = temperatures.mask(random.random(T.shape) < 0.1), frequencies.mask(random.random(F.shape) < 0.1)
+        for tables in ((temperatures, frequencies), gaps, (temperatures.round(0), frequencies.round(1))):
+            assert check_records(*tables).table.empty
+
+    def test_neither_has_a_bridge_by_the_hour(self):
+        campaign = make_kw51_campaign(retrofit=False, random_state=0)
+        findings = check_records(campaign.temperatures, campaign.frequencies)
+        assert findings.summary() == str(findings) == "No finding in 11328 records."
+        assert list(findings.warnings()) == []
+
+    def test_few_records_say_nothing(self):
+        assert check_records(T[:20].sample(frac=1, random_state=0).set_axis(T.index[:20]), F[:20]).table.empty
+
+
+class TestStuck:
+    def test_a_thermometer_at_20_degrees_in_december(self):
+        stuck = T.copy()
+        stuck.loc["2025-12", "T2"] = 20.0
+        found = one(check_records(stuck, F))
+        assert (found["what"], found["column"], found["n_rows"]) == ("stuck sensor", "T2", 31)
+        assert (found["from"], found["to"]) == (pd.Timestamp("2025-12-01"), pd.Timestamp("2025-12-31"))
+
+    def test_a_mode_over_gaps_in_an_array(self):
+        stuck = F.to_numpy().copy()
+        stuck[100:130, 4] = stuck[100, 4]
+        stuck[110:115, 4] = np.nan
+        found = one(check_records(T.to_numpy(), stuck))
+        assert tuple(found[["what", "column", "n_rows", "from", "to"]]) == ("stuck mode", "f5", 25, 100, 129)
+
+    @pytest.mark.parametrize("digits", [None, 1, 0])
+    def test_rounding_of_slow_temperatures_is_not_stuck(self, digits):
+        column = hourly() if digits is None else hourly().round(digits)
+        assert stuck_runs(column) == []
+        column[500:1000] = column[500]
+        runs = stuck_runs(column)
+        assert len(runs) == 1
+        assert runs[0][0] <= 500
+        assert runs[0][-1] >= 999
+
+    def test_values_that_are_repeated_until_the_next_is_logged_are_not_stuck(self):
+        assert stuck_runs(np.repeat(hourly(), 6)) == []
+
+    def test_a_value_at_which_a_sensor_rests_again_and_again_is_not_stuck(self):
+        sun = np.maximum(np.sin(2 * np.pi * np.arange(24 * 100) / 24), 0.0) * np.random.default_rng(0).random(2400)
+        assert stuck_runs(sun) == []
+
+    @pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
+    def test_lags_of_a_sensor_are_no_sensors(self, kind):
+        lagged = LagFeatures([0, 24]).fit_transform(T)
+        assert check_records(kind(lagged), kind(F)).table.empty
+        stuck = T.copy()
+        stuck.loc["2025-12", "T1"] = 20.0
+        found = check_records(LagFeatures([0, 2]).fit_transform(stuck), F).table
+        assert found["column"].tolist() == ["T1"]
+
+
+class TestTime:
+    @pytest.mark.parametrize("shift", [60, -60])
+    def test_a_shift_is_found_with_its_size_and_direction(self, shift):
+        found = one(check_records(T, F.shift(shift)))
+        assert found["what"] == "time shift"
+        direction = "before" if shift > 0 else "after"
+        assert f"those of 60 rows {direction} (about 60 days)" in found["detail"]
+        array = one(check_records(T.to_numpy(), F.shift(shift).to_numpy()))
+        assert array["detail"] == found["detail"].replace(" (about 60 days)", "")
+
+    @pytest.mark.parametrize("lag", [2, 12])
+    def test_inertia_is_no_shift(self, lag):
+        random = np.random.default_rng(0)
+        air = hourly() + 2 * random.standard_normal(24 * 120)  # as rough as weather that no mean of the past replaces
+        frequency = np.roll(4 - 0.02 * air, lag) + 0.01 * random.standard_normal(len(air))
+        index = pd.date_range("2025-01-01", periods=len(air), freq="h")
+        tables = pd.DataFrame({"air": air}, index)[lag:], pd.DataFrame({"f": frequency}, index)[lag:]
+        assert check_records(*tables).table.empty
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_shuffled_temperatures_explain_nothing(self, seed):
+        shuffled = T.sample(frac=1, random_state=seed).set_axis(T.index)
+        found = one(check_records(shuffled, F))
+        assert (found["what"], found["n_rows"]) == ("weather", 365)
+
+
+class TestExchangedModes:
+    @pytest.mark.parametrize("share", [0.5, 0.1, 0.02])
+    def test_rows_are_found(self, share):
+        rows = np.random.default_rng(0).random(len(F)) < share
+        found = one(check_records(T, exchanged(rows)))
+        assert (found["what"], found["column"], found["n_rows"]) == ("exchanged modes", "'f3' and 'f4'", rows.sum())
+
+    def test_with_gaps_a_value_alone_is_found_too(self):
+        rows, random = np.arange(len(F)) < 180, np.random.default_rng(0)
+        gappy = exchanged(rows).mask(random.random(F.shape) < 0.2)
+        either = gappy[["f3", "f4"]].notna().any(axis=1)
+        found = check_records(T, gappy).table.iloc[0]
+        assert found["what"] == "exchanged modes"
+        assert found["n_rows"] >= 0.98 * (rows & either).sum()
+
+    def test_modes_that_cross_with_the_weather_are_not_exchanged(self):
+        random, air = np.random.default_rng(0), T["T1"].to_numpy()
+        slopes = np.array([-0.01, 0.03])
+        crossing = 4 + np.outer(air - np.median(air), slopes) + 0.01 * random.standard_normal((len(air), 2))
+        assert (np.diff(crossing) > 0).mean() > 0.2
+        assert check_records(T, pd.DataFrame(crossing, F.index, ["a", "b"])).table.empty
+
+
+class TestOutliers:
+    @pytest.mark.parametrize("share", [0.01, 0.003])
+    def test_values_of_other_poles_are_counted_by_mode(self, share):
+        random = np.random.default_rng(1)
+        wrong = random.random(F.shape) < share
+        table = check_records(T, F.where(~wrong, F * random.choice([0.8, 1.25], F.shape))).table
+        assert set(table["what"]) == {"outliers"}
+        assert dict(zip(table["column"], table["n_rows"], strict=True)) == {
+            name: count for name, count in zip(F, wrong.sum(axis=0), strict=True) if count
+        }
+
+    def test_twice_the_median_is_one_in_few_records_too(self):
+        few = F[:20].copy()
+        few.iloc[3, 1] *= 2.1
+        found = one(check_records(T[:20], few))
+        assert (found["what"], found["column"], found["from"]) == ("outliers", "f2", F.index[3])
+
+    def test_a_change_that_lasts_is_none(self):
+        changed = F.copy()
+        changed.iloc[300:, 0] *= 0.8
+        assert "outliers" not in set(check_records(T, changed).table["what"])
+
+
+class TestTrend:
+    def test_a_drift_is_estimated(self):
+        two = make_truss_campaign(2, random_state=1)
+        drift = 1 + 0.02 * np.linspace(0, 1, 730)[:, np.newaxis]
+        table = check_records(two.temperatures, two.frequencies * drift).table
+        assert table["what"].tolist() == ["trend"] * 6
+        assert "Hz a year" in table["detail"][0]
+
+    @pytest.mark.parametrize("rho", [0.0, 0.9])
+    def test_estimates_scatter_by_their_standard_errors(self, rho):
+        random, errors = np.random.default_rng(0), []
+        noise = random.standard_normal((1000, 200))
+        for row in range(1, 1000):
+            noise[row] = rho * noise[row - 1] + np.sqrt(1 - rho**2) * noise[row]
+        drift = np.linspace(0, 2, 1000)[:, np.newaxis]
+        table = residual_trend(noise + drift)
+        errors = (table["change"] - 2) / table["standard_error"]
+        assert 0.9 <= (errors.abs() < 2).mean() <= 0.99
+
+    def test_times_count_and_their_order_does_not(self):
+        stamps = pd.date_range("2025-01-01", periods=400, freq="D")
+        residuals = pd.DataFrame({"f": np.arange(400.0)}, stamps)
+        trend = residual_trend(residuals.sample(frac=1, random_state=0))
+        np.testing.assert_allclose(trend["change"], 399)
+        np.testing.assert_allclose(trend["per_year"], 365.25)
+        assert (trend["last"] > trend["first"]).all()
+        assert residual_trend(np.zeros((5, 1))).isna().all(axis=None)
+
+
+def test_findings_do_not_depend_on_the_order_of_rows():
+    stuck = T.copy()
+    stuck.loc["2025-12", "T2"] = 20.0
+    order = np.random.default_rng(0).permutation(len(T))
+    expected = check_records(stuck, F).table
+    pd.testing.assert_frame_equal(check_records(stuck.iloc[order], F.iloc[order]).table, expected)
+
+
+def test_each_kind_gives_one_warning_and_the_tables_stay_as_they_are():
+    stuck, spoiled = T.copy(), F.copy()
+    stuck.iloc[300:, [0, 1]] = 20.0
+    spoiled.iloc[[50, 60], [0, 1]] *= 1.3
+    before = stuck.copy(), spoiled.copy()
+    findings = check_records(stuck, spoiled)
+    kinds = [kind for kind, _ in findings.warnings()]
+    assert kinds == ["stuck sensor", "outliers"]
+    assert len(findings.table) == len(str(findings).splitlines()) - 1 == 4
+    for table, copy in zip((stuck, spoiled), before, strict=True):
+        pd.testing.assert_frame_equal(table, copy)
+
+
+def test_tables_of_other_rows_are_refused():
+    with pytest.raises(ValueError, match="temperatures has 365 rows and frequencies 364"):
+        check_records(T, F[1:])

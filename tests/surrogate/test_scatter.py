@@ -1,0 +1,111 @@
+"""Scatter of records: what is learned of independent and of lasting parts, and how uncertain it leaves means."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from skthermo.surrogate.chain._scatter import Scatter
+
+ROOT = np.array([[1.0, 0.0], [0.6, 0.8]])  # of the correlations of two modes
+NEAR = 25  # number of neighbours in weather
+
+
+def noise(memory, n_records, random, n_columns=2):
+    """First-order autoregressions of unit variance."""
+    shocks = random.standard_normal((300 + n_records, n_columns)) * np.sqrt(1 - memory**2)
+    return lfilter([1.0], [1.0, -memory], shocks, axis=0)[300:]
+
+
+def residuals(values, season=300):
+    """Residuals of records whose weather has a season and weather of the day, and what similar weather takes away."""
+    days, random = np.arange(len(values)), np.random.RandomState(0)
+    weather = np.cos(2 * np.pi * days / season) + 0.3 * random.standard_normal(len(values))
+    near = np.abs(weather[:, np.newaxis] - weather).argsort(axis=1)[:, :NEAR]
+
+    def less_similar(table):
+        return table - table[near].mean(axis=1)
+
+    return SimpleNamespace(values=values, own=values, is_overfitted=False, less_similar=less_similar)
+
+
+def correlations(memory, n_records):
+    return toeplitz(float(memory) ** np.arange(n_records))
+
+
+def test_means_of_autoregressions_have_the_variance_of_the_closed_form():
+    """Also after similar weather, often of neighbours in time, has taken its share of the slow noise."""
+    random = np.random.RandomState(1)
+    for memory in (0.0, 0.6, 0.9):
+        ratios = []
+        for _ in range(12):
+            scatter = Scatter.of(residuals(noise(memory, 1000, random) @ ROOT.T))
+            weights = np.full((60, 2), 1 / 60)
+            found = scatter.of_sums(weights, np.arange(60)).sum(axis=0)
+            ratios.append(found / (correlations(memory, 60).sum() / 60**2))
+        np.testing.assert_allclose(np.mean(ratios, axis=0), ROOT @ ROOT.T, atol=0.15)
+
+
+def test_independent_records_have_no_lasting_part():
+    random = np.random.RandomState(2)
+    found = [Scatter.of(residuals(noise(0.0, 500, random))) for _ in range(20)]
+    assert np.mean([scatter.memory == 0.0 for scatter in found]) >= 0.9
+    assert all((scatter.parts[1] == 0).all() for scatter in found if scatter.memory == 0.0)
+    assert np.mean([scatter.variances for scatter in found]) == pytest.approx(1, abs=0.03)
+
+
+def test_a_small_part_that_lasts_is_seen():
+    """A tenth of the variance that lasts for twenty records makes the variance of long means three times as large."""
+    random = np.random.RandomState(3)
+    table = np.sqrt(0.9) * noise(0.0, 1500, random) + np.sqrt(0.1) * noise(0.9, 1500, random)
+    scatter = Scatter.of(residuals(table))
+    assert 0.75 < scatter.memory < 0.97
+    whole = scatter.of_sums(np.full((300, 2), 1 / 300), np.arange(300)).sum(axis=0)
+    expected = 0.9 / 300 + 0.1 * correlations(0.9, 300).sum() / 300**2
+    np.testing.assert_allclose(np.diag(whole) / expected, 1, atol=0.5)
+
+
+def test_sums_at_irregular_places_are_those_of_the_matrix():
+    random = np.random.RandomState(4)
+    parts = np.array([ROOT @ ROOT.T, np.diag([2.0, 0.5])])
+    scatter = Scatter(parts, 0.8, np.array([500, 500]))
+    places, weights = np.sort(random.uniform(0, 60, 40)), random.uniform(size=(40, 2))
+    matrix = 0.8 ** np.abs(places[:, np.newaxis] - places)
+    first, second = scatter.of_sums(weights, places)
+    np.testing.assert_allclose(first, parts[0] * (weights.T @ weights))
+    np.testing.assert_allclose(second, parts[1] * (weights.T @ matrix @ weights))
+    regular = scatter.of_sums(weights, np.arange(40))[1]
+    np.testing.assert_allclose(regular, parts[1] * (weights.T @ correlations(0.8, 40) @ weights))
+
+
+def test_as_many_independent_records_as_have_the_same_mean_error():
+    scatter = Scatter(np.array([np.zeros((1, 1)), np.ones((1, 1))]), 0.9, np.array([365]))
+    expected = 365**2 / correlations(0.9, 365).sum()
+    assert scatter.n_trained == pytest.approx(expected)
+    parts = scatter.of_sums(np.full((365, 1), 1 / 365), np.arange(365))
+    assert scatter.n_independent(parts)[0] == pytest.approx(expected)
+    assert scatter.freedom(parts) == pytest.approx(365 * 0.1 / 1.9)
+    assert Scatter.independent(np.array([2.0]), 50).n_trained == pytest.approx(50)
+
+
+def test_modes_with_gaps_and_modes_that_hardly_any_record_has():
+    random = np.random.RandomState(5)
+    table = noise(0.0, 400, random, 3) * [1.0, 3.0, 1.0]
+    table[::3, 0], table[10:, 2] = np.nan, np.nan
+    given = residuals(table)
+    given.less_similar = lambda values: values
+    scatter = Scatter.of(given)
+    np.testing.assert_allclose(scatter.variances, [1, 9, 0], rtol=0.2)
+    assert scatter.variances[2] == 0  # of ten records nothing is said
+    assert np.linalg.eigvalsh(scatter.parts[0][:2, :2]).min() > 0
+
+
+def test_residuals_of_a_mapper_that_has_learned_noise_are_not_trusted():
+    random = np.random.RandomState(6)
+    given = residuals(noise(0.0, 400, random))
+    given.own, given.is_overfitted = 0.1 * given.values, True
+    assert Scatter.of(given).variances.mean() == pytest.approx(1, abs=0.15)
+    given.is_overfitted = False
+    assert Scatter.of(given).variances.mean() < 0.2
