@@ -1760,6 +1760,49 @@ for display, argument, good in (
     )
 
 
+# newer arguments
+CLOCKED = F.set_axis(pd.date_range("2020-01-01", periods=len(F), freq="h"))
+fitted(
+    preprocessing.HampelFilter,
+    (BOTH, table(BOTH, fixed=False, rows=False, but=("repeated columns",))),
+    window=(5, number(-1, 0, 0.5, but=("several", "empty"))),
+    n_deviations=(6.0, number(-1.0, 0.0)),
+    targets=(MODES, names(MODES)),
+)
+use("preprocessing.check_records", temperatures=(T, table(T, fixed=False)), frequencies=(F, table(F, fixed=False)))
+use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
+fitted(
+    detection.OutlierDetector,
+    (F, {}),
+    after=DAMAGE_INDEX,
+    estimator=(IsolationForest(n_estimators=5, random_state=0), {}),
+    threshold=("conformal", choice()),
+)
+use(
+    "metrics.complete_r2",
+    y_true=(F, {}),
+    y_pred=(PREDICTED, {}),
+    sample_weight=(np.ones(len(F)), vector(np.ones(len(F)), but=("zero inside",))),
+)
+use(
+    "surrogate.InverseSurrogate",
+    lambda **a: surrogate.InverseSurrogate(TRUSS, **INVERSE, **a).fit().transform(F),
+    verbose=(False, flag("one", "zero")),
+)
+use(
+    "surrogate.DataInformedFEM",
+    lambda **a: surrogate.DataInformedFEM(TRUSS, **PARTS, random_state=0, **a).fit(T, F).predict(T),
+    verbose=(False, flag("one", "zero")),
+)
+use(
+    "studies.DetectabilityStudy",
+    lambda **a: studies.DetectabilityStudy(CHAIN, detection.MahalanobisDetector(), SCENARIOS, n_repeats=1, **a).run(
+        LATER.temperatures
+    )["rate"],
+    verbose=(False, flag("one", "zero")),
+)
+
+
 IGNORED = {"y", "input_features", "groups of split"}
 
 NOT_CALLED = {
@@ -1772,6 +1815,7 @@ NOT_CALLED = {
     "fem.ModalModel": "a protocol",
     "fem.LocalModes": "made by a model's local_modes",
     "surrogate.FitReport": "made by a chain's fit",
+    "preprocessing.RecordFindings": "made by check_records",
     "studies.IdentifiedDamage": "made by identify_damage",
     "studies.PODCurve": "made by pod_curve",
     "datasets.load_kw51": "files have a benchmark of their own, fuzz_loaders.py",
@@ -1783,6 +1827,9 @@ NOT_CALLED = {
 """Public names whose constructors are not tried, with reasons."""
 
 LEGAL: dict[str, dict[tuple[str, str], str]] = {
+    "window": {("a duration", "preprocessing.HampelFilter"): "a window may be a duration"},
+    "n_deviations": {("1e308", "preprocessing.HampelFilter"): "removes nothing"},
+    "sample_weight": {(cause, "*"): "a mask says which rows count" for cause in ("true", "booleans", "true inside")},
     "reduce": {("true", "*"): "True takes the default tolerance"},
     "shapes": {("NaN", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
     "columns": {
