@@ -14,12 +14,15 @@ from sklearn.preprocessing import StandardScaler
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
 from skthermo._gaussian import Gaussian
+from skthermo._warnings import warn_user
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
 LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
+BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
+UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
 
 
@@ -65,6 +68,27 @@ class TrainingRange:
             f"{self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} to {highest:.4g}; expected "
             f"degrees Celsius{kelvin}, and records of such weather to train on"
         )
+
+
+def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
+    """Warn of the fold that has most records in weather that the other folds, from 0, have not seen."""
+    values, worst, text = as_floats(weather), UNSEEN, ""
+    for fold in np.unique(folds[folds >= 0]):
+        test = folds == fold
+        known = TrainingRange.of(weather, ~test)
+        excess = np.nan_to_num(known.excess(values[test]))
+        unseen = (excess > BEYOND).any(axis=1)
+        if unseen.mean() > worst and unseen.sum() >= LEAST_UNSEEN:
+            worst, column = unseen.mean(), int(excess.max(axis=0).argmax())
+            seen = values[test, column]
+            text = (
+                f"{unseen.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
+                f"the other folds have not seen: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
+                f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}: "
+                f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
+            )
+    if text:
+        warn_user(text, "weather of folds")
 
 
 @dataclass(frozen=True)

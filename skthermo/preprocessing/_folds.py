@@ -7,14 +7,17 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._times import has_stamps, row_times
+from skthermo._validation import _num_samples
 from skthermo.preprocessing._stamps import as_duration
 
 WEEK = "7D"
 BLOCKS_OF_ROWS = 52  # into which records without stamps are divided: weeks, if they are those of a year
+BLOCKS_OF_A_FOLD = 2  # at least, in different seasons
 
 
 class BlockedKFold(BaseCrossValidator):
@@ -90,28 +93,76 @@ class BlockedKFold(BaseCrossValidator):
         n_rows = len(times)
         if n_rows < self.n_splits:
             raise ValueError(f"{n_rows} rows are fewer than {self.n_splits} folds; expected a row for each")
-        positions, length = times - times.min(), self._length(X)
+        positions, length = times - times.min(), self.length(X)
         if (is_rows := isinstance(length, int)) or not has_stamps(X):
             positions = np.empty(n_rows)
             positions[np.argsort(times, kind="stable")] = np.arange(n_rows)
-        blocks = np.unique(positions // (length if is_rows else length.astype(np.int64)), return_inverse=True)[1]
+        blocks = np.unique(positions // (length if is_rows else length.as_unit("ns").value), return_inverse=True)[1]
         if blocks.max() + 1 < self.n_splits:
             blocks = np.empty(n_rows, dtype=np.intp)
             order = np.argsort(times, kind="stable")
             blocks[order] = np.arange(n_rows) * self.n_splits // n_rows
         return blocks % self.n_splits
 
-    def _length(self, X: Any) -> Any:
-        """Length of a block, as an integer for a number of rows, else as a duration."""
+    def remembering(self, X: Any, n_records: float) -> BlockedKFold:
+        """Folds whose blocks hold so many records or more, as far as each fold keeps two blocks.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records; the index of a frame tells their times.
+        n_records : float
+            Least number of records in a block, such as five correlation times.
+
+        Returns
+        -------
+        BlockedKFold
+            The same folds where their blocks are long enough.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skthermo.preprocessing import BlockedKFold
+        >>> BlockedKFold(2, block=3).remembering(np.zeros((100, 1)), 10.2)
+        BlockedKFold(block=11, n_splits=2)
+        """
+        times, is_timed = np.sort(row_times(X)), has_stamps(X)
+        step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+        longest = len(times) // (BLOCKS_OF_A_FOLD * self.n_splits)
+        least = min(int(np.ceil(n_records)), longest)
+        length = self.length(X)
+        if isinstance(length, int) or not is_timed:
+            return self if least <= length else BlockedKFold(self.n_splits, block=least)
+        wanted = pd.Timedelta(int(least * step), "ns")
+        return self if wanted <= length else BlockedKFold(self.n_splits, block=wanted)
+
+    def length(self, X: Any) -> int | pd.Timedelta:
+        """Length of a block of records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records; the index of a frame tells their times.
+
+        Returns
+        -------
+        int or Timedelta
+            Number of rows, or duration.
+
+        Raises
+        ------
+        ValueError
+            If ``block`` is not as described.
+        """
         if isinstance(self.block, Integral) and not isinstance(self.block, bool):
             if self.block < 1:
                 raise ValueError(f"block is {self.block!r}; expected a number of rows of 1 or more, or a duration")
             return int(self.block)
         if has_stamps(X):
-            return as_duration(WEEK if self.block is None else self.block, "block")
+            return pd.Timedelta(as_duration(WEEK if self.block is None else self.block, "block"))
         if self.block is not None:
             raise ValueError(f"block is {self.block!r}, but X has no DatetimeIndex; expected a number of rows")
-        return max(len(X) // BLOCKS_OF_ROWS, 1)
+        return max(_num_samples(X) // BLOCKS_OF_ROWS, 1)
 
     def _iter_test_masks(self, X: Any = None, y: Any = None, groups: Any = None) -> Iterator[NDArray[np.bool_]]:
         folds = self.fold_of(X)

@@ -18,7 +18,7 @@ from skthermo._weather import order_statistic
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
 from skthermo.surrogate import TemperatureMapper
-from skthermo.surrogate.chain._records import WeatherResiduals, as_frame, block_length
+from skthermo.surrogate.chain._records import WeatherResiduals
 from tests.surrogate.chains import F, T, inverse
 from tests.surrogate.chains import chain as any_chain
 
@@ -215,9 +215,9 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
         time = (1 + rho) / (1 - rho)
         rows = 5 * residuals(np.random.default_rng(1).uniform(size=5000), autoregressive(5000, rho)).correlation_time
         assert rows == pytest.approx(5 * time, rel=0.4)
-        block = block_length(as_frame(table), rows)
+        block = BlockedKFold().remembering(table, rows).length(table)
         is_timed = isinstance(table, pd.DataFrame)
-        assert block == (max(pd.Timedelta("7D"), rows * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
+        assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
 
 
 def test_any_folds_may_be_asked_for():
@@ -227,7 +227,7 @@ def test_any_folds_may_be_asked_for():
 
 def test_folds_in_unseen_weather_are_named():
     short = chain().fit(T[:60], F[:60])
-    with pytest.warns(UserWarning, match=r"\d+% of the records of fold \d of 5 are in weather that the other folds"):
+    with pytest.warns(UserWarning, match=r"\d+ of 12 records of fold \d of 5 are in weather that the other folds"):
         short.records_.out_of_fold(short.mapper_, short._frequencies, KFold(5))
 
 

@@ -34,7 +34,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user, warnings_once
-from skthermo._weather import SensorRegression, TrainingRange
+from skthermo._weather import SensorRegression, TrainingRange, warn_of_unseen
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._gaps import FillError, fill_temperatures
@@ -364,8 +364,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             if longer is not None:
                 folds = longer
                 residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
-        folds.warn_of_unseen(filled)
-        self.folds_, self.block_ = folds.of_row(len(measured)), folds.block
+        self.folds_ = folds.of_row(len(measured))
+        warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
+        self.block_ = None if folds.blocks is None else folds.blocks.length(filled)
         residuals[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         taught = residuals.copy()

@@ -7,40 +7,32 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import KFold, check_cv
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array
 from skthermo._dependence import correlation_time
-from skthermo._times import has_stamps, row_times
-from skthermo._warnings import warn_user
-from skthermo._weather import TrainingRange
+from skthermo._times import row_times
 from skthermo.preprocessing import BlockedKFold
 
 Rows = NDArray[np.intp]
 N_FOLDS = 5
-WEEK = pd.Timedelta("7D")
-BLOCKS_OF_ROWS = 52  # into which records without stamps are divided
 CORRELATION_TIMES = 5  # of the residuals (the mean over modes) that a block is longer than
-LEAST_BLOCKS = 2  # of each fold, in different seasons
-BEYOND = 0.05  # ranges of the other folds' temperatures, outside which a record's weather is unknown to them
-UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unknown weather from which it is warned of
 
 
 @dataclass(frozen=True)
 class Folds:
-    """Pairs of training and test rows, the rows that no fold tests, and the length of a block if they are blocks."""
+    """Pairs of training and test rows, the rows that no fold tests, and the blocks that they may be made of."""
 
     splits: list[tuple[Rows, Rows]]
     untested: Rows
-    block: Any = None
+    blocks: BlockedKFold | None = None
 
     @classmethod
     def of(cls, cv: Any, X: Any) -> Folds:
         """The folds that a user asks for; by default blocks of a week, or of a 52nd of the rows without stamps."""
         if cv is None:
-            return cls.of_blocks(X, WEEK if has_stamps(X) else max(len(X) // BLOCKS_OF_ROWS, 1))
+            return cls.of_blocks(BlockedKFold(N_FOLDS), X)
         if isinstance(cv, str):
             cv = KFold(N_FOLDS)
         splits = list(check_cv(checked(cv, len(X))).split(X))
@@ -56,23 +48,18 @@ class Folds:
         return cls(splits, untested)
 
     @classmethod
-    def of_blocks(cls, X: Any, block: Any) -> Folds:
+    def of_blocks(cls, blocks: BlockedKFold, X: Any) -> Folds:
         """Blocks that are dealt in turn to the folds."""
-        splits = list(BlockedKFold(N_FOLDS, block=block).split(X))
-        return cls(splits, np.empty(0, dtype=np.intp), block)
+        return cls(list(blocks.split(X)), np.empty(0, dtype=np.intp), blocks)
 
     def longer(self, X: Any, residuals: Array) -> Folds | None:
         """Folds of blocks as long as the residuals' memory wants them, if these are too short and may be longer."""
-        if self.block is None:
+        if self.blocks is None:
             return None
-        times = row_times(X)
-        order = np.argsort(times, kind="stable")
-        steps = CORRELATION_TIMES * np.mean([correlation_time(mode) for mode in residuals[order].T])
-        # Where each fold would have one block only, it could not see each season.
-        longest = np.ptp(times) / (LEAST_BLOCKS * N_FOLDS)
-        block = int(min(steps * np.median(np.diff(times[order])), longest)) if len(X) > 1 else 0
-        wanted = pd.Timedelta(block, "ns") if has_stamps(X) else block
-        return self.of_blocks(X, wanted) if wanted > self.block else None
+        order = np.argsort(row_times(X), kind="stable")
+        memory = np.mean([correlation_time(mode) for mode in residuals[order].T])
+        blocks = self.blocks.remembering(X, CORRELATION_TIMES * memory)
+        return None if blocks is self.blocks else self.of_blocks(blocks, X)
 
     def of_row(self, n_rows: int) -> Rows:
         """The fold of each row, -1 where there is none."""
@@ -80,26 +67,6 @@ class Folds:
         for fold, (_, test) in enumerate(self.splits):
             folds[test] = fold
         return folds
-
-    def warn_of_unseen(self, weather: Any) -> None:
-        """Warn of the fold that has most records in weather that the rows it is predicted from do not know."""
-        values, worst, text = as_floats(weather), UNSEEN, ""
-        for fold, (train, test) in enumerate(self.splits):
-            known = TrainingRange.of(weather, train)
-            excess = np.nan_to_num(known.excess(values[test]))
-            unseen = (excess > BEYOND).any(axis=1)
-            if unseen.mean() > worst and unseen.sum() >= LEAST_UNSEEN:
-                worst, column = unseen.mean(), int(excess.max(axis=0).argmax())
-                seen = values[test, column]
-                text = (
-                    f"{unseen.sum()} of {len(test)} records of fold {fold + 1} of {len(self.splits)} are in weather "
-                    f"that the folds they are predicted from do not know: {known.names[column]!r} is there from "
-                    f"{np.nanmin(seen):.4g} to {np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to "
-                    f"{known.highest[column]:.4g}: their residuals are too large, and may hide damage; expected folds "
-                    "that all see each season, as the default cv=None makes, of a year or more"
-                )
-        if text:
-            warn_user(text, "weather of folds")
 
 
 def checked(cv: Any, n_rows: int) -> Any:

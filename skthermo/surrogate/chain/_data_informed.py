@@ -728,10 +728,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         The change of the prediction when those of a sensor are wrong by their standard deviation, in quadrature.
         """
-        T, deviations = self._temperatures(X)
+        T = self._temperatures(X)[0]
         theta, variances = as_columns(self.mapper_.predict(T)), np.zeros((len(T), len(self.mode_names_)))
-        for sensor in np.flatnonzero((deviations > 0).any(axis=0)):
-            errors = np.where(np.arange(deviations.shape[1]) == sensor, np.nan_to_num(deviations), 0.0)
+        for errors in self.sensors_.errors(X):
             moved = as_columns(self.mapper_.predict(T + errors))
             rows = np.flatnonzero((moved != theta).any(axis=1) & ~np.isnan(theta).any(axis=1))
             variances[rows] += (self._frequencies(moved[rows]) / self._frequencies(theta[rows]) - 1) ** 2

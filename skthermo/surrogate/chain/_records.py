@@ -17,19 +17,21 @@ from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._dependence import correlation_time
 from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
-from skthermo._times import has_stamps, row_times
+from skthermo._times import row_times
 from skthermo._validation import last_step
-from skthermo._warnings import warn_user
-from skthermo._weather import TrainingRange, nearest_in_parts, one_in_each_part, order_statistic, weather_coordinates
+from skthermo._weather import (
+    TrainingRange,
+    nearest_in_parts,
+    one_in_each_part,
+    order_statistic,
+    warn_of_unseen,
+    weather_coordinates,
+)
 from skthermo.preprocessing import BlockedKFold
 from skthermo.surrogate.chain._scatter import Scatter
 
 N_FOLDS = 5
 CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
-WEEK = pd.Timedelta("7D")
-BLOCKS = 52  # into which records without stamps are divided at most
-BEYOND = 0.1  # share of the range of the other folds outside which weather counts as unseen
-UNSEEN = 0.1  # share of the records of a fold in unseen weather that gives a warning
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
@@ -262,14 +264,14 @@ class TrainingRecords(SavesFrames):
         if folds is None:
             known = ~np.isnan(own).all(axis=1)
             in_sample = WeatherResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
-            folds = BlockedKFold(N_FOLDS, block=block_length(records, CORRELATION_TIMES * in_sample.correlation_time))
+            folds = BlockedKFold(N_FOLDS).remembering(records, CORRELATION_TIMES * in_sample.correlation_time)
         learner, predicted, fold_of = last_step(mapper), np.full_like(theta, np.nan), np.zeros(len(order), dtype=int)
         for fold, (train, test) in enumerate(folds.split(records)):
             train = train[usable[train]]
             weights = None if self.weights is None else self.weights[order][train]
             fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
             predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
-        warn_of_unseen(inputs, fold_of)
+        warn_of_unseen(inputs, fold_of, "standard deviations, intervals and noise are guesses there")
         values = measured / frequencies_of(predicted) - 1
         known = ~np.isnan(values).all(axis=1)
         return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known])
@@ -278,26 +280,3 @@ class TrainingRecords(SavesFrames):
 def as_frame(table: Any) -> pd.DataFrame:
     """A frame of records, of which the index tells the times."""
     return table if isinstance(table, pd.DataFrame) else pd.DataFrame(as_floats(table), copy=False)
-
-
-def block_length(records: pd.DataFrame, least: float) -> Any:
-    """Of blocks of records in order of time: a week, or a 52nd of the records, and no fewer records than the least."""
-    if not has_stamps(records):
-        return int(np.ceil(max(len(records) / BLOCKS, least)))
-    return max(WEEK, least * pd.Series(records.index).diff().median())
-
-
-def warn_of_unseen(inputs: Array, folds: NDArray[np.intp]) -> None:
-    """Warn if much of the weather of a fold lies outside that of the others."""
-    shares = []
-    for fold in np.unique(folds):
-        test = folds == fold
-        excess = TrainingRange.of(inputs, ~test).excess(inputs[test])
-        shares.append((excess.max(axis=1) > BEYOND).mean())
-    if max(shares) > UNSEEN:
-        warn_user(
-            f"{max(shares):.0%} of the records of fold {int(np.argmax(shares)) + 1} of {len(shares)} are in weather "
-            "that the other folds have not seen: their residuals, and so standard deviations, intervals and noise, are "
-            "those of guesses; expected records of each season in each fold, as of a whole year or more",
-            "unseen weather in folds",
-        )
