@@ -39,7 +39,11 @@ from skthermo.updating import ModelUpdater
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
 
 # scikit-learn checks detectors on 20 to 50 rows.
-pytestmark = pytest.mark.filterwarnings(
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.* independent baseline (records|windows) are too few"),
+    pytest.mark.filterwarnings("ignore:.* baseline records depend on each other"),
+    pytest.mark.filterwarnings(r"ignore:.*\d+ of \d+ rows are not judged \(predict gives 0\), the first row 0"),
+]
     "ignore:.*(independent baseline (records|windows) are too few|baseline records depend on each other)"
 )
 
