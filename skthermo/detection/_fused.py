@@ -70,7 +70,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
     >>> detectors = [("lines", detector(LinearRegression())), ("neighbours", detector(KNeighborsRegressor()))]
     >>> fused = FusedDetector(detectors).fit(baseline)
     >>> print(f"{(fused.predict(later) == -1).mean():.0%} alarms")
-    21% alarms
+    35% alarms
     """
 
     _parameter_constraints: dict = {**DamageDetector._parameter_constraints, "detectors": [list]}

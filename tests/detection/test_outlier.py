@@ -141,11 +141,11 @@ def test_each_record_is_judged_by_a_clone_that_was_fitted_on_records_far_in_time
 
 
 def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
-    """More estimators and lengths: tests/benchmarks/detection_thresholds.py."""
+    """More estimators, lengths and correlations: tests/benchmarks/detection_thresholds.py."""
     rates = {"conformal": [], "quantile": []}
     for seed in range(6):
         noise = np.random.default_rng(seed).normal(size=(50 + 1000 + 2000, 4))
-        baseline, later = np.split(lfilter([1.0], [1.0, -0.7], noise, axis=0)[50:], [1000])
+        baseline, later = np.split(lfilter([1.0], [1.0, -0.8], noise, axis=0)[50:], [1000])
         for threshold, found in rates.items():
             detector = OutlierDetector(LocalOutlierFactor(novelty=True), 0.05, threshold=threshold).fit(baseline)
             found.append((detector.damage_index(later) > detector.threshold_).mean())
