@@ -307,7 +307,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records; `predict`, `predict_interval` and `simulate` warn of the same.
+            records, or a sensor departs from what the others foretell, as one that drifts or is stuck does; `predict`,
+            `predict_interval` and `simulate` warn of the same.
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
@@ -741,9 +742,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         T, deviations = self._temperatures(X)
         inputs = inputs_of_last_step(self.mapper_, T)
         warn_each(gap_warnings(T, deviations, as_floats(inputs)))
-        message = self.training_range_.warning(inputs)
-        if message:
+        if message := self.training_range_.warning(inputs):
             warn_user(message, "weather outside the training range")
+        if message := self.sensors_.warning(X):
+            warn_user(message, "sensor apart from others")
         theta, impossible = possible(self.mapper_.predict(T))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
