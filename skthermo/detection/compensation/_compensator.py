@@ -279,20 +279,20 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -----
         UserWarning
             As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
-            foretell, as one that drifts or is stuck does; if lags find no record.
+            foretell, as one that drifts or is stuck does; if lags find no record in most rows.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         if not hasattr(self.estimator_, "applicability"):  # which says so itself
-            if message := self.training_range_.warning(weather):
-                warn_user(message, "weather outside the training range")
-            if message := self.sensors_.warning(temperatures):
-                warn_user(message, "sensor apart from others")
-        predicted = self.regression_.predict(filled)
-        self.regression_.warn_of_lags(filled, predicted)
-        residuals = as_floats(frequencies) - predicted
+            outside = self.training_range_.warning(weather)
+            if outside:
+                warn_user(outside, "weather outside the training range")
+            apart = self.sensors_.warning(temperatures)
+            if apart:
+                warn_user(apart, "sensor apart from others")
+        residuals = as_floats(frequencies) - self.regression_.predict(filled)
         residuals[np.isnan(weather).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (

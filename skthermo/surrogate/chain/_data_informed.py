@@ -722,7 +722,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     def _weather(self, X: ArrayLike) -> Array:
         """Inputs of M2."""
-        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)[0]))
+        T = self._temperatures(X)[0]
+        return as_floats(inputs_of_last_step(self.mapper_, T))
 
     def _cost_of_gaps(self, X: ArrayLike) -> Array:
         """Relative standard deviations of predictions because temperatures were filled, (n_samples, n_modes).
@@ -742,10 +743,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         T, deviations = self._temperatures(X)
         inputs = inputs_of_last_step(self.mapper_, T)
         warn_each(gap_warnings(T, deviations, as_floats(inputs)))
-        if message := self.training_range_.warning(inputs):
-            warn_user(message, "weather outside the training range")
-        if message := self.sensors_.warning(X):
-            warn_user(message, "sensor apart from others")
+        outside = self.training_range_.warning(inputs)
+        if outside:
+            warn_user(outside, "weather outside the training range")
+        apart = self.sensors_.warning(X)
+        if apart:
+            warn_user(apart, "sensor apart from others")
         theta, impossible = possible(self.mapper_.predict(T))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
