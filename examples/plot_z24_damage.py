@@ -181,7 +181,7 @@ print(simulation_table(bridge, records, fem, found).round(1).to_string())
 #    damage found boosted trees, residuals whitened by weather      82.3       88.8    61.8     99.2
 #
 # The bands hold the measured rates but one: whitened lines find a little less than simulated, because the damage grew
-# during the first two days and is simulated from the first record on. Simulations alone would have led to the same choice
-# of a detector. :doc:`/guide/studies` plans such a study for your own bridge.
+# during the first two days and is simulated from the first record on. Simulations alone would have led to the same
+# choice of a detector. :doc:`/guide/studies` plans such a study for your own bridge.
 
 save_figures(folder)

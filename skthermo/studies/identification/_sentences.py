@@ -71,7 +71,8 @@ def _place_unknown(found: Any) -> str:
     ]
     if not losses:
         return "Which part cannot be said."
-    return f"Which part cannot be said: the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+    best = f"the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+    return f"Which part cannot be said: {best}"
 
 
 def _unnoticed(found: Any) -> str:
