@@ -1,7 +1,7 @@
 """Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,10 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array, as_floats, patterns
 from skthermo._frames import column_names
-from skthermo._gaussian import Gaussian
+from skthermo._gaussian import Gaussian, precisions
+from skthermo._times import has_stamps, row_times
 from skthermo._warnings import warn_user
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
@@ -24,6 +25,10 @@ NUMBERS_AT_ONCE = 4_000_000  # held in memory
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
+FEWEST = 36  # records in a mean departure of a sensor
+LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
+TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
+MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
 
 
 @dataclass(frozen=True)
@@ -93,20 +98,31 @@ def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> N
 
 @dataclass(frozen=True)
 class SensorRegression:
-    """What each sensor shows, given any others, as learned from records."""
+    """What each sensor shows, given any others, as learned from records.
+
+    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records.
+    """
 
     gaussian: Gaussian
     learned: Array
+    reach: TrainingRange
+    usual: Mapping[int, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, temperatures: Any) -> "SensorRegression":
         """Learn from records; a sensor without any value is not learned."""
-        values = _telling_rows(as_floats(temperatures))
-        learned = ~np.isnan(values).all(axis=0)
-        found = Gaussian.of(values[:, learned])
+        values = as_floats(temperatures)
+        telling = _telling_rows(values)
+        learned = ~np.isnan(telling).all(axis=0)
+        found = Gaussian.of(telling[:, learned])
         variances = np.diag(found.covariance)
         own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
-        return cls(Gaussian(found.mean, found.covariance + own), learned)
+        reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
+        sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
+        departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
+        lengths = [length for length in FEWEST << np.arange(20) if length <= LARGEST * len(values)]
+        usual = {length: np.fmax.reduce(np.abs(_running_means(departures, length))) for length in lengths}
+        return replace(sensors, usual=usual)
 
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
@@ -121,6 +137,48 @@ class SensorRegression:
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
         return values, deviations
 
+    def departures(self, temperatures: Any) -> Array:
+        """What each sensor shows minus what the others of its record foretell; NaN where either is missing."""
+        values = as_floats(temperatures)
+        departures = np.full(values.shape, np.nan)
+        for part in parts(len(values), self.learned.sum() ** 2):
+            known = values[part][:, self.learned]
+            masks, of_row = patterns(~np.isnan(known))
+            inverses = precisions(self.gaussian.covariance, masks)
+            own = np.where(masks & (masks.sum(axis=1, keepdims=True) > 1), np.einsum("ijj->ij", inverses), np.nan)
+            scaled = np.einsum("ij,ijk->ik", self.gaussian.centred(known), inverses[of_row])
+            departures[part, self.learned] = scaled / own[of_row]
+        return departures
+
+    def warning(self, temperatures: Any) -> str:
+        """Text of the warning if a sensor departs from the others as it did not in training, else an empty string.
+
+        Records count in which the others are within their training range, if these are most.
+        """
+        order = np.argsort(row_times(temperatures), kind="stable")
+        lengths = [length for length in self.usual if length <= len(order)]
+        if not lengths:
+            return ""
+        values, length = as_floats(temperatures)[order], max(lengths)
+        outside = np.nan_to_num(self.reach.excess(values)) > 0
+        judged = outside.sum(axis=1, keepdims=True) == outside
+        departures = np.where(judged, self.departures(values), np.nan)
+        departures[:, judged.mean(axis=0) < 0.5] = np.nan
+        means, usual = _running_means(departures, length), self.usual[length]
+        limits = np.maximum(TIMES_USUAL * usual, MATTERS * (self.reach.highest - self.reach.lowest))
+        excess = np.nan_to_num(np.abs(means) / np.where(limits > 0, limits, np.inf))
+        place, sensor = np.unravel_index(excess.argmax(), excess.shape)
+        if excess[place, sensor] <= 1:
+            return ""
+        rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
+        first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
+        return (
+            f"{self.reach.names[sensor]!r} departs from what the other sensors foretell in {len(rows)} of {len(order)} "
+            f"rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} records, where "
+            f"training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, which moves "
+            "predictions and gives false alarms; expected NaN where it is wrong, which the other sensors fill"
+        )
+
     def errors(self, temperatures: Any) -> Iterator[Array]:
         """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
 
@@ -134,6 +192,16 @@ class SensorRegression:
             error = np.zeros_like(values)
             error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
             yield error
+
+
+def _running_means(columns: Array, length: int) -> Array:
+    """Means of so many consecutive values, NaN where most are missing."""
+    sums, counts = (
+        np.cumsum(np.vstack([np.zeros(columns.shape[1]), part]), axis=0)
+        for part in (np.nan_to_num(columns), ~np.isnan(columns))
+    )
+    number = counts[length:] - counts[:-length]
+    return np.where(2 * number > length, (sums[length:] - sums[:-length]) / np.maximum(number, 1), np.nan)
 
 
 def _telling_rows(values: Array) -> Array:

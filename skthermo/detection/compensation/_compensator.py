@@ -82,7 +82,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
-        their standard deviations.
+        their standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
     spread_ : object
         Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
         of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -278,18 +278,21 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            As in `fit`; if temperatures are far outside those of `fit`; if lags find no record.
+            As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
+            foretell, as one that drifts or is stuck does; if lags find no record in most rows.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
-        message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
-        if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
-            warn_user(message, "weather outside the training range")
-        predicted = self.regression_.predict(filled)
-        self.regression_.warn_of_lags(filled, predicted)
-        residuals = as_floats(frequencies) - predicted
+        if not hasattr(self.estimator_, "applicability"):  # which says so itself
+            outside = self.training_range_.warning(weather)
+            if outside:
+                warn_user(outside, "weather outside the training range")
+            apart = self.sensors_.warning(temperatures)
+            if apart:
+                warn_user(apart, "sensor apart from others")
+        residuals = as_floats(frequencies) - self.regression_.predict(filled)
         residuals[np.isnan(weather).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (

@@ -307,7 +307,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records; `predict`, `predict_interval` and `simulate` warn of the same.
+            records, or a sensor departs from what the others foretell, as one that drifts or is stuck does; `predict`,
+            `predict_interval` and `simulate` warn of the same.
         """
         return frame_like(X, self._predict_theta(X), self.parameter_names_)
 
@@ -721,7 +722,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     def _weather(self, X: ArrayLike) -> Array:
         """Inputs of M2."""
-        return as_floats(inputs_of_last_step(self.mapper_, self._temperatures(X)[0]))
+        T = self._temperatures(X)[0]
+        return as_floats(inputs_of_last_step(self.mapper_, T))
 
     def _cost_of_gaps(self, X: ArrayLike) -> Array:
         """Relative standard deviations of predictions because temperatures were filled, (n_samples, n_modes).
@@ -741,9 +743,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         T, deviations = self._temperatures(X)
         inputs = inputs_of_last_step(self.mapper_, T)
         warn_each(gap_warnings(T, deviations, as_floats(inputs)))
-        message = self.training_range_.warning(inputs)
-        if message:
-            warn_user(message, "weather outside the training range")
+        outside = self.training_range_.warning(inputs)
+        if outside:
+            warn_user(outside, "weather outside the training range")
+        apart = self.sensors_.warning(X)
+        if apart:
+            warn_user(apart, "sensor apart from others")
         theta, impossible = possible(self.mapper_.predict(T))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
