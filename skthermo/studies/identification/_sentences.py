@@ -67,10 +67,10 @@ def _place_unknown(found: Any) -> str:
         f"{percent(row['severity'], '.1f')} (± {_percent(2 * row['standard_error'])}) in {group}"
         for group, row in possible.iterrows()
     ]
-    text = "Which part cannot be said"
     if not losses:
-        return f"{text}."
-    return f"{text}: the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+        return "Which part cannot be said."
+    best = f"the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+    return f"Which part cannot be said: {best}"
 
 
 def _unnoticed(found: Any) -> str:
