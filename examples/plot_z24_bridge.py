@@ -181,7 +181,7 @@ print("Share of these records in intervals of 90 %:", ", ".join(f"{mode} {share:
 # %%
 # .. code-block:: none
 #
-#    Share of these records in intervals of 90 %: f1 87%, f2 97%, f3 96%, f4 91%
+#    Share of these records in intervals of 90 %: f1 82%, f2 93%, f3 95%, f4 90%
 #
 # :doc:`plot_z24_detection` looks for the damage that followed.
 

@@ -183,9 +183,9 @@ print(pd.concat(tables).round(1).to_string())
 #    chi2             broken lines            6.2          97.7
 #                     boosted trees           7.5          91.5
 #                     chain                   6.8          97.7
-#    isolation forest broken lines            1.2          78.5
-#                     boosted trees           2.0          86.2
-#                     chain                   1.4          80.0
+#    isolation forest broken lines            1.2          80.0
+#                     boosted trees           2.5          86.9
+#                     chain                   1.4          78.5
 #
 # In which weather?
 # -----------------
@@ -253,7 +253,7 @@ print(pd.DataFrame(rows).T.to_string())
 #                                  24h, m-of-n       0 of 32            3 of 10               86.0
 #                                  24, mean          0 of 32            6 of 10               99.0
 #                                  24, m-of-n        0 of 32            4 of 10               91.0
-#    broken lines, forward in time single records    0 of 32            7 of 10               41.0
+#    broken lines, forward in time single records    0 of 32            7 of 10               38.0
 #                                  24h, mean         0 of 32            8 of 10               52.0
 #                                  24h, m-of-n       0 of 32            8 of 10               52.0
 #                                  24, mean          0 of 32            1 of 10               88.0

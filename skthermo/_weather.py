@@ -1,7 +1,9 @@
 """Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +14,23 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo._arrays import Array, as_floats
-from skthermo._frames import column_names
+from skthermo._frames import column_names, frame_like
 from skthermo._gaussian import Gaussian
-from skthermo._warnings import warn_user
+from skthermo._times import has_stamps, row_times
+from skthermo._warnings import warn_user, without_warnings
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
-MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
-LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
+MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
+LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
+FEWEST = 36  # records in a mean departure of a sensor
+LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
+TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
+MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,7 @@ class TrainingRange:
     names: Sequence[Any]
 
     @classmethod
-    def of(cls, inputs: Any, trained: Array) -> "TrainingRange":
+    def of(cls, inputs: Any, trained: Array) -> TrainingRange:
         """The range of a mapper's inputs, over the rows that trained it."""
         values = as_floats(inputs)[trained]
         return cls(np.fmin.reduce(values), np.fmax.reduce(values), column_names(inputs, "T"))
@@ -93,20 +100,31 @@ def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> N
 
 @dataclass(frozen=True)
 class SensorRegression:
-    """What each sensor shows, given any others, as learned from records."""
+    """What each sensor shows, given any others, as learned from records.
+
+    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records.
+    """
 
     gaussian: Gaussian
     learned: Array
+    reach: TrainingRange
+    usual: Mapping[int, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, temperatures: Any) -> "SensorRegression":
+    def of(cls, temperatures: Any) -> SensorRegression:
         """Learn from records; a sensor without any value is not learned."""
-        values = _telling_rows(as_floats(temperatures))
-        learned = ~np.isnan(values).all(axis=0)
-        found = Gaussian.of(values[:, learned])
+        values = as_floats(temperatures)
+        telling = _telling_rows(values)
+        learned = ~np.isnan(telling).all(axis=0)
+        found = Gaussian.of(telling[:, learned])
         variances = np.diag(found.covariance)
         own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
-        return cls(Gaussian(found.mean, found.covariance + own), learned)
+        reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
+        sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
+        departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
+        lengths = [length for length in FEWEST << np.arange(20) if length <= LARGEST * len(values)]
+        usual = {length: np.fmax.reduce(np.abs(_running_means(departures, length))) for length in lengths}
+        return replace(sensors, usual=usual)
 
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
@@ -121,6 +139,45 @@ class SensorRegression:
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
         return values, deviations
 
+    def departures(self, temperatures: Any) -> Array:
+        """What each sensor shows minus what the others of its record foretell; NaN in records with gaps."""
+        values = as_floats(temperatures)
+        departures = np.full(values.shape, np.nan)
+        if self.learned.sum() > 1:
+            precision = np.linalg.inv(self.gaussian.covariance)
+            centred = values[:, self.learned] - self.gaussian.mean
+            departures[:, self.learned] = centred @ precision / np.diag(precision)
+        return departures
+
+    def warning(self, temperatures: Any) -> str:
+        """Text of the warning if a sensor departs from the others as it did not in training, else an empty string.
+
+        Records count in which the others are within their training range, if these are most.
+        """
+        order = np.argsort(row_times(temperatures), kind="stable")
+        lengths = [length for length in self.usual if length <= len(order)]
+        if not lengths:
+            return ""
+        values, length = as_floats(temperatures)[order], max(lengths)
+        outside = np.nan_to_num(self.reach.excess(values)) > 0
+        judged = outside.sum(axis=1, keepdims=True) == outside
+        departures = np.where(judged, self.departures(values), np.nan)
+        departures[:, judged.mean(axis=0) < 0.5] = np.nan
+        means, usual = _running_means(departures, length), self.usual[length]
+        limits = np.maximum(TIMES_USUAL * usual, MATTERS * (self.reach.highest - self.reach.lowest))
+        excess = np.nan_to_num(np.abs(means) / np.where(limits > 0, limits, np.inf))
+        place, sensor = np.unravel_index(excess.argmax(), excess.shape)
+        if excess[place, sensor] <= 1:
+            return ""
+        rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
+        first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
+        return (
+            f"{self.reach.names[sensor]!r} departs from what the other sensors foretell in {len(rows)} of {len(order)} "
+            f"rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} records, where "
+            f"training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, which moves "
+            "predictions and gives false alarms; expected NaN where it is wrong, which the other sensors fill"
+        )
+
     def errors(self, temperatures: Any) -> Iterator[Array]:
         """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
 
@@ -134,6 +191,65 @@ class SensorRegression:
             error = np.zeros_like(values)
             error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
             yield error
+
+
+@dataclass(frozen=True)
+class FillError:
+    """Covariance of the error that filled temperatures bring into predictions, (n_rows, n_modes, n_modes).
+
+    ``rows`` are those whose predictions depend on a filled temperature.
+    """
+
+    rows: NDArray[np.intp]
+    covariances: Array
+
+    @classmethod
+    def of(
+        cls,
+        sensors: SensorRegression,
+        raw: Any,
+        filled: Any,
+        predict: Callable[[Any], Array],
+        outcome: Callable[[Array], Array] = np.asarray,
+    ) -> FillError:
+        """Move what was filled by one standard deviation up and down, sensor by sensor, and predict again.
+
+        The error is that of the ``outcome`` of each prediction.
+        """
+        with without_warnings():
+            middle, moved = np.empty(0), []
+            for error in sensors.errors(raw):
+                middle = middle if moved else predict(filled)
+                moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
+            if not moved:
+                return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
+            rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
+            start = outcome(middle[rows])
+            changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
+        return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
+
+
+def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str:
+    """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
+    filled = deviations > 0
+    sensors = [
+        f"{name!r} in {rows.sum()} of {len(rows)} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
+        for name, rows, sizes in zip(names, filled.T, deviations.T, strict=True)
+        if rows.any()
+    ]
+    if not sensors:
+        return ""
+    return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
+
+
+def _running_means(columns: Array, length: int) -> Array:
+    """Means of so many consecutive values, NaN where most are missing."""
+    sums, counts = (
+        np.cumsum(np.vstack([np.zeros(columns.shape[1]), part]), axis=0)
+        for part in (np.nan_to_num(columns), ~np.isnan(columns))
+    )
+    number = counts[length:] - counts[:-length]
+    return np.where(2 * number > length, (sums[length:] - sums[:-length]) / np.maximum(number, 1), np.nan)
 
 
 def _telling_rows(values: Array) -> Array:

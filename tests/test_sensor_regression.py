@@ -1,10 +1,17 @@
 """Temperatures that other sensors foretell."""
 
+import re
+
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
 from skthermo._weather import SensorRegression
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import TemperatureCompensator
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 
 def records(n_rows, seed=0):
@@ -41,3 +48,74 @@ def test_gaps_while_learning_do_not_matter():
     new[:, 2] = np.nan
     full, half = (SensorRegression.of(table).fill(new)[0][:, 2] for table in (T, gappy))
     assert half == pytest.approx(full, abs=0.5)
+
+
+def dependent_records(n_rows, seed):
+    """Records whose departures are autoregressive, as those of sun and shade are, beside a season."""
+    rng = np.random.default_rng(seed)
+    season = 10 - 10 * np.cos(2 * np.pi * np.arange(n_rows) / n_rows)
+    departures = lfilter([1], [1, -0.9], rng.normal(0, 0.5, (n_rows, 3)), axis=0)
+    return pd.DataFrame(season[:, np.newaxis] * [1.0, 0.8, 1.2] + departures, columns=["air", "girder", "cable"])
+
+
+def test_departures_are_those_from_a_linear_regression_on_the_other_sensors():
+    T, new = records(500), records(50, seed=1)
+    wanted = LinearRegression().fit(T[:, [0, 2]], T[:, 1])
+    departures = SensorRegression.of(T).departures(new)
+    assert departures[:, 1] == pytest.approx(new[:, 1] - wanted.predict(new[:, [0, 2]]), abs=1e-6)
+    new[:, [0, 2]] = np.nan
+    assert np.isnan(SensorRegression.of(T).departures(new)).all()
+
+
+@pytest.mark.parametrize("n_rows", [40, 400, 3000])
+def test_healthy_sensors_are_not_warned_of(n_rows):
+    for seed in range(10):
+        sensors = SensorRegression.of(dependent_records(3000, seed))
+        assert sensors.warning(dependent_records(3000, seed + 100)[1000 : 1000 + n_rows]) == ""
+
+
+def test_a_sensor_that_drifts_is_named_with_rows_and_degrees():
+    sensors, new = SensorRegression.of(dependent_records(3000, 0)), dependent_records(3000, 1)
+    new["girder"] += np.linspace(0, 6, len(new))
+    text = sensors.warning(new)
+    assert text.startswith("'girder' departs from what the other sensors foretell in ")
+    n_rows, first, size = re.search(r"in (\d+) of 3000 rows, row (\d+) the first: by \+([\d.]+) degrees", text).groups()
+    assert int(n_rows) > 1000
+    assert 300 < int(first) < 2000
+    assert float(size) == pytest.approx(5.6, abs=1)
+    backwards = sensors.warning(new.set_axis(pd.date_range("2024", periods=len(new), freq="h"))[::-1])
+    assert backwards == text.replace(f"row {first}", str(pd.Timestamp("2024") + pd.Timedelta(hours=int(first))))
+
+
+def test_a_sensor_that_is_stuck_is_named():
+    sensors, new = SensorRegression.of(dependent_records(3000, 0)), dependent_records(3000, 1)
+    new.loc[1500:, "air"] = new.loc[1500, "air"]
+    assert sensors.warning(new).startswith("'air' departs")
+
+
+def test_weather_that_training_does_not_know_says_nothing_of_sensors():
+    sensors, new = SensorRegression.of(dependent_records(3000, 0)), dependent_records(3000, 1)
+    assert sensors.warning(new + [40.0, 40.0, 60.0]) == ""
+    assert sensors.warning(new + [0.0, 0.0, 60.0]).startswith("'cable' departs")
+    assert SensorRegression.of(new[["air"]]).warning(new[["air"]] + 40) == ""
+
+
+LINEAR_CHAIN = DataInformedFEM(
+    make_truss(),
+    inverse=InverseSurrogate(make_truss(), LinearRegression(), n_samples=200),
+    mapper=TemperatureMapper(LinearRegression()),
+    random_state=0,
+)
+
+
+def test_compensator_and_chain_warn_of_a_sensor_that_departs():
+    year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+    records, new = (one.temperatures.join(one.frequencies) for one in (year, later))
+    compensator = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies)).fit(records)
+    chain = LINEAR_CHAIN.fit(year.temperatures, year.frequencies)
+    name = records.columns[0]
+    new.iloc[200:, 0] += 15
+    for judge in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
+        with pytest.warns(UserWarning, match=f"'{name}' departs from what the other sensors foretell") as caught:
+            judge()
+        assert sum("departs" in str(warning.message) for warning in caught) == 1

@@ -26,6 +26,7 @@ TRANSFORMERS = [
     TemperatureCompensator(make_pipeline(LagFeatures(2), Ridge()), targets=[1, 2]),
 ]
 DETECTORS = [MahalanobisDetector(), OutlierDetector(OneClassSVM())]
+UNRELATED = pytest.mark.filterwarnings("ignore:the temperatures explain nothing of the frequencies")  # of RECORDS
 each_transformer = pytest.mark.parametrize("estimator", TRANSFORMERS, ids=lambda one: type(one).__name__)
 each_estimator = pytest.mark.parametrize("estimator", TRANSFORMERS + DETECTORS, ids=lambda one: type(one).__name__)
 
@@ -60,6 +61,7 @@ def test_columns_of_objects_become_floats():
 
 
 @pytest.mark.filterwarnings("ignore:1 of 60 rows have no temperature at all")
+@UNRELATED
 @each_estimator
 def test_masked_values_are_missing_to_estimators(estimator):
     holed = RECORDS.to_numpy(copy=True)
@@ -80,9 +82,9 @@ def test_masked_values_are_missing_to_estimators(estimator):
     ids=repr,
 )
 def test_complex_numbers_are_refused(values):
-    with pytest.raises(ValueError, match="complex; expected real numbers"):
+    with pytest.raises(ValueError, match=r"complex.*; expected (real )?numbers"):
         as_floats(values)
-    with pytest.raises(ValueError, match="frequencies is complex; expected real numbers"):
+    with pytest.raises(ValueError, match=r"frequencies (is|holds) complex.*; expected (real )?numbers"):
         real_array(values, "frequencies")
 
 
@@ -110,7 +112,8 @@ def test_estimators_refuse_a_generator_by_name():
 @pytest.mark.parametrize("times", [HOURS, HOURS.tz_localize("UTC"), HOURS - HOURS[0]], ids=["stamps", "zone", "spans"])
 @each_estimator
 def test_a_column_of_times_is_refused_by_name(estimator, times):
-    with pytest.raises(ValueError, match=r"column 'stamp' holds times; expected numbers, .*set_index\('stamp'\)"):
+    said = r"column 'stamp' holds times, such as .*; expected numbers, .*set_index\('stamp'\)"
+    with pytest.raises(ValueError, match=said):
         estimator.fit(RECORDS.assign(stamp=times))
 
 
@@ -118,7 +121,7 @@ def test_a_column_of_times_is_refused_by_name(estimator, times):
 def test_a_column_of_times_in_a_polars_frame_is_refused_by_name(estimator):
     polars = pytest.importorskip("polars")
     frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
-    with pytest.raises(ValueError, match="column 'stamp' holds times; expected numbers"):
+    with pytest.raises(ValueError, match=r"column 'stamp' holds times, such as .*; expected numbers"):
         estimator.fit(frame.with_columns(polars.Series("stamp", range(60)).cast(polars.Datetime)))
 
 
@@ -132,6 +135,7 @@ def test_frames_keep_their_columns_and_index():
     pd.testing.assert_frame_equal(frame_like(RECORDS, RECORDS.to_numpy()), RECORDS, check_freq=False)
 
 
+@UNRELATED
 @each_transformer
 def test_columns_named_by_integers_keep_their_names(estimator):
     numbered = RECORDS.set_axis([0, 1, 2], axis=1)

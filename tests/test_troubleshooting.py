@@ -18,7 +18,7 @@ ERRORS = "The most common errors"
 HELPER = "_warnings.py"
 """The file that gives the warnings of others."""
 
-REPORTS = ["_sentences", "_doubts", "summary", "likely_cause", "answer", "limits"]
+REPORTS = ["_sentences", "_doubts", "summary", "likely_cause", "answer", "limits", "sentences"]
 """Functions whose sentences tell what is doubtful."""
 
 
@@ -34,7 +34,12 @@ class Source:
     def __init__(self, files):
         self.trees = {name: ast.parse(text) for name, text in files.items()}
         self.functions = defaultdict(list)
+        self.constants = defaultdict(list)
         for tree in self.trees.values():
+            for node in tree.body:
+                match node:
+                    case ast.Assign(targets=[ast.Name(id=name)], value=ast.Dict() as value):
+                        self.constants[name].append(value)
             for node in ast.walk(tree):
                 if isinstance(node, ast.FunctionDef):
                     self.functions[node.name].append(node)
@@ -87,6 +92,9 @@ class Source:
                 return self.texts(value, function)
             case ast.Name(id=name):
                 return {text for value in assigned(name, function) for text in self.texts(value, function)} or {ANY}
+            case ast.Call(func=ast.Attribute(attr="format", value=ast.Subscript(value=ast.Name(id=name)))):
+                templates = [item for value in self.constants[name] for item in value.values]
+                return {re.sub(r"{.*?}", ANY, text) for item in templates for text in self.texts(item, function)}
             case ast.Call(func=ast.Name(id="str"), args=[ast.Name(id=name)]) if caught(name, function):
                 return {text for checks in caught(name, function) for text in self.errors(checks)}
             case ast.Call(func=ast.Attribute(attr="join"), args=[items]):
@@ -219,6 +227,11 @@ def caught(n):
     except ValueError as error:
         warn_user(str(error), "kind")
 
+FORMS = {0: "{} is calm.", 1: "{} has {} of wind."}
+
+def formatted(n):
+    warn_user(FORMS[n].format(n, n), "kind")
+
 def hidden(n):
     warn_user(n, "kind")
 """
@@ -232,6 +245,7 @@ def test_a_new_warning_is_found_whatever_form_it_has():
         {"row … is dry"},
         {"row … is windy"},
         {"row … is frozen"},
+        {"… is calm.", "… has … of wind."},
         None,
     ]
     assert not explains("row … is dry", "… rows are wet")

@@ -175,7 +175,7 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
         return frame_like(X, cleaned)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
-        n_least = 1 if self.targets is None else 2
+        n_least = 2 if reset and self.targets is not None else 1
         options = {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan", "ensure_min_features": n_least}
         return validate_data(self, X, reset=reset, **options)
 

@@ -9,6 +9,7 @@ import pandas as pd
 from skthermo._arrays import as_floats, spread_evenly
 from skthermo._formatting import counted, period_text, share_text, significant
 from skthermo._frames import column_names
+from skthermo._warnings import without_warnings
 from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_histories, draw_over_temperature
 from skthermo.reporting._findings import REFERENCE, SIMULATED
 from skthermo.reporting._html import Html, bullets, element, figure, paragraphs, section, table
@@ -174,7 +175,8 @@ def _step(index: pd.Index) -> str:
 def _over_temperature(fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.Series]:
     """Measured and predicted frequencies of some rows, evenly spread, and the temperature that they follow."""
     rows = spread_evenly(np.arange(len(T)), MOST_PREDICTED)
-    theta = as_floats(fem.predict_parameters(fem.training_records_[0]))[rows]
+    with without_warnings():  # the report of the fit counts the gaps of these records
+        theta = as_floats(fem.predict_parameters(fem.training_records_[0]))[rows]
     frequencies = as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
     measured = F.iloc[rows]
     predicted = pd.DataFrame(frequencies, measured.index, measured.columns)

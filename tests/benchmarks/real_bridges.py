@@ -26,6 +26,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 EXPECTED_WARNINGS = (
     r"\d+ of \d+ rows have temperatures far outside",
     "groups that these modes cannot tell apart",
+    r"\d+ of 130 records could not be compared",
+    "damage of these groups does not explain the shifts",
+    r"\d+ of \d+ rows cannot be predicted and are NaN",
     r"\d+ independent baseline records are too few",  # of windows, in ten days
 )
 
@@ -55,12 +58,12 @@ def targets_of_detection(bridge):
 def targets_of_identification(bridge):
     """The damage that explains the shifts, and the rates that it lets one expect."""
     fem, found = damage.identify(bridge)
-    unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
+    unexplained = 100 * (found.shifts["measured"] - found.shifts["explained"])
     names = [f"broken lines, {label}" for label in z24.SCALES]
     table = damage.simulation_table(bridge, z24.Records.of(bridge), fem, found, names, n_repeats=10)
     rates = table.loc["damage found"]
     outside = ~rates["measured"].between(rates["lowest"], rates["highest"])
-    yield "unexplained shift, standard errors, largest", unexplained.abs().max(), "< 2"
+    yield "unexplained shift, %, largest", unexplained.abs().max(), "< 1"
     yield "the soil's damage is significant", float(found.table.loc["soil", "significant"]), ">= 1"
     yield "measured rates outside the simulated band", float(outside.sum()), "<= 0"
 

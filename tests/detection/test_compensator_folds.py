@@ -49,6 +49,7 @@ def test_blocks_are_longer_than_the_memory_of_the_residuals():
     assert rows == pytest.approx(5 * (1 + 0.95) / (1 - 0.95), rel=0.35)
 
 
+@pytest.mark.filterwarnings("ignore:what the weather leaves of the frequencies has a trend")
 def test_every_fold_keeps_two_blocks():
     fitted = compensator().fit(year(memory=0.999))
     assert fitted.block_ <= pd.Timedelta("36.5D")
@@ -111,6 +112,7 @@ def winter_year():
     return records
 
 
+@pytest.mark.filterwarnings("ignore:lags reach 2 rows back")  # before the first row of a fold
 def test_lags_inside_an_estimator_keep_rows_without_stamps_together():
     mapper = make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression()))
     with pytest.warns(UserWarning, match="rows have no stamps, and lags inside DataInformedFEM would take rows of"):
@@ -146,6 +148,7 @@ def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
 
 
 @pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows are not judged")
+@pytest.mark.filterwarnings("ignore:lags reach 24 h back; the first record given is")
 def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -159,10 +162,10 @@ def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
 def test_a_day_alone_says_what_lags_lack(service):
     detector, later = service
     said = (
-        "8 of 8 rows are not judged: lags reach 1 days 00:00:00 back, to where no record is; the first record given is "
-        "2026-03-04 00:00:00: give the 1 days 00:00:00 before, too"
+        "lags reach 24 h back; the first record given is 2026-03-04 00:00:00, and 8 of 8 rows have a lag before it "
+        "that finds no record; give the 24 h before, too"
     )
-    with pytest.warns(UserWarning, match="not judged") as given:
+    with pytest.warns(UserWarning, match="give the 24 h before") as given:
         residuals = detector[0].transform(later.loc["2026-03-04"])
     assert [str(warning.message) for warning in given] == [said]
     assert residuals.isna().all(axis=None)

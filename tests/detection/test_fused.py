@@ -99,7 +99,10 @@ def test_windows_and_records_can_be_fused():
     ("detectors", "message"),
     [
         ([], "detectors is an empty list"),
-        ([("a", behind(LinearRegression())), ("a", behind(LinearRegression()))], "Names provided are not unique"),
+        (
+            [("a", behind(LinearRegression())), ("a", behind(LinearRegression()))],
+            "with names of their own",
+        ),
         ([("forest", behind(LinearRegression(), IsolationForest()))], "detector 'forest' ends with IsolationForest"),
         (
             [("svm", behind(LinearRegression(), OutlierDetector(OneClassSVM(nu=0.5))))],

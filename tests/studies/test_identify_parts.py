@@ -5,7 +5,14 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies.identification._bounded_fit import fit_severities, p_of_damage, p_of_group, p_of_misfit, redrawn
+from skthermo.studies.identification._bounded_fit import (
+    fit_severities,
+    p_of_damage,
+    p_of_group,
+    p_of_misfit,
+    redrawn,
+    widening_of,
+)
 from skthermo.studies.identification._comparison import Comparison, Part
 from skthermo.studies.identification._frequency_effects import FrequencyEffects
 from skthermo.studies.identification._identify import read_groups
@@ -117,6 +124,20 @@ def test_p_values_of_healthy_structures_are_uniform():
     assert np.mean([p_of_damage(fit, 1e4, 100, random) < 0.05 for fit in fits[:200]]) < 0.08
     few = linear_fit(slopes[:2], random.standard_normal(2) + slopes[:2].sum(axis=1))
     assert np.isnan(p_of_misfit(few, 1e4)) == (np.count_nonzero(few.severities) >= 2)
+
+
+def test_errors_widened_by_a_misfit_make_it_likely():
+    slopes, wild = np.eye(6)[:, :1], np.array([8.0, 3.0, -3.0, 3.0, -3.0, 3.0])
+
+    def fit(shift):
+        return fit_severities(lambda severities: (slopes @ severities, slopes), shift, np.eye(6), 1)
+
+    assert widening_of(fit(wild)) == pytest.approx(np.sqrt(fit(wild).misfit / 5))
+    assert p_of_misfit(fit(wild), 1e4) < 0.01 < p_of_misfit(fit(wild / widening_of(fit(wild))), 1e4)
+    assert widening_of(fit(0.1 * wild)) == 1
+    draws = (redrawn(40 * slopes, 16 * slopes[:, 0], 500, np.random.RandomState(0), widening=w) for w in (2.0, 1.0))
+    wide, usual = (draw.std() for draw in draws)
+    assert wide == pytest.approx(2 * usual)
 
 
 def test_redrawn_fits_scatter_as_least_squares_says():

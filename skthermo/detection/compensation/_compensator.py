@@ -16,6 +16,7 @@ from skthermo._frames import (
     check_columns,
     check_positions_are_names,
     check_temperatures,
+    column_names,
     frame_like,
     positions_of,
     warn_of_disorder,
@@ -34,10 +35,9 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user, warnings_once
-from skthermo._weather import SensorRegression, TrainingRange, warn_of_unseen
+from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, warn_of_unseen
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
-from skthermo.detection.compensation._gaps import FillError, fill_temperatures
 from skthermo.detection.compensation._local_covariance import rows_near_in_time
 from skthermo.detection.compensation._whitening import Spread
 from skthermo.preprocessing import check_records
@@ -82,7 +82,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
-        their standard deviations.
+        their standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
     spread_ : object
         Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
         of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -278,18 +278,21 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            As in `fit`; if temperatures are far outside those of `fit`; if lags find no record.
+            As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
+            foretell, as one that drifts or is stuck does; if lags find no record in most rows.
         """
         check_is_fitted(self)
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
-        message = "" if np.isnan(weather).any(axis=1).all() else self.training_range_.warning(weather)
-        if message and not hasattr(self.estimator_, "applicability"):  # which says so itself
-            warn_user(message, "weather outside the training range")
-        predicted = self.regression_.predict(filled)
-        self.regression_.warn_of_lags(filled, predicted)
-        residuals = as_floats(frequencies) - predicted
+        if not hasattr(self.estimator_, "applicability"):  # which says so itself
+            outside = self.training_range_.warning(weather)
+            if outside:
+                warn_user(outside, "weather outside the training range")
+            apart = self.sensors_.warning(temperatures)
+            if apart:
+                warn_user(apart, "sensor apart from others")
+        residuals = as_floats(frequencies) - self.regression_.predict(filled)
         residuals[np.isnan(weather).all(axis=1)] = np.nan
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (
@@ -398,6 +401,22 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             "lags without stamps",
         )
         return "contiguous"
+
+
+def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
+    """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
+    filled, deviations = sensors.fill(temperatures)
+    consequence = "the spread of residuals is widened by what that costs"
+    message = told_fills(deviations, column_names(temperatures, "x"), consequence)
+    if message:
+        warn_user(message, "filled temperatures")
+    empty = np.isnan(as_floats(temperatures)).all(axis=1)
+    if empty.any():
+        warn_user(
+            f"{empty.sum()} of {len(empty)} rows have no temperature at all: they are not judged",
+            "without temperature",
+        )
+    return frame_like(temperatures, filled)
 
 
 def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:

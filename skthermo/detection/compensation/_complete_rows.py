@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -21,7 +20,6 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
-from skthermo._warnings import warn_user
 from skthermo.detection.compensation._folds import Folds
 from skthermo.preprocessing import LagFeatures
 
@@ -54,22 +52,6 @@ class Regression:
         predicted = cross_val_predict(clone(self.rest), self._inputs(X), y, cv=partition, params={})
         predicted[folds.untested] = np.nan
         return predicted
-
-    def warn_of_lags(self, X: Any, predicted: NDArray[np.float64]) -> None:
-        """Warn of rows with temperatures that have no prediction, because a lag finds no record."""
-        lost = np.isnan(predicted).all(axis=1) & ~np.isnan(as_floats(X)).all(axis=1)
-        lags = [part for part in self.estimator.get_params(deep=True).values() if hasattr(part, "lags_")]
-        if not lost.any() or not lags:
-            return
-        longest = max(lags, key=lambda part: max(part.lags_))
-        steps = max(longest.lags_)
-        reach = f"{steps} rows" if longest.freq_ is None else f"{pd.Timedelta(steps * longest.freq_)}"
-        first = X.index[0] if isinstance(X, pd.DataFrame) else "row 0"
-        warn_user(
-            f"{lost.sum()} of {len(lost)} rows are not judged: lags reach {reach} back, to where no record is; the "
-            f"first record given is {first}: give the {reach} before, too",
-            "lags without records",
-        )
 
     def _inputs(self, X: Any) -> Any:
         return X if self.head is None else self.head.transform(X)

@@ -12,6 +12,7 @@ from scipy.stats import chi
 
 from skthermo._arrays import Array
 from skthermo._gaussian import Gaussian, check_invertible
+from skthermo._warnings import without_warnings
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._patterns import as_if_complete
 from skthermo.detection.windows._windows import Windows
@@ -80,7 +81,8 @@ class CountLaw:
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window; NaN where no record has a mode."""
-        single = self.detector.damage_index(windows.rows)
+        with without_warnings():  # the alarm counts windows that are not judged
+            single = self.detector.damage_index(windows.rows)
         padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
         last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)
         inside = np.arange(windows.longest) >= windows.longest - windows.sizes[:, np.newaxis]

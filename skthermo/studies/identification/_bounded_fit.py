@@ -65,10 +65,15 @@ def drawn_errors(shape: tuple[int, int], freedom: float, random: np.random.Rando
 
 
 def redrawn(
-    slopes: Array, around: Array, n_draws: int, random: np.random.RandomState, freedom: float = np.inf
+    slopes: Array,
+    around: Array,
+    n_draws: int,
+    random: np.random.RandomState,
+    freedom: float = np.inf,
+    widening: float = 1.0,
 ) -> Array:
-    """Severities fitted to whitened shifts with redrawn errors, (n_draws, n_groups)."""
-    errors = drawn_errors((n_draws, len(around)), freedom, random)
+    """Severities fitted to whitened shifts with redrawn errors, so many times as wide, (n_draws, n_groups)."""
+    errors = widening * drawn_errors((n_draws, len(around)), freedom, random)
     return np.array([solve(slopes, around + error) for error in errors]).reshape(n_draws, slopes.shape[1])
 
 
@@ -130,8 +135,19 @@ def p_of_group(fit: BoundedFit, without: BoundedFit, freedom: float, column: int
 
 def p_of_misfit(fit: BoundedFit, freedom: float) -> float:
     """p-value (F) of the misfit if only these groups changed; NaN without more modes than damaged groups."""
-    rest = len(fit.target) - np.count_nonzero(fit.severities)
+    rest = n_left(fit)
     return float(stats.f.sf(fit.misfit / rest, rest, freedom)) if rest > 0 else float("nan")
+
+
+def widening_of(fit: BoundedFit) -> float:
+    """Birge's ratio: how many times as large errors would make such a misfit likely; at least 1."""
+    rest = n_left(fit)
+    return max(float(np.sqrt(fit.misfit / rest)), 1.0) if rest > 0 else 1.0
+
+
+def n_left(fit: BoundedFit) -> int:
+    """Number of observations that severities leave free."""
+    return len(fit.target) - int(np.count_nonzero(fit.severities))
 
 
 def _misfit(slopes: Array, target: Array) -> float:

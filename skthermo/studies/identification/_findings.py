@@ -12,6 +12,7 @@ from skthermo.studies.identification._bounded_fit import (
     redrawn,
     standard_errors,
     two_errors,
+    widening_of,
 )
 from skthermo.studies.identification._compared import ComparedRecords
 from skthermo.studies.identification._comparison import Comparison
@@ -37,11 +38,14 @@ def findings(
     """
     fit, names, at_nominal = comparison.fit(), list(comparison.names), nominal.slopes()
     confused = list(dict.fromkeys(confused_groups(at_nominal) + confused_groups(fit.slopes)))
-    draws = redrawn(fit.slopes, fit.target, N_DRAWS, random, shift.freedom)
+    misfit_p_value = p_of_misfit(fit, shift.freedom)
+    widening = widening_of(fit) if misfit_p_value < significance else 1.0
+    draws = redrawn(fit.slopes, fit.target, N_DRAWS, random, shift.freedom, widening)
     errors, covariance = standard_errors(fit, N_DRAWS, random)
     for column in {column for group in confused for column in group}:
         errors[column] = max(errors[column], error_beside(at_nominal, fit.severities, column))
     factor = two_errors(shift.freedom)
+    errors, covariance = widening * errors, widening**2 * covariance
     p_value, p_values = p_of_damage(fit, shift.freedom, N_DRAWS, random), []
     for column, severity in enumerate(fit.severities):
         others = [[other] for other in range(len(names)) if other != column]
@@ -51,7 +55,7 @@ def findings(
         {
             "severity": fit.severities,
             "standard_error": factor * errors,
-            "error_alone": factor * errors_alone(fit.slopes),
+            "error_alone": factor * widening * errors_alone(fit.slopes),
             "p_value": p_values,
             "significant": (np.array(p_values) < significance / len(names)) & (p_value <= significance),
         },
@@ -69,7 +73,8 @@ def findings(
         members=comparison.contents,
         p_value=p_value,
         misfit=fit.misfit,
-        misfit_p_value=p_of_misfit(fit, shift.freedom),
+        misfit_p_value=misfit_p_value,
+        widening=widening,
         records=records,
         significance=significance,
         converged=fit.converged,

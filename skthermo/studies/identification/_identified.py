@@ -55,6 +55,9 @@ class IdentifiedDamage:
     misfit, misfit_p_value : float
         Sum of squared differences between measured and explained shifts, in standard errors, and the probability of a
         larger one if these groups are all that changed. A low one says that something else changed too.
+    widening : float
+        Factor of standard errors, covariance and draws of the severities where damage does not explain the shifts: the
+        root of the misfit over its degrees of freedom (Birge's ratio); else 1.
     records : ComparedRecords
         The records that were compared, those that could not be, by reason, and how many independent ones they are
         worth.
@@ -94,6 +97,7 @@ class IdentifiedDamage:
     p_value: float
     misfit: float
     misfit_p_value: float
+    widening: float
     records: ComparedRecords
     significance: float
     converged: bool

@@ -103,12 +103,12 @@ def identify_damage(
     Severities follow from non-negative least squares in standard errors of the shifts,
     repeated with exact derivatives on the damaged model until they no longer change. Their standard errors are
     those of the bounded estimate, from fits to redrawn shifts, and not below half of what a severity can grow by
-    until the fit is worse by two standard errors, however the other groups adapt. A group is significant if the
-    best fit without it is worse by more than errors would make it (one-sided, Bonferroni over the groups) and if all
-    groups together explain more than chance would. What
-    groups have in common is judged at the model's nominal state, too, because a chain may have drifted out of the
-    symmetry of its structure; the standard error of a group in such a set covers what the others could take from
-    it.
+    until the fit is worse by two standard errors, however the other groups adapt. Where damage does not explain the
+    shifts, they are widened by Birge's ratio, the root of the misfit over its degrees of freedom. A group is
+    significant if the best fit without it is worse by more than errors would make it (one-sided, Bonferroni over
+    the groups) and if all groups together explain more than chance would. What groups have in common is judged at
+    the model's nominal state, too, because a chain may have drifted out of the symmetry of its structure; the
+    standard error of a group in such a set covers what the others could take from it.
 
     Examples
     --------

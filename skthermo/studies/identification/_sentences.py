@@ -22,15 +22,13 @@ OF_GROUP = {
 def damaged(found: Any) -> pd.Series:
     """Whether each group is damaged, in words.
 
-    Where damage does not explain the shifts, standard errors are multiplied by the largest unexplained shift of a mode
-    in standard errors, and a severity within two of them is doubtful.
+    Where damage does not explain the shifts, standard errors are widened; a severity within two of them is doubtful.
     """
     table = found.table
     answers = pd.Series(NO, table.index).mask(table["significant"].eq(True), YES)  # missing where a group is not seen
     if not found.is_unexplained:
         return answers
-    factor = max(np.nanmax(np.abs(found.unexplained), initial=1.0), 1.0)
-    small = table["severity"] < 2 * factor * table["standard_error"]
+    small = table["severity"] < 2 * table["standard_error"]
     return answers.mask(answers == YES, small.map({True: DOUBTFUL, False: ALONE}))
 
 
@@ -51,8 +49,8 @@ def _first(found: Any) -> str:
     if found.is_evident and found.is_unexplained:
         return (
             f"Something has changed (probability by chance {chance}), and damage of these groups does not explain all "
-            f"of it (probability of such a misfit by chance {misfit}): severities may be wrong by more than their "
-            "uncertainties."
+            f"of it (probability of such a misfit by chance {misfit}): uncertainties are {found.widening:.1f} times as "
+            "wide for that."
         )
     if found.is_unexplained:
         return f"Something has changed, but no damage of these groups explains it (probability by chance {misfit})."
@@ -69,10 +67,10 @@ def _place_unknown(found: Any) -> str:
         f"{percent(row['severity'], '.1f')} (± {_percent(2 * row['standard_error'])}) in {group}"
         for group, row in possible.iterrows()
     ]
-    text = "Which part cannot be said"
     if not losses:
-        return f"{text}."
-    return f"{text}: the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+        return "Which part cannot be said."
+    best = f"the best explanation is a loss of {listed(losses)}, none of them clear by itself."
+    return f"Which part cannot be said: {best}"
 
 
 def _unnoticed(found: Any) -> str:
