@@ -1,6 +1,8 @@
 """Weather of records: its range, similar records, and temperatures that other sensors foretell."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,19 +13,19 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._arrays import Array, as_floats, patterns
-from skthermo._frames import column_names
-from skthermo._gaussian import Gaussian, precisions
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import column_names, frame_like
+from skthermo._gaussian import Gaussian
 from skthermo._times import has_stamps, row_times
-from skthermo._warnings import warn_user
+from skthermo._warnings import warn_user, without_warnings
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
-MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
-LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
+MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
+LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
 FEWEST = 36  # records in a mean departure of a sensor
 LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
@@ -40,7 +42,7 @@ class TrainingRange:
     names: Sequence[Any]
 
     @classmethod
-    def of(cls, inputs: Any, trained: Array) -> "TrainingRange":
+    def of(cls, inputs: Any, trained: Array) -> TrainingRange:
         """The range of a mapper's inputs, over the rows that trained it."""
         values = as_floats(inputs)[trained]
         return cls(np.fmin.reduce(values), np.fmax.reduce(values), column_names(inputs, "T"))
@@ -109,7 +111,7 @@ class SensorRegression:
     usual: Mapping[int, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, temperatures: Any) -> "SensorRegression":
+    def of(cls, temperatures: Any) -> SensorRegression:
         """Learn from records; a sensor without any value is not learned."""
         values = as_floats(temperatures)
         telling = _telling_rows(values)
@@ -138,16 +140,13 @@ class SensorRegression:
         return values, deviations
 
     def departures(self, temperatures: Any) -> Array:
-        """What each sensor shows minus what the others of its record foretell; NaN where either is missing."""
+        """What each sensor shows minus what the others of its record foretell; NaN in records with gaps."""
         values = as_floats(temperatures)
         departures = np.full(values.shape, np.nan)
-        for part in parts(len(values), self.learned.sum() ** 2):
-            known = values[part][:, self.learned]
-            masks, of_row = patterns(~np.isnan(known))
-            inverses = precisions(self.gaussian.covariance, masks)
-            own = np.where(masks & (masks.sum(axis=1, keepdims=True) > 1), np.einsum("ijj->ij", inverses), np.nan)
-            scaled = np.einsum("ij,ijk->ik", self.gaussian.centred(known), inverses[of_row])
-            departures[part, self.learned] = scaled / own[of_row]
+        if self.learned.sum() > 1:
+            precision = np.linalg.inv(self.gaussian.covariance)
+            centred = values[:, self.learned] - self.gaussian.mean
+            departures[:, self.learned] = centred @ precision / np.diag(precision)
         return departures
 
     def warning(self, temperatures: Any) -> str:
@@ -192,6 +191,55 @@ class SensorRegression:
             error = np.zeros_like(values)
             error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
             yield error
+
+
+@dataclass(frozen=True)
+class FillError:
+    """Covariance of the error that filled temperatures bring into predictions, (n_rows, n_modes, n_modes).
+
+    ``rows`` are those whose predictions depend on a filled temperature.
+    """
+
+    rows: NDArray[np.intp]
+    covariances: Array
+
+    @classmethod
+    def of(
+        cls,
+        sensors: SensorRegression,
+        raw: Any,
+        filled: Any,
+        predict: Callable[[Any], Array],
+        outcome: Callable[[Array], Array] = np.asarray,
+    ) -> FillError:
+        """Move what was filled by one standard deviation up and down, sensor by sensor, and predict again.
+
+        The error is that of the ``outcome`` of each prediction.
+        """
+        with without_warnings():
+            middle, moved = np.empty(0), []
+            for error in sensors.errors(raw):
+                middle = middle if moved else predict(filled)
+                moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
+            if not moved:
+                return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
+            rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
+            start = outcome(middle[rows])
+            changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
+        return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
+
+
+def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str:
+    """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
+    filled = deviations > 0
+    sensors = [
+        f"{name!r} in {rows.sum()} of {len(rows)} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
+        for name, rows, sizes in zip(names, filled.T, deviations.T, strict=True)
+        if rows.any()
+    ]
+    if not sensors:
+        return ""
+    return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
 
 
 def _running_means(columns: Array, length: int) -> Array:

@@ -139,8 +139,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
         ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
     ],
-    ("surrogate/chain/_data_informed.py", "surrogate/test_uncertainty.py"): [
-        ("cost of filled temperatures", "variances[rows] += (", "variances[rows] += 0 * ("),
+    ("_weather.py", "test_sensor_regression.py"): [
+        ("sensors in unknown weather", "np.nan_to_num(self.reach.excess(values)) > 0", "values > 1e9"),
+        ("usual departures of sensors", "TIMES_USUAL * usual", "0.5 * usual"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
@@ -156,6 +157,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_weather.py", "surrogate/test_uncertainty.py"): [
+        ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
         ("correlation time", "time += 2 * correlation", "time += correlation"),
     ],

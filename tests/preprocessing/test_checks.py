@@ -102,6 +102,21 @@ class TestTime:
         array = one(check_records(T.to_numpy(), F.shift(shift).to_numpy()))
         assert array["detail"] == found["detail"].replace(" (about 60 days)", "")
 
+    @pytest.mark.parametrize("shift", [60, -60, 160, -160])
+    def test_a_shift_of_days_is_found_in_three_hourly_records_that_season_and_day_rule(self, shift):
+        random = np.random.default_rng(0)
+        hours, index = 3 * np.arange(2920), pd.date_range("2025-01-01", periods=2920, freq="3h")
+        fronts = 6 * pd.Series(random.standard_normal(2920)).ewm(halflife=12).mean().to_numpy()
+        cycles = 4 * np.sin(2 * np.pi * hours / 24) - 11 * np.cos(2 * np.pi * hours / 8760)
+        air = 10 + fronts + cycles
+        deck = pd.Series(air).ewm(halflife=2).mean().to_numpy()
+        modes = 4 - np.outer(deck, [0.005, 0.01]) + 0.015 * random.standard_normal((2920, 2))
+        late = np.roll(np.column_stack([air, deck]), shift, axis=0)
+        tables = [pd.DataFrame(table, index).iloc[abs(shift) : -abs(shift)] for table in (late, modes)]
+        found = one(check_records(*tables))
+        assert found["what"] == "time shift"
+        assert f"{abs(shift)} rows {'after' if shift > 0 else 'before'}" in found["detail"]
+
     @pytest.mark.parametrize("lag", [2, 12])
     def test_inertia_is_no_shift(self, lag):
         random = np.random.default_rng(0)
@@ -162,6 +177,28 @@ class TestOutliers:
         changed = F.copy()
         changed.iloc[300:, 0] *= 0.8
         assert "outliers" not in set(check_records(T, changed).table["what"])
+
+
+class TestStep:
+    @pytest.mark.parametrize(("start", "modes"), [(100, [0, 1, 2, 3, 4, 5]), (182, [1]), (250, [1, 4])])
+    def test_a_level_that_changes_at_once_is_placed_and_measured(self, start, modes):
+        changed = F.copy()
+        changed.iloc[start:, modes] *= 0.97
+        table = check_records(T, changed).table
+        assert table["what"].tolist() == ["step"] * len(modes)
+        assert table["column"].tolist() == [f"f{mode + 1}" for mode in modes]
+        for mode, detail in zip(modes, table["detail"], strict=True):
+            change, at = detail.split("by ")[1].split(" Hz about ")
+            assert float(change) == pytest.approx(-0.03 * F.iloc[:, mode].mean(), rel=0.25)
+            assert abs((pd.Timestamp(at[:10]) - F.index[start]).days) <= 12
+
+    def test_a_retrofit_is_not_taken_for_temperatures_of_other_days(self):
+        random, day = np.random.default_rng(0), np.arange(465)
+        air = 11 - 9 * np.cos(2 * np.pi * day / 365) + 2 * random.standard_normal(465)
+        mode = 2.92 - 0.001 * air + 0.06 * (day >= 292) + 0.004 * random.standard_normal(465)
+        found = one(check_records(air[:, np.newaxis], mode[:, np.newaxis]))
+        assert found["what"] == "step"
+        assert "Hz about row 29" in found["detail"]
 
 
 class TestTrend:

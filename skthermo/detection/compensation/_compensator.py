@@ -16,6 +16,7 @@ from skthermo._frames import (
     check_columns,
     check_positions_are_names,
     check_temperatures,
+    column_names,
     frame_like,
     positions_of,
     warn_of_disorder,
@@ -34,10 +35,9 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user, warnings_once
-from skthermo._weather import SensorRegression, TrainingRange, warn_of_unseen
+from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, warn_of_unseen
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
-from skthermo.detection.compensation._gaps import FillError, fill_temperatures
 from skthermo.detection.compensation._local_covariance import rows_near_in_time
 from skthermo.detection.compensation._whitening import Spread
 from skthermo.preprocessing import check_records
@@ -401,6 +401,22 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             "lags without stamps",
         )
         return "contiguous"
+
+
+def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
+    """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
+    filled, deviations = sensors.fill(temperatures)
+    consequence = "the spread of residuals is widened by what that costs"
+    message = told_fills(deviations, column_names(temperatures, "x"), consequence)
+    if message:
+        warn_user(message, "filled temperatures")
+    empty = np.isnan(as_floats(temperatures)).all(axis=1)
+    if empty.any():
+        warn_user(
+            f"{empty.sum()} of {len(empty)} rows have no temperature at all: they are not judged",
+            "without temperature",
+        )
+    return frame_like(temperatures, filled)
 
 
 def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:

@@ -10,8 +10,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, patterns, spread_evenly
 from skthermo._gaussian import Gaussian, check_invertible, whiten_by, whitenings
-from skthermo._weather import TrainingRange, nearest, weather_coordinates
-from skthermo.detection.compensation._gaps import FillError
+from skthermo._weather import FillError, TrainingRange, nearest, weather_coordinates
 from skthermo.detection.compensation._local_covariance import (
     CANDIDATES,
     NEAR_IN_TIME,

@@ -155,8 +155,9 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
     for node in element.nodes:
         if not isinstance(node, Hashable) or node not in coordinates:
             raise ValueError(f"member {name!r} ends at node {node!r:.100}; expected one of the nodes")
-    if not isinstance(getattr(element, "lumped", False), bool):
-        raise ValueError(f"member {name!r} has lumped = {element.lumped!r:.100}; expected True or False")
+    lumped = getattr(element, "lumped", False)
+    if not isinstance(lumped, bool):
+        raise ValueError(f"member {name!r} has lumped = {lumped!r:.100}; expected True or False")
     ends = element.ends(np.array([coordinates[node] for node in element.nodes]))
     if len(ends) == 2 and np.array_equal(*ends):
         first, last = element.nodes

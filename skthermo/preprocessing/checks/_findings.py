@@ -19,7 +19,7 @@ from skthermo.preprocessing._weather_regression import WeatherBasis, median, out
 from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
 from skthermo.preprocessing.checks._stuck import stuck_runs
 from skthermo.preprocessing.checks._swaps import swapped_modes
-from skthermo.preprocessing.checks._trend import trend_table
+from skthermo.preprocessing.checks._trend import largest_step, trend_table
 
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail"]
 LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
@@ -107,6 +107,12 @@ class RecordFindings:
                     f"frequencies are far from their neighbours in time and from what the weather explains: {details}; "
                     "expected NaN where a value is wrong: HampelFilter puts it there",
                 )
+            elif kind == "step":
+                yield (
+                    kind,
+                    f"frequencies change at once by what the weather does not explain: {details}; expected records of "
+                    "one structure, in one state and by one way of identification",
+                )
             else:
                 yield kind, f"what the weather leaves of the frequencies has a trend: {details}"
 
@@ -115,7 +121,8 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
     It looks for sensors and modes that are stuck, weather that explains nothing, temperatures of another time, modes
-    exchanged in some rows, outliers, and a trend. A finding is a reason to look at the records, no proof of a fault.
+    exchanged in some rows, outliers, steps and trends. A finding is a reason to look at the records, no proof of a
+    fault.
 
     Parameters
     ----------
@@ -154,6 +161,9 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
       of the other column, and ordering them at least halves what it leaves.
     - *Outliers*: values more than eight robust standard deviations away from the median of the 25 rows around, and from
       what the weather explains.
+    - *Step*: the level of a frequency beside what the weather explains changes at once, by at least five standard
+      errors, and this leaves at least a tenth less of its variance than a straight line does; not in fewer than 90
+      days, nor beside a stuck sensor. The row is the best of a hundred places.
     - *Trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
       the scatter of a single record; not in fewer than 90 days, nor beside a stuck sensor.
 
@@ -251,9 +261,11 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
     folds = BlockedKFold().fold_of(_with_stamps(records))
     yield from _exchanged(records, lines, folds)
     yield from _outliers(records, lines, folds)
-    share = explained(lines, records.F, folds)
-    usable = np.flatnonzero(~np.isnan(records.F).all(axis=1) & ~np.isnan(places).any(axis=1))
-    shift = best_shift(lines, past, places, records.F, folds, records.inertia)
+    changes, level = _changes(records, np.hstack([lines, past]))
+    F = records.F - level  # a step or a trend would pass for a season of another time
+    share = explained(lines, F, folds)
+    usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
+    shift = best_shift(lines, past, places, F, folds, records.inertia)
     if shift is not None:
         yield records.finding("time shift", "", *_shifted(records, shift))
         return
@@ -264,8 +276,7 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
         )
         yield records.finding("weather", "", usable, detail)
         return
-    if not records.has_stuck_sensors:
-        yield from _trends(records, np.hstack([lines, past]))
+    yield from changes
 
 
 def _with_stamps(records: _Records) -> Any:
@@ -329,23 +340,34 @@ def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:
     return rows, detail
 
 
-def _trends(records: _Records, inputs: Array) -> Iterator[list[Any]]:
+def _changes(records: _Records, inputs: Array) -> tuple[list[list[Any]], Array]:
+    """Steps and trends that are found beside the weather, and what they add to each frequency."""
+    level, found = np.zeros(records.F.shape), []
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)
-    if timed and index[-1] - index[0] < SHORTEST_TREND:
-        return
-    table = trend_table(inputs[rows], F, row_times(pd.DataFrame(index=index)), records.modes, timed)
+    if records.has_stuck_sensors or (timed and index[-1] - index[0] < SHORTEST_TREND):
+        return found, level
+    times = row_times(pd.DataFrame(index=records.index))
+    table = trend_table(inputs[rows], F, times[rows], records.modes, timed)
     for mode, (name, row) in enumerate(table.iterrows()):
+        known = np.flatnonzero(~np.isnan(records.F[:, mode]))
+        of_frequency = LEAST_OF_ALL * robust_deviation(F)[mode]
+        step = largest_step(inputs[rows], F[:, mode])
+        if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
+            level[rows[step.row] :, mode] = step.change
+            detail = f"{name!r} changes by {step.change:+.2g} Hz about {records.label(rows[step.row])}"
+            found.append(records.finding("step", name, known, f"{detail}, standard error {step.standard_error:.1g}"))
+            continue
         change, error = row["change"], row["standard_error"]
         scatter = error * np.sqrt(row["n_independent"] / 12)
-        least = max(LEAST_CHANGE * scatter, LEAST_OF_ALL * robust_deviation(F)[mode])
-        if not (abs(change) > CERTAIN * error and abs(change) > least):
+        if not (abs(change) > CERTAIN * error and abs(change) > max(LEAST_CHANGE * scatter, of_frequency)):
             continue
-        known = np.flatnonzero(~np.isnan(records.F[:, mode]))
+        level[:, mode] = change * (times - times[0]) / np.ptp(times)
         a_year = f" ({row['per_year']:+.2g} Hz a year)" if timed else ""
         detail = (
             f"{name!r} changes by {change:+.2g} Hz, standard error {error:.1g}{a_year}; first fifth "
             f"{row['first']:+.2g} Hz, last fifth {row['last']:+.2g} Hz"
         )
-        yield records.finding("trend", name, known, detail)
+        found.append(records.finding("trend", name, known, detail))
+    return found, level

@@ -17,7 +17,7 @@ N_PEAKS = 3  # shifts that each kind of correlation proposes
 PAST = (6, 24, 168)  # rows of means of the past: a structure follows the weather late
 LEAST_MEANS = 10  # times that such a period must fit into the records
 BETTER = 0.9  # ratio of what shifted temperatures leave to what those of the row leave, below which they are better
-LEAST_GAIN = 0.02  # share of the variance that shifted temperatures explain beyond those of the row
+LEAST_GAIN = 0.01  # share of the variance that shifted temperatures explain beyond those of the row
 LEAST_EXPLAINED = 0.1  # share of the variance that shifted temperatures explain
 
 
@@ -88,7 +88,7 @@ def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int
     """Shifts at which coordinates of the weather and frequencies, or their changes, are most correlated."""
     n_rows = len(places)
     farthest, found = int(FARTHEST * n_rows), set()
-    for of in (np.asarray, lambda table: np.diff(table, axis=0)):
+    for of in (np.asarray, lambda table: np.diff(table, axis=0), lambda table: _changes_of_means(table, inertia)):
         weather, modes = (_spectra(of(table), 2 * n_rows) for table in (places, frequencies))
         correlations = (scipy.fft.irfft(modes * row.conj(), 2 * n_rows, axis=1) for row in weather)
         strength = sum((one**2).sum(axis=0) for one in correlations)
@@ -99,6 +99,14 @@ def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int
             found.add(peak - farthest)
             strength[max(peak - 2, 0) : peak + 3] = 0
     return sorted(found)
+
+
+def _changes_of_means(table: Array, length: int) -> Array:
+    """Change from the mean over some rows to that over the next ones, which shows fronts beside days and seasons."""
+    sums = np.vstack(
+        [np.zeros((1, table.shape[1])), np.cumsum(np.nan_to_num(table - np.nanmean(table, axis=0)), axis=0)]
+    )
+    return sums[2 * length :] - 2 * sums[length:-length] + sums[: -2 * length]
 
 
 def _spectra(table: Array, length: int) -> Array:

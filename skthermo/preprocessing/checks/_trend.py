@@ -1,8 +1,9 @@
-"""Trend of residuals over time, with a standard error that holds under serial dependence."""
+"""Trend and steps of residuals over time, with a standard error that holds under serial dependence."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,8 @@ from skthermo._times import has_stamps, row_times
 YEAR = 365.25 * 86400e9  # nanoseconds
 PARTS = 5  # into which the records are divided, to compare the first with the last
 LEAST_RECORDS = 10
+N_PLACES = 100  # at which a step is sought
+SHARPER = 0.9  # ratio of what a step leaves to what a line leaves, below which the change is a step
 ESTIMATES = ["change", "standard_error", "first", "last", "n_independent"]
 
 
@@ -90,3 +93,38 @@ def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
     at = scatter[known] + change * (x - x.mean())
     ends = [at[part].mean() if part.any() else np.nan for part in (x <= 1 / PARTS, x >= 1 - 1 / PARTS)]
     return [change, np.sqrt(variance * time / (alone @ alone)), *ends, len(y) / time]
+
+
+class Step(NamedTuple):
+    """Row from which a level is another one, the change and its standard error."""
+
+    row: int
+    change: float
+    standard_error: float
+
+
+def largest_step(inputs: Array, column: Array) -> Step | None:
+    """The step that explains most of a column beside inputs; None where a straight line does nearly as well.
+
+    Rows are in order of time. As for a trend, the standard error holds if what remains depends on what was before.
+    """
+    known = np.flatnonzero(~np.isnan(column) & ~np.isnan(inputs).any(axis=1))
+    n_places = min(N_PLACES, len(known) // LEAST_RECORDS)
+    if len(known) < LEAST_RECORDS + 2 * inputs.shape[1] or n_places < 2:
+        return None
+    at = np.arange(1, n_places) * len(known) // n_places
+    order, beside = np.arange(len(known)), inputs[known]
+    left = np.column_stack([order / len(known), order[:, np.newaxis] >= at, column[known]])
+    left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-8)[0]
+    shapes, rest = left[:, :-1], left[:, -1]
+    squares = np.maximum((shapes**2).sum(axis=0), 1e-12 * len(known))
+    changes = shapes.T @ rest / squares
+    remaining = rest @ rest - changes**2 * squares
+    best = 1 + int(remaining[1:].argmin())
+    if remaining[best] > SHARPER * remaining[0]:
+        return None
+    scatter = np.full(len(column), np.nan)
+    scatter[known] = rest - changes[best] * shapes[:, best]
+    time = min(correlation_time(scatter), len(known) / 2)
+    variance = remaining[best] / max(len(known) - inputs.shape[1] - 2 * time, 1.0)
+    return Step(int(known[at[best - 1]]), float(changes[best]), float(np.sqrt(variance * time / squares[best])))

@@ -31,7 +31,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import warn_each, warn_user
-from skthermo._weather import SensorRegression, TrainingRange
+from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import check_records
@@ -659,7 +659,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         inputs = inputs_of_last_step(self.mapper_, T)
         excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(T))
+        theta = self._mapped(T)
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         return excess.assign(outside_bounds=outside)
 
@@ -731,12 +731,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         The change of the prediction when those of a sensor are wrong by their standard deviation, in quadrature.
         """
         T = self._temperatures(X)[0]
-        theta, variances = as_columns(self.mapper_.predict(T)), np.zeros((len(T), len(self.mode_names_)))
-        for errors in self.sensors_.errors(X):
-            moved = as_columns(self.mapper_.predict(T + errors))
-            rows = np.flatnonzero((moved != theta).any(axis=1) & ~np.isnan(theta).any(axis=1))
-            variances[rows] += (self._frequencies(moved[rows]) / self._frequencies(theta[rows]) - 1) ** 2
-        return np.sqrt(variances)
+        std = np.zeros((len(T), len(self.mode_names_)))
+        cost = FillError.of(self.sensors_, X, T, self._mapped, lambda theta: np.log(self._frequencies(theta)))
+        if len(cost.rows):
+            std[cost.rows] = np.sqrt(np.einsum("ijj->ij", cost.covariances))
+        return std
+
+    def _mapped(self, T: Any) -> Array:
+        return as_columns(self.mapper_.predict(T))
 
     def _predict_theta(self, X: ArrayLike) -> Array:
         """Parameters at given temperatures; warns of what was filled, unknown weather and impossible parameters."""
@@ -792,18 +794,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
 def gap_warnings(T: Any, deviations: Array, inputs: Array) -> Iterator[tuple[str, str]]:
     """Warnings about temperatures that were filled, and rows that cannot be predicted: kind and text of each."""
-    filled, n_rows = deviations > 0, len(deviations)
-    if filled.any():
-        sensors = [
-            f"{name!r} in {rows.sum()} of {n_rows} rows (standard deviation {sizes[rows].mean():.2g} degrees)"
-            for name, rows, sizes in zip(column_names(T, "T"), filled.T, deviations.T, strict=True)
-            if rows.any()
-        ]
-        yield (
-            "filled temperatures",
-            f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; standard deviations and "
-            "intervals of predictions are widened by what that costs",
-        )
+    consequence = "standard deviations and intervals of predictions are widened by what that costs"
+    message = told_fills(deviations, column_names(T, "T"), consequence)
+    if message:
+        yield "filled temperatures", message
     unknown = np.isnan(inputs).any(axis=1)
     if unknown.any():
         empty = np.isnan(as_floats(T)).any(axis=1)
@@ -811,8 +805,8 @@ def gap_warnings(T: Any, deviations: Array, inputs: Array) -> Iterator[tuple[str
         counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
         yield (
             "rows that cannot be predicted",
-            f"{unknown.sum()} of {n_rows} rows cannot be predicted and are NaN: {counts}; expected the records before "
-            "them, too, and at least one sensor that works",
+            f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}; expected the records "
+            "before them, too, and at least one sensor that works",
         )
 
 
