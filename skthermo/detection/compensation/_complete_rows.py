@@ -25,6 +25,8 @@ from skthermo._warnings import warn_user
 from skthermo.detection.compensation._folds import Folds
 from skthermo.preprocessing import LagFeatures
 
+HOUR = pd.Timedelta(hours=1)
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -63,7 +65,7 @@ class Regression:
             return
         longest = max(lags, key=lambda part: max(part.lags_))
         steps = max(longest.lags_)
-        reach = f"{steps} rows" if longest.freq_ is None else f"{pd.Timedelta(steps * longest.freq_)}"
+        reach = f"{steps} rows" if longest.freq_ is None else f"{pd.Timedelta(steps * longest.freq_) / HOUR:g} h"
         first = X.index[0] if isinstance(X, pd.DataFrame) else "row 0"
         warn_user(
             f"{lost.sum()} of {len(lost)} rows are not judged: lags reach {reach} back, to where no record is; the "
