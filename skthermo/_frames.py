@@ -116,7 +116,7 @@ def check_temperatures(T: ArrayLike) -> None:
         if marker.any():
             marks = values[marker]
             others = "" if len(marks) == 1 else f" to {marks[-1]:g}"
-            kelvin = " (kelvin?)" if -80 - ABSOLUTE_ZERO <= marks[0] and marks[-1] <= 100 - ABSOLUTE_ZERO else ""
+            kelvin = " (kelvin?)" if marks[0] >= -80 - ABSOLUTE_ZERO and marks[-1] <= 100 - ABSOLUTE_ZERO else ""
             raise ValueError(
                 f"temperature column {name!r} is {marks[0]:g}{others} in {counts[marker].sum()} of {len(column)} rows"
                 f"{kelvin}; expected degrees Celsius, and NaN where a value is missing"

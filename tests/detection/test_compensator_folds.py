@@ -159,8 +159,8 @@ def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
 def test_a_day_alone_says_what_lags_lack(service):
     detector, later = service
     said = (
-        "8 of 8 rows are not judged: lags reach 1 days 00:00:00 back, to where no record is; the first record given is "
-        "2026-03-04 00:00:00: give the 1 days 00:00:00 before, too"
+        "8 of 8 rows are not judged: lags reach 24 h back, to where no record is; the first record given is "
+        "2026-03-04 00:00:00: give the 24 h before, too"
     )
     with pytest.warns(UserWarning, match="not judged") as given:
         residuals = detector[0].transform(later.loc["2026-03-04"])
