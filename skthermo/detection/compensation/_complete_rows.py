@@ -23,8 +23,6 @@ from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
 from skthermo.detection.compensation._folds import Folds
 from skthermo.preprocessing import LagFeatures
 
-HOUR = pd.Timedelta(hours=1)
-
 
 @dataclass(frozen=True)
 class Regression:
