@@ -163,7 +163,7 @@ def test_what_damage_does_not_explain_is_said_where_damage_is_named(study, ident
 
 
 def test_lags_are_no_sensors(tmp_path):
-    fem, T, F = fitted_chain(n_records=60)
+    fem, T, F = fitted_chain()
     lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), T.rename(columns={SENSOR: "deck"})], axis=1)
     lagged["deck_lag2"], lagged["north_lag3"] = T[SENSOR].shift(2).bfill(), T[SENSOR].shift(3).bfill()
     study = run_study(clone(fem).fit(lagged, F), lagged, [Scenario("healthy")])

@@ -129,7 +129,7 @@ def test_impossible_questions_are_errors():
     curve = pod_curve(SEVERITIES, DETECTED, RECORDS)
     with pytest.raises(ValueError, match="pod is 90; expected a probability"):
         curve.severity_at(90)
-    with pytest.raises(ValueError, match="expected the sign"):
+    with pytest.raises(ValueError, match="expected shares below 1 of the sign of those tested"):
         curve.predict(-0.2)
 
 

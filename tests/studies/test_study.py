@@ -264,10 +264,13 @@ def test_records_that_cannot_be_judged_do_not_count():
     frequencies.iloc[::5] = np.nan
     gappy = DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, frequencies)
     weather = WEATHER.copy()
-    weather.iloc[5:15, 0] = np.nan
+    weather.iloc[5:15] = np.nan
     detector = OutlierDetector(IsolationForest())
     study = DetectabilityStudy(gappy, detector, [Scenario("healthy")], n_repeats=2, random_state=0)
-    n_records, n_not_judged = study.run(weather).loc[0, ["n_records", "n_not_judged"]]
+    with pytest.warns(UserWarning, match="10 of 365 rows cannot be predicted") as caught:
+        results = study.run(weather)
+    assert len(caught) == 1
+    n_records, n_not_judged = results.loc[0, ["n_records", "n_not_judged"]]
     assert 0.4 * 730 < n_records < 0.75 * 730
     assert n_records + n_not_judged == 730
     assert study.indices_["healthy", "data-informed"].iloc[5:15].isna().all()
@@ -322,6 +325,7 @@ def test_impossible_studies_are_errors(fem, options, message):
         (compensated(), {"reference": {"healthy": YEAR.frequencies[:99]}}, "temperatures has 365 rows"),
     ],
 )
+@pytest.mark.filterwarnings("ignore:365 of 365 rows are not judged")  # before the error
 def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
     study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0)
     with pytest.raises(ValueError, match=message):

@@ -16,6 +16,7 @@ from skthermo.updating import identifiability
 SCRIPT = Path(__file__).with_name("user_script.py")
 
 
+@pytest.mark.filterwarnings("ignore:1 of 122 rows are not judged")  # the first, whose window is not full
 def test_what_type_checkers_are_told_is_true_at_run_time(monkeypatch):
     checked = []
 
@@ -43,7 +44,10 @@ def test_typed_results_are_bunches(result):
     assert isinstance(result, Bunch)
     assert not set(vars(type(result))) & set(result), "a class attribute would hide the value"
     assert set(typing.get_type_hints(type(result))) == set(result)
-    assert repr(result) == dict.__repr__(result)
+    if type(result).__repr__ is Bunch.__repr__:
+        assert repr(result) == dict.__repr__(result)
+    else:
+        assert repr(result).startswith(result.summary())
     for twin in (pickle.loads(pickle.dumps(result)), copy.copy(result)):
         assert type(twin) is type(result)
         assert list(twin) == list(result)

@@ -255,8 +255,10 @@ def _stuck(records: _Records) -> Iterator[list[Any]]:
 
 
 def _against_weather(records: _Records) -> Iterator[list[Any]]:
-    basis = WeatherBasis.of(records.T)
-    places = basis.coordinates(records.T)
+    first = [columns[0] for columns in records.sensors.values()]  # with lags, rows know the weather of others
+    now = records.T[:, first]
+    basis = WeatherBasis.of(now)
+    places = basis.coordinates(now)
     lines, past = basis.lines(places), with_past(places)
     folds = BlockedKFold().fold_of(_with_stamps(records))
     yield from _exchanged(records, lines, folds)
