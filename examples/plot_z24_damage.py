@@ -180,7 +180,7 @@ print(simulation_table(bridge, records, fem, found).round(1).to_string())
 #    false alarms boosted trees, residuals whitened by weather       1.1        1.3     0.5      2.3
 #    damage found boosted trees, residuals whitened by weather      82.3       84.3    33.2    100.0
 #
-# The bands hold the measured rates, and are wide, since the severities are uncertain. On average, simulations alone would
-# have led to the same choice of a detector. :doc:`/guide/studies` plans such a study for your own bridge.
+# The bands hold the measured rates, and are wide, since the severities are uncertain. On average, simulations alone
+# would have led to the same choice of a detector. :doc:`/guide/studies` plans such a study for your own bridge.
 
 save_figures(folder)
