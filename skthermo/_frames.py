@@ -114,9 +114,12 @@ def check_temperatures(T: ArrayLike) -> None:
                 "expected degrees Celsius"
             )
         if marker.any():
+            marks = values[marker]
+            others = "" if len(marks) == 1 else f" to {marks[-1]:g}"
+            kelvin = " (kelvin?)" if marks[0] >= -80 - ABSOLUTE_ZERO and marks[-1] <= 100 - ABSOLUTE_ZERO else ""
             raise ValueError(
-                f"temperature column {name!r} is {values[marker][0]:g} in {counts[marker][0]} of {len(column)} rows; "
-                "expected degrees Celsius, and NaN where a value is missing"
+                f"temperature column {name!r} is {marks[0]:g}{others} in {counts[marker].sum()} of {len(column)} rows"
+                f"{kelvin}; expected degrees Celsius, and NaN where a value is missing"
             )
 
 

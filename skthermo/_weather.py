@@ -152,15 +152,16 @@ class SensorRegression:
     def warning(self, temperatures: Any) -> str:
         """Text of the warning if a sensor departs from the others as it did not in training, else an empty string.
 
-        Records count in which the others are within their training range, if these are most.
+        Records count in which the others are within their training range and it is not far outside, if these are most.
         """
         order = np.argsort(row_times(temperatures), kind="stable")
         lengths = [length for length in self.usual if length <= len(order)]
         if not lengths:
             return ""
         values, length = as_floats(temperatures)[order], max(lengths)
-        outside = np.nan_to_num(self.reach.excess(values)) > 0
-        judged = outside.sum(axis=1, keepdims=True) == outside
+        beyond = np.nan_to_num(self.reach.excess(values))
+        outside = beyond > 0
+        judged = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
         departures = np.where(judged, self.departures(values), np.nan)
         departures[:, judged.mean(axis=0) < 0.5] = np.nan
         means, usual = _running_means(departures, length), self.usual[length]

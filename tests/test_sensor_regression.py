@@ -94,9 +94,13 @@ def test_a_sensor_that_is_stuck_is_named():
 
 
 def test_weather_that_training_does_not_know_says_nothing_of_sensors():
-    sensors, new = SensorRegression.of(dependent_records(3000, 0)), dependent_records(3000, 1)
-    assert sensors.warning(new + [40.0, 40.0, 60.0]) == ""
-    assert sensors.warning(new + [0.0, 0.0, 60.0]).startswith("'cable' departs")
+    T, new = dependent_records(3000, 0), dependent_records(3000, 1)
+    sensors, hottest = SensorRegression.of(T), pd.DataFrame([T.max()] * 400)
+    assert sensors.warning(hottest + [-0.1, 4.0, -0.1]).startswith("'girder' departs")
+    assert sensors.warning(hottest + [0.1, 4.0, 0.1]) == ""
+    assert sensors.warning(new + [0.0, 0.0, 8.0]).startswith("'cable' departs")
+    new.loc[[5, 30, 800], "cable"] += 80  # which another warning tells
+    assert sensors.warning(new) == ""
     assert SensorRegression.of(new[["air"]]).warning(new[["air"]] + 40) == ""
 
 

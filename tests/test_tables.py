@@ -181,6 +181,10 @@ def temperatures(**changes):
         (temperatures(deck=([3], 9998), air=([4], 20)), "column 'deck' is 9998"),
         (temperatures(air=([3], -127)), "column 'air' is -127 in 1 of 40 rows"),
         (temperatures(air=([0, 1], 290.0)), "column 'air' is 290 in 2 of 40 rows"),
+        (
+            temperatures(air=([0, 1, 5], [290.0, 295.0, 280.0])),
+            r"column 'air' is 280 to 295 in 3 of 40 rows \(kelvin.\); expected degrees Celsius",
+        ),
         (np.array([[293.0], [294.0]]), "column 'T1' lies between 293 and 294"),
     ],
 )

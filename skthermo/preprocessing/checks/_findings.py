@@ -255,9 +255,8 @@ def _stuck(records: _Records) -> Iterator[list[Any]]:
 
 
 def _against_weather(records: _Records) -> Iterator[list[Any]]:
-    now = records.T[
-        :, [columns[0] for columns in records.sensors.values()]
-    ]  # with lags, every row knows others' weather
+    first = [columns[0] for columns in records.sensors.values()]  # with lags, rows know the weather of others
+    now = records.T[:, first]
     basis = WeatherBasis.of(now)
     places = basis.coordinates(now)
     lines, past = basis.lines(places), with_past(places)
