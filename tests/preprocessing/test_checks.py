@@ -126,11 +126,11 @@ class TestTime:
         tables = pd.DataFrame({"air": air}, index)[lag:], pd.DataFrame({"f": frequency}, index)[lag:]
         assert check_records(*tables).table.empty
 
-    def test_lags_are_no_shift(self):
+    def test_lags_are_no_shift_and_hide_none(self):
         random = np.random.default_rng(0)
         air = 10 + 12 * np.sin(np.arange(60) / 12) + random.standard_normal(60)
         index = pd.date_range("2025-01-01", periods=60)
-        lagged = LagFeatures(6).fit_transform(pd.DataFrame({"air": air}, index))
+        lagged = LagFeatures([0, 3, 24]).fit_transform(pd.DataFrame({"air": air}, index))
         frequencies = np.array([3.0, 5.0, 7.0]) * (1 - 0.002 * air[:, np.newaxis])
         noisy = pd.DataFrame(frequencies * (1 + 0.005 * random.standard_normal((60, 3))), index)
         assert check_records(lagged, noisy).table.empty
