@@ -173,10 +173,10 @@ class SensorRegression:
         rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
         first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
         return (
-            f"{self.reach.names[sensor]!r} departs from what the other sensors foretell in {len(rows)} of {len(order)} "
-            f"rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} records, where "
-            f"training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, which moves "
-            "predictions and gives false alarms; expected NaN where it is wrong, which the other sensors fill"
+            f"{self.reach.names[int(sensor)]!r} departs from what the other sensors foretell in {len(rows)} of "
+            f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
+            f"records, where training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, "
+            "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other sensors fill"
         )
 
     def errors(self, temperatures: Any) -> Iterator[Array]:
@@ -218,7 +218,8 @@ class FillError:
         The error is that of the ``outcome`` of each prediction.
         """
         with without_warnings():
-            middle, moved = np.empty(0), []
+            middle = np.empty(0)
+            moved: list[Array] = []
             for error in sensors.errors(raw):
                 middle = middle if moved else predict(filled)
                 moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]

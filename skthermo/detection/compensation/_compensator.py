@@ -413,7 +413,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     empty = np.isnan(as_floats(temperatures)).all(axis=1)
     if empty.any():
         warn_user(
-            f"{empty.sum()} of {len(empty)} rows have no temperature at all: they are not judged",
+            f"{empty.sum()} of {len(filled)} rows have no temperature at all: they are not judged",
             "without temperature",
         )
     return frame_like(temperatures, filled)
