@@ -176,8 +176,8 @@ class SensorRegression:
             f"{self.reach.names[int(sensor)]!r} departs from what the other sensors foretell in {len(rows)} of "
             f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
             f"records, where training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, "
-            "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other "
-            "sensors fill"
+            "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other sensors "
+            "fill"
         )
 
     def errors(self, temperatures: Any) -> Iterator[Array]:
