@@ -344,7 +344,8 @@ def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:
 
 def _changes(records: _Records, inputs: Array) -> tuple[list[list[Any]], Array]:
     """Steps and trends that are found beside the weather, and what they add to each frequency."""
-    level, found = np.zeros(records.F.shape), []
+    level = np.zeros(records.F.shape)
+    found: list[list[Any]] = []
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)
