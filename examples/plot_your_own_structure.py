@@ -212,12 +212,14 @@ FrequencyTemperatureDisplay.from_predictions(T["T2"], F, history)
 
 T, F = T[:400], F[:400]
 swapped = F.rename(columns={"f2": "f3", "f3": "f2"})[list(F)]
-gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
+gappy = T.assign(T1=T["T1"].where(np.arange(len(T)) < 150))
+stuck = T.assign(T1=T["T1"].where(np.arange(len(T)) < 150, 10.0))
 mistakes = {
     "rad/s instead of Hz": said(chain(model).fit, T, F * 2 * np.pi),
     "frequencies 1.5 times too high": said(chain(model).fit, T, F * 1.5),
     "two modes swapped": said(chain(model).fit, T, swapped),
-    "2 % of temperatures missing, 24 lags": said(chain(model, lags=24).fit, gappy, F),
+    "a thermometer that died": said(chain(model).fit, gappy, F),
+    "a thermometer that got stuck": said(chain(model).fit, stuck, F),
     "bounds of 0.5 %": said(chain(model, bounds=0.005).fit, T, F),
     "30 records": said(chain(model).fit, T[:30], F[:30]),
     "kelvin in fit": said(chain(model).fit, T + 273.15, F),

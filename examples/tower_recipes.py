@@ -28,9 +28,11 @@ def write_synthetic_log(path, model, scatter, n_days=25):
 
 
 def quietly(function, *arguments):
-    """Call a function without its warning of unknown weather, where that is already known."""
+    """Call a function without its warnings of unknown weather, rows after gaps and few weeks, which are known."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
+        warnings.filterwarnings("ignore", r"\d+ of \d+ rows cannot be predicted and are NaN")
+        warnings.filterwarnings("ignore", r"\d+ of \d+ records of fold")
         return function(*arguments)
 
 

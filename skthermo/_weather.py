@@ -31,6 +31,7 @@ FEWEST = 36  # records in a mean departure of a sensor
 LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
 TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
 MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
+A_DEGREE = 1.0  # below which thermometers may differ without a fault
 
 
 @dataclass(frozen=True)
@@ -165,8 +166,9 @@ class SensorRegression:
         departures = np.where(judged, self.departures(values), np.nan)
         departures[:, judged.mean(axis=0) < 0.5] = np.nan
         means, usual = _running_means(departures, length), self.usual[length]
-        limits = np.maximum(TIMES_USUAL * usual, MATTERS * (self.reach.highest - self.reach.lowest))
-        excess = np.nan_to_num(np.abs(means) / np.where(limits > 0, limits, np.inf))
+        least = np.maximum(MATTERS * (self.reach.highest - self.reach.lowest), A_DEGREE)
+        limits = np.maximum(TIMES_USUAL * usual, least)
+        excess = np.nan_to_num(np.abs(means) / limits)
         place, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[place, sensor] <= 1:
             return ""

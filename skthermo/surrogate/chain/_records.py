@@ -271,7 +271,7 @@ class TrainingRecords(SavesFrames):
             weights = None if self.weights is None else self.weights[order][train]
             fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
             predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
-        warn_of_unseen(inputs, fold_of, "standard deviations, intervals and noise are guesses there")
+        warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
         values = measured / frequencies_of(predicted) - 1
         known = ~np.isnan(values).all(axis=1)
         return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known])
