@@ -16,7 +16,8 @@ def test_a_clone_beside_a_script_does_not_hide_a_package_that_is_installed_as_a_
     clone = tmp_path / "skthermo"
     shutil.copytree(Path(skthermo.__file__).parent, clone / "skthermo", ignore=shutil.ignore_patterns("__pycache__"))
     code = f"import sys; sys.path.append({str(clone)!r}); import skthermo as s; print(s.__version__, s.__file__)"
-    command = [sys.executable, "-S", "-c", code]  # which no other installation reaches; its path begins with the working directory
+    # The path begins with the working directory, and no other installation is on it.
+    command = [sys.executable, "-S", "-c", code]
     found = subprocess.run(command, cwd=tmp_path, env={}, capture_output=True, text=True, check=True)
     assert found.stdout.split() == [skthermo.__version__, str(clone / "skthermo" / "__init__.py")]
 
