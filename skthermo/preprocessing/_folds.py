@@ -38,7 +38,7 @@ class BlockedKFold(BaseCrossValidator):
 
     See Also
     --------
-    TemperatureCompensator : Predicts the records of its baseline by such folds.
+    skthermo.detection.TemperatureCompensator : Predicts the records of its baseline by such folds.
 
     Examples
     --------
