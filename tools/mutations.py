@@ -123,7 +123,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("surrogate/_standardiser.py", "surrogate/test_coordinates.py"): [
         ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
-        ("damping of the mapper", "np.diag(np.sqrt(damping))", "np.diag(damping)"),
+        ("damping of the mapper", "np.diag(np.sqrt(self.damping))", "np.diag(self.damping)"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
         (
@@ -153,13 +153,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
         ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
-        ("blocks as long as residuals remember", "max(WEEK, least *", "max(WEEK, 0 * least *"),
+        ("blocks as long as residuals remember", "CORRELATION_TIMES = 5 ", "CORRELATION_TIMES = 0 "),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
     ("_weather.py", "surrogate/test_uncertainty.py"): [
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
-        ("correlation time", "time += 2 * correlation", "time += correlation"),
+    ],
+    ("_dependence.py", "surrogate/test_uncertainty.py"): [
+        ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
+    ],
+    ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [
+        ("blocks dealt in turn", "blocks % self.n_splits", "blocks * self.n_splits // (blocks.max() + 1)"),
     ],
     ("_io/_child.py", "test_matlab.py"): [
         ("a part too many in a file", "n_parts != expected", "n_parts < expected"),

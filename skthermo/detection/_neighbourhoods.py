@@ -123,7 +123,7 @@ def _season(times: Array) -> Array:
 def _without(column: Array, season: Array) -> Array:
     """A column less what the season explains of it."""
     known = ~np.isnan(column)
-    return column - season @ np.linalg.lstsq(season[known], column[known])[0]
+    return column - season @ np.linalg.lstsq(season[known], column[known], rcond=None)[0]
 
 
 def _distances_left_out(rows: Array, correlation: Array, some: Array, first: Rows, stop: Rows) -> Array:

@@ -220,6 +220,14 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
         assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
 
 
+@pytest.mark.filterwarnings("ignore:what the weather leaves of the frequencies has a trend", "ignore:.* change at once")
+def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
+    lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
+    blocks = [np.diff(np.flatnonzero(np.diff(one.residuals_.folds))) for one in (FITTED, chain().fit(T, lasting))]
+    assert set(blocks[0]) == {7}
+    assert min(blocks[1]) > 20
+
+
 def test_any_folds_may_be_asked_for():
     kept = FITTED.records_.out_of_fold(FITTED.mapper_, FITTED._frequencies, KFold(5))
     np.testing.assert_array_equal(kept.folds, np.arange(365) // 73)
