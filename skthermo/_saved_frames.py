@@ -38,10 +38,11 @@ class SavedLabels:
 class SavedTable:
     """Values and labels of a frame, or of a series where there are no columns."""
 
-    values: NDArray
+    values: NDArray | list
     index: SavedLabels
     columns: SavedLabels | None
     name: Any = None
+    dtype: str | None = None
 
 
 def to_saved(value: Any) -> Any:
@@ -53,8 +54,10 @@ def to_saved(value: Any) -> Any:
     is_frame = isinstance(value, pd.DataFrame)
     axes = [_to_labels(axis) for axis in value.axes]
     dtypes = set(value.dtypes) if is_frame else {value.dtype}
-    if None in axes or len(dtypes) != 1 or dtypes.pop() not in (np.dtype(float), np.dtype("int64")):
+    if None in axes:
         return value
+    if len(dtypes) != 1 or dtypes.pop() not in (np.dtype(float), np.dtype("int64")):
+        return _of_columns(value, axes) if is_frame else _of_objects(value, axes)
     return SavedTable(value.to_numpy(), axes[0], axes[1] if is_frame else None, None if is_frame else value.name)
 
 
@@ -66,8 +69,24 @@ def from_saved(value: Any) -> Any:
         return value
     index = _from_labels(value.index)
     if value.columns is None:
-        return pd.Series(value.values, index, name=value.name)
+        return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
+    if isinstance(value.values, list):
+        columns = dict(enumerate(map(from_saved, value.values)))
+        return pd.DataFrame(columns, index).set_axis(_from_labels(value.columns), axis=1)
     return pd.DataFrame(value.values, index, _from_labels(value.columns))
+
+
+def _of_columns(frame: pd.DataFrame, axes: list[Any]) -> Any:
+    """A frame with columns of several types as a table of tables, or unchanged."""
+    columns = [to_saved(frame.iloc[:, place]) for place in range(frame.shape[1])]
+    return SavedTable(columns, *axes) if all(isinstance(column, SavedTable) for column in columns) else frame
+
+
+def _of_objects(series: pd.Series, axes: list[Any]) -> Any:
+    """A series of texts and numbers as a table of a list, or unchanged."""
+    values = series.tolist()
+    plain = series.dtype == object and all(isinstance(value, str | int | float | None) for value in values)
+    return SavedTable(values, axes[0], None, series.name, str(series.dtype)) if plain else series
 
 
 def _to_labels(index: pd.Index) -> SavedLabels | None:

@@ -56,8 +56,10 @@ def test_polars():
     assert recipe["lagged"].columns[:4] == ["T1_lag0", "T1_lag1", "T1_lag2", "T2_lag0"]
     np.testing.assert_array_equal(recipe["predicted"].to_numpy(), fem.fit(T, F).predict(T))
 
-    cold = polars.when(polars.col("T1") > 20).then(None).otherwise(polars.col("T1"))
-    gaps = recipe["T_polars"].with_columns(cold.alias("T1"))
+    warm = polars.col("T1") > 20
+    gaps = recipe["T_polars"].with_columns(
+        polars.when(warm).then(None).otherwise(polars.col(name)).alias(name) for name in ("T1", "T2", "T3")
+    )
     fem.fit(recipe["T_polars"], recipe["F_polars"])
     missing = gaps["T1"].is_null().to_numpy()
     assert missing.any()

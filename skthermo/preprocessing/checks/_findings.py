@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
+from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
@@ -37,7 +38,7 @@ PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency
 
 
 @dataclass(frozen=True, repr=False)
-class RecordFindings:
+class RecordFindings(SavesFrames):
     """What `check_records` has found.
 
     Parameters
