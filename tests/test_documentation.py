@@ -86,7 +86,7 @@ def test_no_file_names_an_address_of_the_project_that_does_not_exist():
     folders = [ROOT / name for name in ("docs", "examples", "skthermo", "tests", "tools", ".ci")]
     below = [path for folder in folders for path in folder.rglob("*") if not BUILT & set(path.parts)]
     address = re.compile(rb"(?:https?://|www\.|git@)[^\s\"'<>`]*skthermo|pip install [\"']?skthermo", re.IGNORECASE)
-    files = [path for path in [*ROOT.iterdir(), *below] if path.is_file() and path.suffix not in {".pyc", ".png", ".inv"}]
+    files = [path for path in [*ROOT.iterdir(), *below] if path.is_file()]
     found = {str(path.relative_to(ROOT)): address.findall(path.read_bytes()) for path in files}
     assert {"README.md", "pyproject.toml", "CITATION.cff", "docs/conf.py"} < set(found)
     assert not {name: addresses for name, addresses in found.items() if addresses}
