@@ -15,12 +15,12 @@ from skthermo.plotting._axes import Axes, figure_legend, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, marker_style, shortened
 from skthermo.plotting.comparison._rows import (
     both_ends,
+    check_study,
     in_percent,
     name_rows,
     note,
     places_of,
     read_table,
-    results_of,
     size_of_rows,
     small_rates,
 )
@@ -127,7 +127,8 @@ class AgreementDisplay:
         ValueError
             If no scenario has both simulated and measured records.
         """
-        return cls.from_predictions(results_of(study), groups=groups, **options)
+        check_study(study)
+        return cls.from_predictions(study.results_, groups=groups, **options)
 
     @classmethod
     def from_predictions(

@@ -20,13 +20,12 @@ CLOSEST = 0.07  # share of the axis that two ticks are apart at least
 LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
 
 
-def results_of(study: Any) -> pd.DataFrame:
-    """The results of a study."""
+def check_study(study: Any) -> None:
+    """Raise an error for what is no study, or one without results."""
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
-    return study.results_
 
 
 def read_table(results: Any, needed: Sequence[str], what: str) -> pd.DataFrame:
