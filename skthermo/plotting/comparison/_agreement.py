@@ -284,7 +284,7 @@ class AgreementDisplay:
         self.bands_[name] = ax.barh(y, high - low, 0.62, low, color=ORANGE, alpha=0.35, label=label)
         style = {"linestyle": "", "marker": "|", "markersize": 10, "markeredgewidth": 2, "color": ORANGE}
         self.simulated_[name] = ax.plot(simulated, y, **style, label="simulated, mean")[0]
-        style = {"linestyle": "", "marker": "o", "markersize": 5.5, "color": BLUE, "clip_on": False}
+        style = {"linestyle": "", "marker": "o", "markersize": 5.5, "color": BLUE}
         is_outside = (rows["inside"] == 0).to_numpy()
         self.measured_[name] = [
             ax.plot(measured[~is_outside], y[~is_outside], **style, label="measured")[0],
@@ -321,11 +321,11 @@ class AgreementDisplay:
         groups = self.groups or {}
         self.points_[name] = []
         for number, group in enumerate(dict.fromkeys([*groups.values(), None])):
-            some = rows[[groups.get(detector) == group for detector in rows.index]]
+            some = rows[[groups.get(detector) == group for detector in rows.index]].dropna(subset=["measured"])
             low, high, simulated, measured = in_percent(some[RATES]).T
             ends = np.clip([simulated - low, high - simulated], 0, None)
             style = marker_style(number, 1) | {"clip_on": False, "elinewidth": 0.8}
-            if group is not None or len(some):
+            if len(some):
                 label = label_of(group) if group is not None else "others" if groups else None
                 self.points_[name].append(ax.errorbar(simulated, measured, xerr=ends, **style, label=label))
 

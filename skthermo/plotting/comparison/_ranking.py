@@ -175,7 +175,7 @@ class RankingDisplay:
         for one, name, marker in zip(self.axes_, ("false_alarms", "pod", "behind"), "ooD", strict=True):
             value, low, high = in_percent(rows[[name, f"{name}_lowest", f"{name}_highest"]]).T
             self.bounds_[name] = one.hlines(y, low, high, colors=colours, linewidth=1.5)
-            style = {"s": 30, "zorder": 3, "clip_on": False, "marker": marker, "edgecolors": colours}
+            style = {"s": 30, "zorder": 3, "marker": marker, "edgecolors": colours}
             faces, label = (colours, "at its own threshold, with bounds") if marker == "o" else ("white", None)
             self.points_[name] = one.scatter(value, y, **style, facecolors=faces, label=label)
         alarms, found, behind = self.axes_

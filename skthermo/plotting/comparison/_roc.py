@@ -181,7 +181,7 @@ class ROCDisplay:
             x, y = in_percent(curves[name])
             self.lines_[name] = self.ax_.plot(x, y, color=colour, linestyle=dashes, label=label)[0]
             own = [100 * float((part[~np.isnan(part)] < 0).mean()) for part in self.decisions[name]]
-            style = {"marker": MARKERS[number % len(MARKERS)], "color": colour, "clip_on": False, "zorder": 3}
+            style = {"marker": MARKERS[number % len(MARKERS)], "color": colour, "zorder": 3}
             self.thresholds_[name] = self.ax_.plot(*own, linestyle="", **style)[0]
         chance = np.linspace(0, 100, 200)
         self.ax_.plot(chance, chance, color=GREY, linestyle=":", linewidth=1, label="chance: AUC 0.5")
