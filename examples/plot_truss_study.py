@@ -144,14 +144,16 @@ for ax, group in zip(axes, GROUPS, strict=True):
 # Which detector?
 # ---------------
 # All detectors judge the same simulated records: some see frequencies only, others remove the effect of temperature by
-# a regression before. On the real structure there would be no damaged records to choose by. Here the true ones are
-# judged too, with damage of 10 %: the detectors that find most in simulation find most in truth.
+# a regression before. On a real structure there are no damaged records to choose by. Here the true ones are judged, too
+# (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
 
 several = field_detectors(list(year.frequencies))
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "broken lines"]
 tenth = [{}, *({group: 0.1} for group in GROUPS)]
 bench = DetectabilityStudy(fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0)
 bench.run(later.temperatures, reference=true_records)
+print(bench.ranking()[["false_alarms", "pod", "behind", "clearly_behind"]].round(2).to_string())
+print(bench.summary())
 display = AgreementDisplay.from_estimator(bench)
 
 # %%
