@@ -184,10 +184,14 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
 
 def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
     asked = []
-    study = SimpleNamespace(scenarios=[], results_=None, ranking=lambda *given: asked.append(given) or RANKING)
+    study = SimpleNamespace(scenarios=[], results_=None)
+    study.ranking = lambda *given, by: asked.append((*given, by)) or RANKING
     display = RankingDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
-    assert asked == [(0.05, "reference")]
+    assert asked == [(0.05, "reference", "pod")]
     assert display.limit_line_.get_xdata()[0] == 5
+    bounds = ["behind_lowest", "behind_highest"]
+    display = RankingDisplay.from_predictions(RANKING.assign(clearly_behind=False, **dict.fromkeys(bounds, np.nan)))
+    assert rows_named(display.axes_[0])[0] == "order not sure: one repeat"
     with pytest.raises(ValueError, match=r"the ranking lacks the columns \['behind'\]"):
         RankingDisplay.from_predictions(RANKING.drop(columns="behind"))
 
