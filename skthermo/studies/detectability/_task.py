@@ -375,8 +375,8 @@ def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
         or stamps.hasnans
     ):
         raise ValueError(
-            f"T has the index {stamps!r:.200}, and the baseline stamps in the time zone {baseline.index.tz}; expected T "
-            "on a DatetimeIndex as well, with a time zone if the baseline has one, and each stamp once"
+            f"T has the index {stamps!r:.200}, and the baseline stamps in the time zone {baseline.index.tz}; expected "
+            "T on a DatetimeIndex as well, with a time zone if the baseline has one, and each stamp once"
         )
     day, gap = pd.Timedelta(days=1), pd.Timedelta(days=SHORTEST_GAP)
     wait, period = (baseline.index.max() + gap - stamps.min()) / day, (stamps.max() - stamps.min() + gap) / day
