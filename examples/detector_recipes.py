@@ -75,10 +75,12 @@ class Cointegration(OutlierMixin, BaseEstimator):
         return -np.abs(X @ self.vector_ - self.mean_) / self.deviation_
 
 
-def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.02):
+def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.02, block=None):
     """Detectors by name, not fitted: those named "raw" see frequencies only, the others temperatures beside them.
 
     `targets` names the frequency columns. An `estimator`, such as the chain of the structure, compensates as well.
+    Thresholds come from blocks of time that are left out. `block` is their length for outlier detectors: hourly records
+    of one winter want "1D", or whole spells of frost are left out, and the threshold hides damage.
     """
     novelties = {
         "isolation forest": IsolationForest(random_state=random_state),
@@ -99,7 +101,7 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
         regressors["chain"] = estimator
 
     def outlier(name):
-        return OutlierDetector(make_pipeline(StandardScaler(), novelties[name]), contamination)
+        return OutlierDetector(make_pipeline(StandardScaler(), novelties[name]), contamination, block=block)
 
     def compensated(regressor, scale=None, detector=None):
         compensator = TemperatureCompensator(regressor, targets=targets, scale=scale)
