@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_tuning.py --seeds 5
 
-The steel of a truss follows the air with inertia, and its frequencies scatter more when it is cold. It is recorded every
-three hours. For each seed, a chain learns one healthy year, and 12 settings of a whitened detector are judged by
+The steel of a truss follows the air with inertia, and its frequencies, recorded every three hours, scatter more when it
+is cold. For each seed, a chain learns one healthy year, and 12 settings of a whitened detector are judged by
 simulated records, healthy and damaged, in the weather of a second year. A third year, in which all scenarios are
 simulated with fresh noise and are also true, judges the winner, the setting that the search began with, and the best of
 the 12 by truth. Scores are the share of damaged records found at 2 % false alarms, mean over scenarios.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +24,7 @@ from skthermo.studies.detectability._simulation import clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._task_scorer import TaskScorer
 from skthermo.studies.detectability._view import View
-from skthermo.studies.scenarios import BaseScenario, check_chain
+from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
 
 YEAR = 365.2425  # days
 SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
@@ -316,6 +316,8 @@ def _task(
     names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
     positions = [names.index(name) for name in baseline.columns]
     labels = _labels(scenarios, T)
+    n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
+    index = _moved(T, baseline, n_repeats * n_scenarios)
     with warnings_once("in the simulations of this task"), single_blas_thread():
         clean = clean_frequencies(fem, scenarios, T, len(seeds))
         tables = []
@@ -325,9 +327,7 @@ def _task(
                 (clean[one.name] for one in scenarios),
             )
             tables += [np.hstack([as_floats(T), one[repeat % len(one)] * factors])[:, positions] for one in draws]
-    index = _moved(T, baseline, len(tables))
-    X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)])
-    n_baseline, n_repeats, n_scenarios, n_records = len(baseline), len(seeds), len(scenarios), labels.shape[1]
+    X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)]).rename_axis(baseline.index.name)
     y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
     state = np.repeat(np.arange(len(tables)), n_records)
     codes = np.r_[np.full(n_baseline, -1), state % n_scenarios]
@@ -422,5 +422,16 @@ def _seeds(n_repeats: Any, random_state: Any) -> NDArray[np.intp]:
     return as_random_state(random_state).randint(np.iinfo(np.int32).max, size=size)
 
 
-def _scenarios(fem, scenarios):
-    return list(scenarios)
+def _scenarios(fem: Any, given: Any) -> list[BaseScenario]:
+    """The scenarios; an error if they are wrong."""
+    if isinstance(given, type) or not isinstance(given, Iterable):
+        raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
+    scenarios, groups = list(given), getattr(fem.model, "groups", None)
+    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
+    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
+    if wrong or not names or len(set(names)) < len(names):
+        raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
+    for scenario in scenarios:
+        if groups is not None:
+            check_groups(scenario.groups, groups)
+    return scenarios
