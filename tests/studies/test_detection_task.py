@@ -218,7 +218,9 @@ def test_a_search_finds_what_each_setting_scores(task):
 def test_other_detectors_are_judged_too(fem, detector):
     task = task_of(fem, columns=MODES)
     assert list(task.X) == MODES
-    scores = cross_val_score(detector, task.X, task.y, cv=task.cv, scoring=task.scoring)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*LocalOutlierFactor was fitted with feature names")
+        scores = cross_val_score(detector, task.X, task.y, cv=task.cv, scoring=task.scoring)
     assert ((scores >= 0) & (scores < 1)).all()
     only = task_of(fem, baseline=YEAR.frequencies)
     pd.testing.assert_frame_equal(only.X, task.X)
@@ -229,8 +231,9 @@ def test_halving_takes_a_parameter_as_its_resource(fem):
     grid = {"max_features": [0.3, 0.6, 1.0], "max_samples": [0.2, 0.5]}
     options = {"resource": "n_estimators", "max_resources": 40, "min_resources": 10, "factor": 2, "random_state": 0}
     options |= {"cv": task.cv, "scoring": task.scoring, "refit": False}
+    options["return_train_score"] = False  # the baseline has no damaged records
     search = HalvingRandomSearchCV(IsolationForest(random_state=0), grid, **options).fit(task.X, task.y)
-    assert search.n_resources_ == [10, 20]
+    assert search.n_resources_ == [10, 20, 40]
     assert np.isfinite(search.cv_results_["mean_test_score"]).all()
     best = task.refit(search)
     assert best.n_estimators == search.best_params_["n_estimators"]
@@ -239,7 +242,9 @@ def test_halving_takes_a_parameter_as_its_resource(fem):
 
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"windowedalarm__window": ["1D", "7D"]}
-    search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*weather that the other folds have not seen")
+        search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     with pytest.warns(UserWarning, match="fitted best_estimator_ to all records of the task, damaged ones"):
         best = task.refit(search)
     expected = with_memory("7D").fit(SIDE_BY_SIDE)
@@ -286,10 +291,10 @@ def test_confirmation_in_the_same_weather_says_so(fem):
 
 
 def test_scenarios_of_uncertain_severity_are_drawn_anew(fem):
-    uncertain = UncertainDamage("uncertain", {"bottom": (0.2, 0.05)}, n_draws=2, random_state=0)
+    uncertain = UncertainDamage("uncertain", pd.DataFrame({"bottom": [0.1, 0.2]}))
     task = task_of(fem, [Scenario("healthy"), uncertain])
     first, second = (task.X[MODES].iloc[rows_of(task, "uncertain", repeat)].to_numpy() for repeat in (0, 1))
-    assert abs(np.log(first / second).mean()) > 1e-4
+    assert np.log(first / second).mean() > 0.005
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -20,11 +20,11 @@ from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.detectability._pod_curve import check_probability
-from skthermo.studies.detectability._simulation import clean_frequencies
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._task_scorer import TaskScorer
 from skthermo.studies.detectability._view import View
-from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
+from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 
 YEAR = 365.2425  # days
 SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
@@ -32,6 +32,11 @@ SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit int
 
 class DetectionTask(Bunch):
     """Labelled records, measured and simulated, on which a detector is tuned; `detection_task` makes it.
+
+    Parameters
+    ----------
+    **kwargs : dict
+        The attributes.
 
     Attributes
     ----------
@@ -50,9 +55,27 @@ class DetectionTask(Bunch):
     states : DataFrame of shape (n_records, 2)
         Name of the ``scenario`` (missing for the baseline) and number of the ``repeat`` (-1) of each record.
 
+    fem, T, scenarios, noise, seeds : object
+        What the records were simulated with.
+
+    See Also
+    --------
+    detection_task : Makes it, and says what the score is.
+
     Examples
     --------
-    See `detection_task`.
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector
+    >>> from skthermo.studies import detection_task, sweep
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> scenarios = [{}, {"bottom": 0.2}]
+    >>> task = detection_task(fem, weather, scenarios, columns=fem.mode_names_, n_repeats=2, random_state=0)
+    >>> detector = task.refit(MahalanobisDetector())
+    >>> train, test = task.cv[0]
+    >>> print(f"{task.scoring(detector, task.X.iloc[test], task.y.iloc[test]):.1f} found")
+    0.9 found
     """
 
     X: pd.DataFrame
@@ -61,6 +84,9 @@ class DetectionTask(Bunch):
     scoring: TaskScorer
     baseline: pd.DataFrame
     states: pd.DataFrame
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
 
     def refit(self, detector: Any) -> Any:
         """A detector, or the best one of a search, fitted to the baseline alone.
@@ -95,7 +121,7 @@ class DetectionTask(Bunch):
                     "search that refits",
                 )
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
-        check_detector(detector)
+        check_detector(detector, "the detector")
         return clone(detector).fit(self.baseline)
 
     def confirm(
@@ -291,12 +317,18 @@ def detection_task(
     >>> scenarios = sweep(fem, (0.1,), ["bottom", "top"])
     >>> task = detection_task(fem, weather, scenarios, columns=fem.mode_names_, n_repeats=4, random_state=0)
     >>> task.X.shape, task.states["scenario"].value_counts().to_dict()
+    ((4745, 6), {'healthy': 1460, 'bottom 10 %': 1460, 'top 10 %': 1460})
     >>> grid = {"window": [1, 3, 7], "rule": ["mean", "m-of-n"]}
     >>> search = GridSearchCV(WindowedAlarm(1), grid, cv=task.cv, scoring=task.scoring, refit=False)
     >>> search.fit(task.X, task.y).best_params_
+    {'rule': 'mean', 'window': 7}
     >>> later = make_truss_campaign(random_state=2).temperatures
     >>> detectors = {"tuned": search, "single records": WindowedAlarm(1)}
-    >>> task.confirm(detectors, later, random_state=0)[["tuned", "fresh", "optimism", "false_alarms"]].round(2)
+    >>> task.confirm(detectors, later, random_state=0)[["tuned", "fresh", "fresh_lowest", "fresh_highest"]].round(2)
+                    tuned  fresh  fresh_lowest  fresh_highest
+    detector
+    tuned            0.65   0.65          0.61           0.69
+    single records   0.14   0.15          0.13           0.17
     """
     seeds = _seeds(n_repeats, random_state)[:, 0]
     n_splits = positive_integer(n_splits, "n_splits")
@@ -306,7 +338,7 @@ def detection_task(
     check_chain(fem)
     table = _baseline(fem, baseline)
     table = table[_columns(table, columns, fem.mode_names_)]
-    return _task(fem, T, _scenarios(fem, scenarios), table, noise, limit, n_splits, seeds)
+    return _task(fem, T, read_scenarios(scenarios, fem.model), table, noise, limit, n_splits, seeds)
 
 
 def _task(
@@ -320,13 +352,12 @@ def _task(
     index = _moved(T, baseline, n_repeats * n_scenarios)
     with warnings_once("in the simulations of this task"), single_blas_thread():
         clean = clean_frequencies(fem, scenarios, T, len(seeds))
-        tables = []
-        for repeat, seed in enumerate(seeds):
-            factors, draws = (
-                1 + fem.draw_noise(T, noise, random_state=int(seed)),
-                (clean[one.name] for one in scenarios),
-            )
-            tables += [np.hstack([as_floats(T), one[repeat % len(one)] * factors])[:, positions] for one in draws]
+        simulation = Simulation(fem, {}, scenarios, T, clean, noise, None)
+        tables = [
+            np.hstack([as_floats(T), one.values])[:, positions]
+            for repeat, seed in enumerate(seeds)
+            for one in simulation.records(scenarios, repeat, [seed])
+        ]
     X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)]).rename_axis(baseline.index.name)
     y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
     state = np.repeat(np.arange(len(tables)), n_records)
@@ -419,19 +450,4 @@ def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) ->
 def _seeds(n_repeats: Any, random_state: Any) -> NDArray[np.intp]:
     """Seeds of the noise of each repeat: of a task, and of its confirmation."""
     size = positive_integer(n_repeats, "n_repeats"), 2
-    return as_random_state(random_state).randint(np.iinfo(np.int32).max, size=size)
-
-
-def _scenarios(fem: Any, given: Any) -> list[BaseScenario]:
-    """The scenarios; an error if they are wrong."""
-    if isinstance(given, type) or not isinstance(given, Iterable):
-        raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
-    scenarios, groups = list(given), getattr(fem.model, "groups", None)
-    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
-    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
-    if wrong or not names or len(set(names)) < len(names):
-        raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
-    for scenario in scenarios:
-        if groups is not None:
-            check_groups(scenario.groups, groups)
-    return scenarios
+    return as_random_state(random_state).randint(LARGEST_SEED, size=size)

@@ -72,7 +72,7 @@ class TaskScorer:
 
     def decisions(self, estimator: Any, X: pd.DataFrame, y: ArrayLike | None = None) -> Decisions:
         """Decisions on rows of the task; lags and windows of a state see no record of another."""
-        check_detector(estimator)
+        check_detector(estimator, "the detector")
         self._check_columns(estimator, X)
         rows = self._rows(X)
         labels = self.labels.to_numpy()[rows] if y is None else np.asarray(y)
@@ -93,7 +93,8 @@ class TaskScorer:
         if (rows < 0).any():
             raise ValueError(
                 f"{(rows < 0).sum()} of {len(rows)} rows are no simulated records of the task, the first "
-                f"{X.index[(rows < 0).argmax()]}; expected rows of the task's X, split by its cv"
+                f"{X.index[(rows < 0).argmax()]}; expected rows of the task's X, split by its cv, and no score of the "
+                "baseline on which a detector is fitted (return_train_score=False)"
             )
         return rows
 
