@@ -12,8 +12,8 @@ import pandas as pd
 from skthermo._formatting import percent, share_text
 from skthermo.plotting._axes import Axes, figure_legend, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE
+from skthermo.plotting._tables import check_study
 from skthermo.plotting.comparison._rows import (
-    check_study,
     in_percent,
     name_rows,
     note,
