@@ -42,6 +42,7 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
     best = ranking.index[0]
     assert best in (HOSTILE, QUOTED)
     assert f"Recommended is \N{LEFT DOUBLE QUOTATION MARK}{best}\N{RIGHT DOUBLE QUOTATION MARK}: it finds" in page.text
+    assert "as was asked for" not in page.text
     assert "4\N{NO-BREAK SPACE}alarm systems were tested" in page.text
     assert f"More false alarms than 10\N{NO-BREAK SPACE}%: \N{LEFT DOUBLE QUOTATION MARK}{LOUD}" in page.text
     assert f"{FAILING}\N{RIGHT DOUBLE QUOTATION MARK} (ValueError: " in page.text
