@@ -12,6 +12,8 @@ Run it with ``python examples/plot_detectors.py``. It needs :download:`detector_
 
 # sphinx_gallery_thumbnail_number = 1
 
+import warnings
+
 from detector_recipes import field_detectors
 from page_recipes import command_line, save_figures
 
@@ -66,7 +68,7 @@ RankingDisplay.from_estimator(study, max_false_alarms=0.03)
 # %%
 # Damage found over false alarms, for all thresholds.
 
-few = [ranking.index[0], "raw, 20 neighbours", "raw, Mahalanobis", "raw, cointegration"]
+few = [ranking.index[0], "raw, 20 neighbours", "raw, isolation forest", "raw, less 2 components", "raw, cointegration"]
 ROCDisplay.from_estimator(study, detectors=few)
 
 # %%
@@ -84,17 +86,15 @@ print(f"rank correlation of damage found: {true['pod'].corr(ranking['pod'], meth
 # %%
 # Weather that the baseline never saw
 # -----------------------------------
-# The same detectors in a year that is 10 °C colder. Neighbours and forests find frequencies there that no record of the
-# baseline had, and call them damage. Principal components left out and cointegration go on where frequencies
-# move together as before. The simulation foretells which of them will fail, before the cold year comes.
+# Some of them in a year that is 10 °C colder. Neighbours and forests find frequencies there that no record of the
+# baseline had, and call them damage. Principal components left out and cointegration hold as long as frequencies move
+# together as before. The simulation foretells which of them will fail, before the cold year comes.
 
-colder = DetectabilityStudy(fem, detectors, scenarios[:1], n_repeats=2, random_state=0)
-rates = {}
-for name, T in (("like the baseline", later.temperatures), ("10 °C colder", later.temperatures - 10)):
-    rates[name] = colder.run(T, baseline).set_index("detector")["rate"]
-
-# %%
-for name in ("raw, 20 neighbours", "raw, isolation forest", "raw, less 2 components", "raw, cointegration"):
-    print(name, *(f"{where}: {rate[name]:.1%}" for where, rate in rates.items()), sep=", ")
+colder = DetectabilityStudy(fem, {name: detectors[name] for name in few}, scenarios[:1], n_repeats=5, random_state=0)
+with warnings.catch_warnings():
+    warnings.filterwarnings("ignore", ".*temperatures far outside")  # as they are meant to be
+    rates = colder.run(later.temperatures - 10, baseline).set_index("detector")["rate"]
+for name, rate in rates.items():
+    print(f"{name}: {ranking.loc[name, 'false_alarms']:.1%} false alarms, 10 °C colder {rate:.1%}")
 
 save_figures(options.figures)
