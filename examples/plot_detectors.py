@@ -17,7 +17,7 @@ import warnings
 from detector_recipes import field_detectors
 from page_recipes import command_line, save_figures
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss, make_truss_campaign, steel_modulus
 from skthermo.fem import add_noise
 from skthermo.plotting import AgreementDisplay, RankingDisplay, ROCDisplay
 from skthermo.studies import DetectabilityStudy, sweep
@@ -74,9 +74,12 @@ ROCDisplay.from_estimator(study, detectors=few)
 # %%
 # Would truth have chosen the same?
 # ---------------------------------
-# Measured, here true, rates over simulated ones. A detector on the diagonal does what the simulation promised.
+# Measured rates, here those of true records, beside simulated ones. Found damage agrees, and so does its order. False
+# alarms are more than simulated: the simulated noise is drawn from the residuals of the baseline, and the detectors have
+# learned that baseline. Leave room below the limit.
 
-AgreementDisplay.from_estimator(study)
+results = study.results_
+AgreementDisplay.from_predictions(results[results["scenario"].isin(["healthy", "bottom 10 %", "diagonal 5 %"])])
 true = study.ranking(max_false_alarms=0.03, source="reference")
 best = true.loc[ranking.index[0], "pod"]
 print(f"first by simulation: {ranking.index[0]}, which finds {best:.1%} of the true damaged records")
@@ -88,13 +91,16 @@ print(f"rank correlation of damage found: {true['pod'].corr(ranking['pod'], meth
 # -----------------------------------
 # Some of them in a year that is 10 °C colder. Neighbours and forests find frequencies there that no record of the
 # baseline had, and call them damage. Principal components left out and cointegration hold as long as frequencies move
-# together as before. The simulation foretells which of them will fail, before the cold year comes.
+# together as before. The simulation foretells that, before the cold year comes. It favours broken lines, however: the
+# chain, too, continues by broken lines where it has no records, and so cannot know that they err there.
 
+cold = later.temperatures - 10
+clean_cold = later.model.frequencies(steel_modulus(cold))
 colder = DetectabilityStudy(fem, {name: detectors[name] for name in few}, scenarios[:1], n_repeats=5, random_state=0)
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", ".*temperatures far outside")  # as they are meant to be
-    rates = colder.run(later.temperatures - 10, baseline).set_index("detector")["rate"]
-for name, rate in rates.items():
-    print(f"{name}: {ranking.loc[name, 'false_alarms']:.1%} false alarms, 10 °C colder {rate:.1%}")
+    colder.run(cold, baseline, reference=lambda scenario, seed: add_noise(clean_cold, 0.01, random_state=seed))
+rates = colder.results_.pivot(index="detector", columns="source", values="rate").loc[few]
+print((100 * rates.assign(**{"not colder": ranking["false_alarms"]})).round(1).to_string())
 
 save_figures(options.figures)

@@ -102,7 +102,8 @@ def main():
         for name in runs[0]:
             false, found = np.array([run[name] for run in runs]).T
             error = np.std(false, ddof=1) / np.sqrt(len(false)) if len(false) > 1 else np.nan
-            table.setdefault((case, "false alarms"), {})[name] = f"{false.mean():.1f} ± {error:.1f}"
+            shown = f"{false.mean():.1f}" + f" ± {error:.1f}" * (len(false) > 1)
+            table.setdefault((case, "false alarms"), {})[name] = shown
             table.setdefault((case, "found"), {})[name] = f"{found.mean():.1f}"
             if case in REPEATS and false.mean() > ASKED + SLACK + 2 * error:
                 missed.append(f"{name}, {case}")
