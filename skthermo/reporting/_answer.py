@@ -103,6 +103,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     if (results["source"] == REFERENCE).any():
         introduction += " Rows called reference are of records that were given to compare the simulations with."
     distance = "The index is the Mahalanobis distance, not squared."
+    judge = last_step(study.detectors_[study.detector_name()])
     parts = [
         paragraphs(introduction),
         table("Alarms in every scenario.", columns, cells),
