@@ -108,7 +108,8 @@ def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study,
     for name in table.index[:-1]:
         calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
         threshold = calibration[int(0.02 * calibration.size)]
-        assert (calibration < threshold).sum() == int(0.02 * calibration.size)
+        n_tied = (calibration == threshold).sum()  # resampled noise repeats some records
+        assert 0 <= int(0.02 * calibration.size) - (calibration < threshold).sum() < n_tied
         pod = np.mean([(decisions < threshold).mean() for decisions in damaged(study, name)])
         assert table.loc[name, "pod_equal"] == pytest.approx(pod)
 
