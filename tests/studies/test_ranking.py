@@ -209,7 +209,7 @@ def test_in_sentences(study, table):
     )
     assert said[1].startswith("Clearly worse: 'raw' (")
     assert said[2].startswith("More false alarms than 2.0%: 'loud' (")
-    assert said[3] == "Failed: 'broken' (OSError: no dice)."
+    assert said[3] == "Stopped by an error: 'broken' (OSError: no dice)."
 
 
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
