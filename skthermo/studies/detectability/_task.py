@@ -415,7 +415,8 @@ def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     for length in (YEAR, 1.0):
         days = np.round(length * (max(np.ceil(wait / length), 0) + np.ceil(period / length) * np.arange(n_states)))
         if days[-1] < room:
-            return pd.DatetimeIndex(np.concatenate([stamps + one * day for one in days]))
+            moved = stamps[:0].append([stamps + one * day for one in days])
+            return moved.tz_convert(baseline.index.tz) if stamps.tz is not None else moved
     raise ValueError(
         f"{n_states} states of {period:.0f} days, each with stamps of its own, would end after the year 2262; expected "
         "fewer scenarios or repeats, or a shorter T"
