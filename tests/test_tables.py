@@ -60,7 +60,7 @@ def test_columns_of_objects_become_floats():
     np.testing.assert_array_equal(as_floats(frame), [[1.0, np.nan], [np.nan, 2.0]])
 
 
-@pytest.mark.filterwarnings("ignore:1 of 60 rows have no temperature at all")
+@pytest.mark.filterwarnings("ignore:1 of 60 rows cannot be predicted")
 @UNRELATED
 @each_estimator
 def test_masked_values_are_missing_to_estimators(estimator):

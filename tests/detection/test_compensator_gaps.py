@@ -103,7 +103,7 @@ def test_targets_that_are_never_there_together_are_compensated():
     np.testing.assert_array_equal(residuals.isna(), holed[MODES].isna())
 
 
-EMPTY = r"ignore:[0-9]+ of [0-9]+ rows have no temperature at all"
+EMPTY = r"ignore:[0-9]+ of [0-9]+ rows cannot be predicted and are NaN"
 
 
 @pytest.mark.filterwarnings(EMPTY)

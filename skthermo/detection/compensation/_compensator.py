@@ -417,7 +417,8 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
 def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     """Rows of which the regression predicts nothing, so that they are not judged; a warning counts them."""
     unknown = np.isnan(predicted).all(axis=1)
-    message = told_unpredicted(unknown, weather)
+    others = "of which the estimator predicts nothing, as where lags reach to no record"
+    message = told_unpredicted(unknown, weather, others)
     if message:
         warn_user(message, "rows that cannot be predicted")
     return unknown
