@@ -72,7 +72,6 @@ html_js_files = [("mathjax/settings.js", {"priority": 100})]
 mathjax_path = "mathjax/tex-svg.js"
 html_show_sourcelink = False
 html_theme_options = {
-    "github_url": "https://github.com/skthermo/skthermo",
     "show_nav_level": 1,
     "navigation_with_keys": False,
     "show_toc_level": 2,

@@ -17,9 +17,10 @@ def import_optional(module: str, *, extra: str) -> ModuleType:
     >>> import_optional("no_such_plotter", extra="plot")
     Traceback (most recent call last):
     ...
-    ImportError: 'no_such_plotter' is not installed; get it with: pip install "skthermo[plot]"
+    ImportError: 'no_such_plotter' is not installed; get it with: pip install ".[plot]" in a copy of the repository
     """
     try:
         return import_module(module)
     except ImportError as error:
-        raise ImportError(f'{module!r} is not installed; get it with: pip install "skthermo[{extra}]"') from error
+        command = f'pip install ".[{extra}]"'
+        raise ImportError(f"{module!r} is not installed; get it with: {command} in a copy of the repository") from error

@@ -42,6 +42,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.refinement": set(),
     "surrogate.inverse": {"surrogate.refinement"},
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
+    "plotting.comparison": set(),
     "plotting.structures": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
@@ -178,5 +179,5 @@ def test_fem_needs_neither_pandas_nor_scikit_learn_to_be_imported():
 
 def test_a_missing_extra_is_named():
     assert import_optional("json", extra="plot").dumps([1]) == "[1]"
-    with pytest.raises(ImportError, match=r"'no_such_module' is not installed; .* install \"skthermo\[plot"):
+    with pytest.raises(ImportError, match=r"'no_such_module' is not installed; .* install \"\.\[plot"):
         import_optional("no_such_module", extra="plot")

@@ -12,8 +12,6 @@ import pytest
 import skthermo
 
 ROOT = Path(__file__).parents[1]
-ADDRESS = "https://raw.githubusercontent.com/skthermo/skthermo/main/"
-FILES = "https://github.com/skthermo/skthermo/blob/main/"
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 API = ROOT / "docs" / "reference" / "api"
@@ -63,9 +61,11 @@ def test_the_reference_lists_every_public_name(room):
     assert sorted(" ".join(tables).split()) == sorted(importlib.import_module(f"skthermo.{room}").__all__)
 
 
-def test_the_reference_has_a_page_for_every_package():
+def test_reference_and_guide_have_every_package():
     toctree = re.search(r"toctree::\n   :hidden:\n\n((?:   \w+\n)+)", (API / "index.rst").read_text())[1].split()
+    inside = re.findall(r"</reference/api/(?!index)(\w+)>", (ROOT / "docs/guide/inside.rst").read_text())
     assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
+    assert sorted(inside) == sorted(ROOMS)
 
 
 def test_sources_are_listed_and_cited():
@@ -75,13 +75,23 @@ def test_sources_are_listed_and_cited():
     assert sorted(cited) == sorted(listed)
 
 
-@pytest.mark.parametrize(("pattern", "address"), [(r"!\[.*?\]\((.*?)\)", ADDRESS), (r"[^!]\[.*?\]\((.*?)\)", FILES)])
-def test_images_and_links_of_readme_exist(pattern, address):
-    targets = re.findall(pattern, (ROOT / "README.md").read_text())
-    assert targets
-    for target in targets:
-        assert target.startswith(address), "a package index shows README without the repository beside it"
-        assert (ROOT / target.removeprefix(address)).is_file()
+def test_images_and_links_of_readme_are_files_of_any_copy():
+    text = (ROOT / "README.md").read_text()
+    images, links = (re.findall(pattern, text) for pattern in (r"!\[[^]]*\]\((.*?)\)", r"[^!]\[[^]]*\]\((.*?)\)"))
+    assert images
+    assert links
+    assert not [target for target in images + links if not (ROOT / target).is_file()]
+
+
+def test_no_file_names_an_address_of_the_project_that_does_not_exist():
+    """The project has no address yet, neither a page of its own nor one at a package index."""
+    folders = [ROOT / name for name in ("docs", "examples", "skthermo", "tests", "tools", ".ci")]
+    below = [path for folder in folders for path in folder.rglob("*") if not BUILT & set(path.parts)]
+    address = re.compile(rb"(?:https?://|www\.|git@)[^\s\"'<>`]*skthermo|pip install [\"']?skthermo", re.IGNORECASE)
+    files = [path for path in [*ROOT.iterdir(), *below] if path.is_file()]
+    found = {str(path.relative_to(ROOT)): address.findall(path.read_bytes()) for path in files}
+    assert {"README.md", "pyproject.toml", "CITATION.cff", "docs/conf.py"} < set(found)
+    assert not {name: addresses for name, addresses in found.items() if addresses}
 
 
 def test_the_citation_is_of_this_version():

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
@@ -67,9 +69,17 @@ class Neighbourhoods:
         stop = sorted_times.searchsorted(self.times + self.reach, side="right")
         return np.maximum(first, place - most), np.minimum(stop, place + most + 1)
 
-    def folds(self, n_folds: int) -> Iterator[tuple[Rows, Rows]]:
-        """Blocks of time dealt in turn to some folds, each after the records that are no neighbours of any of it."""
+    def folds(self, n_folds: int, block: Any = None) -> Iterator[tuple[Rows, Rows]]:
+        """Blocks of time dealt in turn to some folds, each after the records that are no neighbours of any of it.
+
+        After all others if the length of a block is given.
+        """
         n_rows = len(self.times)
+        if block is not None:
+            is_timed = np.ptp(self.times) > MOST_ROWS
+            stamps = pd.DatetimeIndex(self.times.astype("datetime64[ns]")) if is_timed else self.times
+            yield from BlockedKFold(min(n_folds, n_rows), block=block).split(pd.DataFrame(index=stamps))
+            return
         block = max(n_rows // N_BLOCKS, int(np.ceil(BLOCK * self.correlation_time)))
         fold_of = np.empty(n_rows, dtype=np.intp)
         fold_of[self.order] = BlockedKFold(min(n_folds, n_rows), block=block).fold_of(self.records)
@@ -82,10 +92,10 @@ class Neighbourhoods:
         before = np.concatenate([[0], np.cumsum(chosen[self.order])])
         return np.flatnonzero(before[stop] == before[first])
 
-    def out_of_fold(self, n_folds: int, index_of: Callable[[Array, Array], Array]) -> Array:
+    def out_of_fold(self, n_folds: int, index_of: Callable[[Array, Array], Array], block: Any = None) -> Array:
         """Damage index of the records of each fold, a function of the records away from it and of its own."""
         index = np.empty(len(self.times))
-        for rest, fold in self.folds(n_folds):
+        for rest, fold in self.folds(n_folds, block):
             index[fold] = index_of(self.records[rest], self.records[fold])
         return index
 

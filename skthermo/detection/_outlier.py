@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +13,7 @@ from sklearn.base import BaseEstimator, clone
 from skthermo._arrays import Array, as_floats
 from skthermo._formatting import listed
 from skthermo._frames import column_names
-from skthermo._validation import HasMethods, StrOptions
+from skthermo._validation import HasMethods, Interval, StrOptions
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
@@ -42,6 +44,10 @@ class OutlierDetector(DamageDetector):
         - ``"quantile"``: the (1 - contamination) quantile of the indices of the records that the estimator was fitted
           on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
           raise more false alarms than asked for.
+    block : int or duration, optional
+        Length of the blocks of time of the conformal threshold, as in `~skthermo.preprocessing.BlockedKFold`: a number
+        of rows or, for frames on a ``DatetimeIndex``, a duration such as ``"1D"``; only the block itself is then left
+        out. By default five correlation times, or a fiftieth of the records where that is longer.
 
     Attributes
     ----------
@@ -73,7 +79,11 @@ class OutlierDetector(DamageDetector):
     vary more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
 
     The correlation time, and the neighbours that are left out, are those of `MahalanobisDetector`; blocks last five
-    correlation times at least. The promise is also the same: about the rate asked for or less, on the mean over
+    correlation times at least. Raw frequencies remember as long as the weather does. In a baseline of one winter, such
+    blocks leave out whole spells of frost, which nothing else in it resembles, and the threshold hides damage. A
+    ``block`` of a day, of hourly records, supposes that frost which comes will be like frost that was: false alarms
+    are then those asked for as long as the weather is none that the baseline lacks, and what else records remember is
+    over within the day. The promise is also the same: about the rate asked for or less, on the mean over
     baselines that are like the records to come. After 365 records of 6 modes, 2 % asked, ``LocalOutlierFactor``,
     ``IsolationForest``, ``EllipticEnvelope`` and ``OneClassSVM`` raise 1.8, 1.7, 1.8 and 1.5 % false alarms; where
     neighbours in time have a correlation of 0.9, 2.1, 2.2, 1.6 and 1.1 % (by "quantile" 19.6, 7.3, 7.1 and 12.2 %).
@@ -106,6 +116,7 @@ class OutlierDetector(DamageDetector):
         **DamageDetector._parameter_constraints,
         "estimator": [HasMethods("fit")],
         "threshold": [StrOptions({"conformal", "quantile"})],
+        "block": [Interval(Integral, 1, None, closed="left"), str, timedelta, np.timedelta64, None],
     }
 
     def __init__(
@@ -114,10 +125,12 @@ class OutlierDetector(DamageDetector):
         contamination: float = 0.02,
         *,
         threshold: Literal["conformal", "quantile"] = "conformal",
+        block: Any = None,
     ):
         self.estimator = estimator
         self.contamination = contamination
         self.threshold = threshold
+        self.block = block
 
     def _learn(self, F: Array, times: Array) -> Array:
         complete = ~np.isnan(F).any(axis=1)
@@ -135,7 +148,7 @@ class OutlierDetector(DamageDetector):
         if self.threshold == "quantile":
             return self._index(F)
         index = np.full(len(F), np.nan)
-        index[complete] = baseline.out_of_fold(N_FOLDS, self._index_from)
+        index[complete] = baseline.out_of_fold(N_FOLDS, self._index_from, self.block)
         return index
 
     def _limit(self, index: Array) -> float:

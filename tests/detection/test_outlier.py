@@ -140,6 +140,34 @@ def test_each_record_is_judged_by_a_clone_that_was_fitted_on_records_far_in_time
     assert detector.n_independent_ < 50
 
 
+@pytest.mark.parametrize("block", [24, "1D", pd.Timedelta("1D")])
+@pytest.mark.filterwarnings("ignore:the 398 baseline records depend on each other")
+def test_blocks_as_long_as_wanted_are_left_out_and_nothing_else(block):
+    rows = pd.DataFrame({"score": np.arange(400.0), "number": np.arange(400)}, STAMPS)
+    rows.loc[STAMPS[[5, 100]], "score"] = np.nan
+    Recorder.seen.clear()
+    OutlierDetector(Recorder(), block=block).fit(rows)
+    everything, *others = Recorder.seen
+    left_out = [np.setdiff1d(everything, rest) for rest in others]
+    np.testing.assert_array_equal(np.sort(np.concatenate(left_out)), everything)
+    if block != 24:  # of 24 complete rows, which do not begin at midnight
+        for fold, rest in enumerate(left_out):
+            assert set(rest // 24 % 5) == {fold}
+
+
+@pytest.mark.parametrize(
+    ("rows", "block", "message"),
+    [
+        (F.to_numpy(), "1D", "block is '1D', but X has no DatetimeIndex; expected a number of rows"),
+        (F, "a day", "block is 'a day'; expected a duration of fixed length"),
+        (F, 0, "'block' parameter of OutlierDetector must be"),
+    ],
+)
+def test_blocks_are_rows_or_durations(rows, block, message):
+    with pytest.raises(ValueError, match=message):
+        OutlierDetector(OneClassSVM(), block=block).fit(rows)
+
+
 def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
     """More estimators, lengths and correlations: tests/benchmarks/detection_thresholds.py."""
     rates = {"conformal": [], "quantile": []}
