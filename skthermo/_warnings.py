@@ -104,7 +104,7 @@ def findings_of(check: Callable[..., Any], *tables: Any) -> Any:
     return found[content]
 
 
-def explain_rows(table: Records, rows: NDArray[np.bool_]) -> Records:
+def explain_rows(table: Records, rows: NDArray[np.bool_] | np.bool_) -> Records:
     """The table, of which a warning has said why some rows have no value."""
     if rows.any():
         key = id(table)
@@ -112,10 +112,10 @@ def explain_rows(table: Records, rows: NDArray[np.bool_]) -> Records:
     return table
 
 
-def explained_rows(table: Any) -> NDArray[np.bool_]:
-    """Which rows of a table have no value for a cause that a warning has given."""
+def explained_rows(table: Any) -> NDArray[np.bool_] | np.bool_:
+    """Which rows of a table have no value for a cause that a warning has given; False where it has none of them."""
     known = _explained.get(id(table))
-    return np.zeros(len(table), dtype=bool) if known is None else known[1]
+    return np.False_ if known is None else known[1]
 
 
 @contextmanager

@@ -111,8 +111,9 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
         index = self._index(self._records(X, F))
         told = explained_rows(X) | explained_rows(index)
-        if np.isnan(index).all() and not told.all():
-            self._warn_of_not_judged(X, ~told)
+        untold = np.isnan(index) & ~told
+        if np.isnan(index).all() and untold.any():
+            self._warn_of_not_judged(X, untold)
         if isinstance(X, pd.DataFrame):
             return explain_rows(pd.Series(index, index=X.index, name="damage_index"), told)
         return explain_rows(index, told)

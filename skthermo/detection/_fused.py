@@ -141,7 +141,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
             scores = [fitted.score_samples(X) for fitted in self.detectors_]
         thresholds = [last_step(fitted).threshold_ for fitted in self.detectors_]
         index = _mean([-score / limit for score, limit in zip(scores, thresholds, strict=True)])
-        return explain_rows(index, np.isnan(index) & np.all([explained_rows(score) for score in scores], axis=0))
+        told = [explained_rows(score) for score in scores]
+        return explain_rows(index, np.logical_and.reduce(np.broadcast_arrays(np.isnan(index), *told)))
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return f"none of the {len(self.detectors_)} detectors can judge them"

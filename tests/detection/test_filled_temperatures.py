@@ -93,6 +93,7 @@ def test_the_error_of_a_linear_regression_is_its_slope_times_what_is_not_known()
 
 
 @FILLED
+@pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows cannot be predicted")
 def test_lags_of_a_filled_temperature_count_too():
     lagged = make_pipeline(LagFeatures([0, 3], freq="1h", padding="nan"), LinearRegression())
     compensator = TemperatureCompensator(lagged, targets=MODES, scale="global").fit(BASELINE)

@@ -34,7 +34,7 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
-from skthermo._warnings import explain_rows, findings_of, warn_user, warnings_once
+from skthermo._warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
 from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted, warn_of_unseen
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
@@ -293,6 +293,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             warn_user(apart, "sensor apart from others")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
+        unknown = warn_of_unpredicted(predicted, weather)
         residuals = as_floats(frequencies) - predicted
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (
@@ -300,7 +301,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             if self.scale is None
             else self.spread_.whiten(weather, residuals, fills)
         )
-        return explain_rows(frame_like(frequencies, scaled), warn_of_unpredicted(predicted, weather))
+        return explain_rows(frame_like(frequencies, scaled), unknown)
 
     @overload
     def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -415,10 +416,10 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
 
 
 def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
-    """Rows of which the regression predicts nothing, so that they are not judged; a warning counts them."""
+    """Rows of which nothing is predicted, so that they are not judged; a warning counts those not yet explained."""
     unknown = np.isnan(predicted).all(axis=1)
     others = "of which the estimator predicts nothing, as where lags reach to no record"
-    message = told_unpredicted(unknown, weather, others)
+    message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
     if message:
         warn_user(message, "rows that cannot be predicted")
     return unknown

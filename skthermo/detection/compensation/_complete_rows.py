@@ -20,7 +20,7 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
-from skthermo._warnings import told_around
+from skthermo._warnings import explain_rows, explained_rows, told_around
 from skthermo.detection.compensation._folds import Folds
 from skthermo.preprocessing import LagFeatures, RecordFindings
 
@@ -51,7 +51,8 @@ class Regression:
 
     def predict(self, X: Any) -> NDArray[np.float64]:
         """Predictions, NaN for rows that the estimator does not accept."""
-        return self.rest.predict(self._inputs(X))
+        inputs = self._inputs(X)
+        return explain_rows(self.rest.predict(inputs), explained_rows(inputs))
 
     def out_of_fold(self, X: Any, y: Any, folds: Folds) -> Any:
         """Predictions by clones of the rest that are fitted on other rows; the first transformers know all rows."""
