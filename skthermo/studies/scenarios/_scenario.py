@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from skthermo._arguments import check_names
+from skthermo._arguments import as_mapping, check_names
 from skthermo._arrays import HUGE, is_real, real_array
 from skthermo.studies.scenarios._base import (
     BaseScenario,
@@ -111,14 +111,30 @@ class Scenario(BaseScenario):
         return f"Scenario({', '.join([repr(self.name), *(f'{k}={_short(v)}' for k, v in self.changes(None).items())])})"
 
 
-def as_scenario(given: Any) -> Any:
+def read_scenarios(given: Any, model: Any) -> list[BaseScenario]:
+    """Scenarios of a study of a model, mappings of groups to severities among them; an error if they are wrong."""
+    if isinstance(given, type) or not isinstance(given, Iterable):
+        raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
+    scenarios, groups = [_as_scenario(one) for one in given], getattr(model, "groups", None)
+    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
+    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
+    if wrong or not names or len(set(names)) < len(names):
+        raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
+    for scenario in scenarios:
+        if groups is not None:
+            check_groups(scenario.groups, groups)
+    return scenarios
+
+
+def _as_scenario(given: Any) -> Any:
     """A scenario of a mapping of groups to severities, with a name such as "soil 18 %, piers 5 %"; others as they are.
 
     An empty mapping is the healthy structure.
     """
-    if not isinstance(given, Mapping):
+    mapping = as_mapping(given)
+    if not isinstance(mapping, Mapping):
         return given
-    damage = severities_of(given, f"{dict(given)!r:.100}")
+    damage = severities_of(mapping, f"{dict(mapping)!r:.100}")
     name = ", ".join(f"{group} {100 * severity:g} %" for group, severity in damage.items())
     return Scenario(name or "healthy", damage)
 
