@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from scipy.sparse import csr_array
 
 from skthermo.surrogate.chain._scatter import Scatter
 
@@ -22,18 +23,19 @@ def noise(memory, n_records, random, n_columns=2):
 
 @cache
 def neighbours(n_records, season):
-    """Records with the most similar weather, which has a season and weather of the day."""
+    """Averages over the records with the most similar weather, which has a season and weather of the day."""
     days, random = np.arange(n_records), np.random.RandomState(0)
     weather = np.cos(2 * np.pi * days / season) + 0.3 * random.standard_normal(n_records)
-    return np.abs(weather[:, np.newaxis] - weather).argsort(axis=1)[:, :NEAR]
+    near = np.abs(weather[:, np.newaxis] - weather).argsort(axis=1)[:, :NEAR].ravel()
+    return csr_array((np.full(near.size, 1 / NEAR), near, np.arange(0, near.size + 1, NEAR)), (n_records, n_records))
 
 
 def residuals(values, season=300):
     """Residuals of records, and what similar weather takes away."""
-    near = neighbours(len(values), season)
+    similar = neighbours(len(values), season)
 
     def less_similar(table):
-        return table - table[near].mean(axis=1)
+        return table - similar @ table
 
     return SimpleNamespace(values=values, own=values, is_overfitted=False, less_similar=less_similar)
 
