@@ -115,9 +115,10 @@ def study_of(severities):
 
 study = study_of(SEVERITIES)
 sources = {"thermo-mechanical": "reference", "data-informed": "data-informed"}
+detector = study.detector_name()
 shown = ["healthy", *(f"{group} 20 %" for group in GROUPS)]
-indices = {name: {label: study.indices_[name, source] for label, source in sources.items()} for name in shown}
-display = DamageIndexDisplay.from_scenarios(indices, study.threshold_, n_columns=2)
+indices = {name: {label: study.indices_[detector, name, source] for label, source in sources.items()} for name in shown}
+display = DamageIndexDisplay.from_scenarios(indices, study.thresholds_[detector], n_columns=2)
 display.figure_.set_size_inches(7, 4.6)
 
 # %%

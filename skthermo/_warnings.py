@@ -56,7 +56,7 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
     """Give warnings that differ only in their numbers once, when the context ends, and yield a list of their texts.
 
     ``where`` is said of the repetitions with their number, such as "in the simulations of this study"; by default they
-    are not mentioned.
+    are not mentioned. Detectors that warnings come from (`warnings_of_detector`) are named.
     """
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
@@ -66,12 +66,36 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
     for warning in caught:
         alike.setdefault(re.sub(r"[\d.]+", "0", str(warning.message)), []).append(warning)
     for first, *others in alike.values():
-        again = f" (and {len(others)} times more {where})" if others and where else ""
+        named = [one.message for one in (first, *others) if hasattr(one.message, "detector")]
+        detectors = dict.fromkeys(repr(message.detector) for message in named)
+        notes = [f"detectors {', '.join(detectors)}"] if detectors else []
+        notes += [f"and {len(others)} times more {where}"] if others and where else []
+        again = f" ({'; '.join(notes)})" if notes else ""
         texts.append(f"{first.message}{again}")
         if first.category is UserWarning:
             warn_user(f"{first.message}{again}", f"once: {first.message}")
         else:
+            if detectors:
+                first.message.args = (texts[-1],)
             warnings.warn_explicit(first.message, first.category, first.filename, first.lineno)
+
+
+@contextmanager
+def warnings_of_detector(name: str | None) -> Iterator[None]:
+    """Mark warnings with the detector that they come from, so that `warnings_once` can name it; without a name, and
+    outside the main thread, they pass as they are."""
+    if name is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        finally:
+            marked = list(caught)
+    for one in marked:
+        one.message.detector = name
+        warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
 
 
 @contextmanager

@@ -42,6 +42,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.refinement": set(),
     "surrogate.inverse": {"surrogate.refinement"},
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
+    "plotting.comparison": set(),
     "plotting.structures": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},

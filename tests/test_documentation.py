@@ -61,9 +61,11 @@ def test_the_reference_lists_every_public_name(room):
     assert sorted(" ".join(tables).split()) == sorted(importlib.import_module(f"skthermo.{room}").__all__)
 
 
-def test_the_reference_has_a_page_for_every_package():
+def test_reference_and_guide_have_every_package():
     toctree = re.search(r"toctree::\n   :hidden:\n\n((?:   \w+\n)+)", (API / "index.rst").read_text())[1].split()
+    inside = re.findall(r"</reference/api/(?!index)(\w+)>", (ROOT / "docs/guide/inside.rst").read_text())
     assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
+    assert sorted(inside) == sorted(ROOMS)
 
 
 def test_sources_are_listed_and_cited():

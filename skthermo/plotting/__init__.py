@@ -8,9 +8,11 @@ from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
+from skthermo.plotting.comparison import AgreementDisplay
 from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
 
 __all__ = [
+    "AgreementDisplay",
     "DamageIndexDisplay",
     "FitReportDisplay",
     "FrequencyTemperatureDisplay",

@@ -66,7 +66,7 @@ def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[s
 
 def _judged(study: Any) -> str:
     """How many simulated records the alarm system judged."""
-    unjudged = {name: index.isna() for (name, source), index in study.indices_.items() if source == SIMULATED}
+    unjudged = {name: index.isna() for (_, name, source), index in study.indices_.items() if source == SIMULATED}
     number, total = (int(sum(count)) for count in zip(*((u.sum(), len(u)) for u in unjudged.values()), strict=True))
     if not number:
         return "The alarm system judged every simulated record."
@@ -80,7 +80,7 @@ def _judged(study: Any) -> str:
 def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
-    scenarios = {scenario.name: scenario for scenario in study.scenarios}
+    scenarios = {scenario.name: scenario for scenario in study.scenarios_}
     columns = ["Scenario", "What is changed", "Records in alarm", "Bounds", "Records judged"]
     columns.append("Mean time to the first alarm")
     cells = [
@@ -117,7 +117,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
             "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
             "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
             "records of the damaged structure above."
-            + (f" {distance}" if isinstance(last_step(study.detector_), MahalanobisDetector) else ""),
+            + (f" {distance}" if isinstance(last_step(study.detectors_[study.detector_name()]), MahalanobisDetector) else ""),
             _damage_indices(study, findings, scenarios),
             "What the alarm system sees",
         ),
@@ -127,13 +127,13 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
 
 def _share_not_judged(study: Any, row: pd.Series) -> str:
     """What share of the records of a scenario was not judged; nothing if all were."""
-    share = float(study.indices_[row["scenario"], row["source"]].isna().mean())
+    share = float(study.indices_[row["detector"], row["scenario"], row["source"]].isna().mean())
     return f" ({share_text(share)} not judged)" if share else ""
 
 
 def _beginning(study: Any) -> str:
     """A sentence that says when the time to the first alarm begins."""
-    weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)].index
+    weather = study.indices_[next(key for key in study.indices_ if key[2] == SIMULATED)].index
     first = f", {_place(weather.min())}" if isinstance(weather, pd.DatetimeIndex) else ""
     return (
         " The time to the first alarm begins with the damage or, where that is there from the beginning or there is "
@@ -200,7 +200,8 @@ def _missed(rows: pd.DataFrame) -> Html:
 
 def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str, Any]) -> list[Html]:
     """One drawing for each family, and for each scenario that belongs to none."""
-    if study.threshold_ is None:
+    detector = study.detector_name()
+    if study.thresholds_[detector] is None:
         return []
     rows = study.results_[study.results_["source"] == SIMULATED]
     healthy = rows.loc[rows["measure"] == "PFA", "scenario"].head(1).tolist()
@@ -211,7 +212,7 @@ def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str
     shown += rows.loc[(rows["measure"] == "POD") & rows["family"].isna(), "scenario"].tolist()
     drawn = []
     for name in shown[:MOST_LISTED]:
-        indices = {scenario: study.indices_[scenario, SIMULATED] for scenario in (*healthy, name)}
+        indices = {scenario: study.indices_[detector, scenario, SIMULATED] for scenario in (*healthy, name)}
         onset = scenarios[name].onset if name in scenarios else None
         drawn.append(draw_damage_indices(study, indices, onset))
     return drawn

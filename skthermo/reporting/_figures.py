@@ -140,7 +140,7 @@ def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
 
 def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
-    threshold = study.threshold_
+    threshold = study.thresholds_[study.detector_name()]
     above = "; ".join(
         f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
         + (f", {counted(int(index.isna().sum()), 'record')} not judged" if index.isna().any() else "")

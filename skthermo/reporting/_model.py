@@ -27,7 +27,7 @@ def monitored(study: Any, structure: Any, families: list[str]) -> Html:
     sensors = _sensors(T)
     has_lags = len(sensors.columns) < len(T.columns)
     when, step = period_text(F.index), _step(F.index)
-    weather = study.indices_[next(key for key in study.indices_ if key[1] == SIMULATED)]
+    weather = study.indices_[next(key for key in study.indices_ if key[2] == SIMULATED)]
     then = period_text(weather.index)
     text = (
         f"The model learned from {counted(len(F), 'record')}{f' {when}' if when else ''}"

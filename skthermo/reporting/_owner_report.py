@@ -125,10 +125,10 @@ def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[st
 
 def _settings(study: Any, identified: Any) -> Html:
     """Parameters, versions and warnings."""
-    parts = {"model": study.fem, "alarm system": study.detector}
+    parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()]}
     rows = [[f"{part}: {name}", value] for part, estimator in parts.items() for name, value in _parameters(estimator)]
     rows += [
-        [f"study: {name}", value] for name, value in _parameters(study) if name not in ("fem", "detector", "scenarios")
+        [f"study: {name}", value] for name, value in _parameters(study) if name not in ("fem", "detectors", "scenarios")
     ]
     warned = [*getattr(study, "warnings_", [])]
     warned += [f"Identified damage: {text}" for _, text in ([] if identified is None else identified.warnings())]

@@ -3,9 +3,10 @@
     pip install pyod mapie smt
     OMP_NUM_THREADS=1 python tests/benchmarks/other_tools.py
 
-PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals; MAPIE's split conformal
-intervals of each frequency, calibrated on a second healthy year, beside `predict_interval`; SMT's Kriging beside
-scikit-learn's Gaussian process as inverse surrogate, without refining. What is not installed is left out.
+PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals, and both beside an
+isolation forest on raw frequencies; MAPIE's split conformal intervals of each frequency, calibrated on a second healthy
+year, beside `predict_interval`; SMT's Kriging beside scikit-learn's Gaussian process as inverse surrogate, without
+refining. What is not installed is left out.
 """
 
 import argparse
@@ -16,9 +17,12 @@ import warnings
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.compose import make_column_transformer
+from sklearn.ensemble import IsolationForest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
@@ -73,9 +77,16 @@ def detectors(seed):
 
     baseline, targets = records(seed)
     found = {}
-    for name, detector in {"MahalanobisDetector": MahalanobisDetector(), "PyOD's KNN": OutlierDetector(KNN())}.items():
-        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets, scale="global")
-        alarm = make_pipeline(compensator, detector).fit(baseline)
+    whitened = TemperatureCompensator(TemperatureMapper(), targets=targets, scale="global")
+    raw = make_column_transformer((StandardScaler(), targets))
+    for name, alarm in {
+        "whitened, MahalanobisDetector": make_pipeline(whitened, MahalanobisDetector()),
+        "whitened, PyOD's KNN": make_pipeline(whitened, OutlierDetector(KNN())),
+        "raw, MahalanobisDetector": make_pipeline(raw, MahalanobisDetector()),
+        "raw, PyOD's KNN of 20": make_pipeline(raw, OutlierDetector(KNN(n_neighbors=20))),
+        "raw, isolation forest": make_pipeline(raw, OutlierDetector(IsolationForest(random_state=seed))),
+    }.items():
+        alarm.fit(baseline)
         for severity in (0.0, 0.1, 0.2):
             later = records(1000 + seed, **({"bottom": severity} if severity else {}))[0]
             found[name, f"{severity:.0%} damage"] = 100 * (alarm.predict(later) == -1).mean()

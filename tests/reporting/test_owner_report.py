@@ -187,7 +187,7 @@ def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
     scenarios = [Scenario("one", {HOSTILE: 0.2})]
     truth = fem.simulate(T, damage={HOSTILE: 0.2}, noise=0.005, random_state=5)
     study = run_study(fem, T, scenarios, reference={"one": truth})
-    study.threshold_ = None  # as of detectors without one
+    study.thresholds_[study.detector_name()] = None  # as of detectors without one
     page = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
     assert "how often alarms are false is not known" in page.text
     assert "Only one severity was tested" in page.text

@@ -53,6 +53,8 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
     rows = {
         "family": "deck",
         "severity": severities,
+        "detector": "one",
+        "error": "",
         "source": SIMULATED,
         "measure": "POD",
         "rate": rates,
@@ -60,7 +62,14 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
         "highest": np.clip(rates + error, 0, 1),
         "n_effective": n_records,
     }
-    healthy = {"source": SIMULATED, "measure": "PFA", "rate": false_alarms, "highest": false_alarms + 0.01}
+    healthy = {
+        "detector": "one",
+        "source": SIMULATED,
+        "error": "",
+        "measure": "PFA",
+        "rate": false_alarms,
+        "highest": false_alarms + 0.01,
+    }
     study = DetectabilityStudy(None, None, [])
     study.results_ = pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True)
     study.confidence_ = 0.95

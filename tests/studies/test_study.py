@@ -20,6 +20,7 @@ YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures
 SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
 MODES = list(YEAR.frequencies)
+ONLY = "MahalanobisDetector"  # name of the only detector of a study
 
 
 def compensated(last=None):
@@ -36,11 +37,11 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
     study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3)
     results = study.run(WEATHER).set_index("scenario")
     detector = MahalanobisDetector().fit(YEAR.frequencies)
-    assert study.threshold_ == pytest.approx(detector.threshold_, rel=1e-9)
+    assert study.thresholds_[ONLY] == pytest.approx(detector.threshold_, rel=1e-9)
     for name, damage in (("healthy", None), ("a fifth", {"bottom": 0.2})):
         records = fem.simulate(WEATHER, damage=damage, noise=noise, random_state=first_seed(3))
         index = detector.damage_index(records)
-        pd.testing.assert_series_equal(study.indices_[name, "data-informed"], index)
+        pd.testing.assert_series_equal(study.indices_[ONLY, name, "data-informed"], index)
         assert results.loc[name, "rate"] == probability_of_detection(index, detector.threshold_)
         wait = time_to_detection(index, detector.threshold_)
         assert results.loc[name, "time_to_detection"] == wait
@@ -88,14 +89,14 @@ def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
     expected = -detector.score_samples(records.join(WEATHER)[[*MODES, "T2", "T1", "T3"]])
-    np.testing.assert_allclose(study.indices_["top 10 %", "data-informed"], expected)
+    np.testing.assert_allclose(study.indices_[ONLY, "top 10 %", "data-informed"], expected)
 
 
 def test_a_detector_may_see_some_of_the_modes(fem):
     study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1, random_state=0)
     few = study.run(WEATHER, YEAR.frequencies[["f3", "f1"]])
     assert few["rate"][1] < study.run(WEATHER)["rate"][1]
-    assert list(study.detector_.feature_names_in_) == MODES
+    assert list(study.detectors_[ONLY].feature_names_in_) == MODES
 
 
 def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
@@ -114,11 +115,11 @@ def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
         if isinstance(detector, MahalanobisDetector):
             frames = expected.run(WEATHER, baseline)
         else:
-            frames = expected.set_params(detector=compensated()).run(WEATHER, baseline)
+            frames = expected.set_params(detectors=compensated()).run(WEATHER, baseline)
         columns = ["rate", "lowest", "highest", "n_effective"]
         pd.testing.assert_frame_equal(arrays.run(WEATHER.to_numpy(), baseline.to_numpy())[columns], frames[columns])
         assert arrays.results_["time_to_detection"].dtype == float
-    assert isinstance(arrays.indices_["healthy", "data-informed"].index, pd.RangeIndex)
+    assert isinstance(arrays.indices_[ONLY, "healthy", "data-informed"].index, pd.RangeIndex)
 
 
 def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
@@ -133,7 +134,7 @@ def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
     results = study.run(WEATHER, reference=truth)
     assert results["source"].tolist() == ["data-informed", "data-informed", "reference"]
     simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
-    simulated_index, true_index = (study.indices_["top 10 %", source] for source in results["source"][1:])
+    simulated_index, true_index = (study.indices_[ONLY, "top 10 %", source] for source in results["source"][1:])
     assert (simulated_index != true_index).all()  # other seeds
     assert true.lowest < simulated.rate < true.highest
     np.testing.assert_array_equal(results["n_repeats"], 3)
@@ -149,13 +150,13 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
         study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0)
         results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
         row = results.loc[("top 30 %", "reference")]
-        decision = study.detector_.decision_function(records)
+        decision = study.detectors_[study.detector_name()].decision_function(records)
         assert row["n_records"] == np.count_nonzero(~np.isnan(decision)) == 710
         assert row["rate"] == np.mean(decision[~np.isnan(decision)] < 0)
         assert row["n_repeats"] == 1
-        pd.testing.assert_index_equal(study.indices_["top 30 %", "reference"].index, measured.frequencies.index)
-        expected = -study.detector_.score_samples(records)
-        np.testing.assert_array_equal(study.indices_["top 30 %", "reference"], expected)
+        pd.testing.assert_index_equal(study.indices_[ONLY, "top 30 %", "reference"].index, measured.frequencies.index)
+        expected = -study.detectors_[study.detector_name()].score_samples(records)
+        np.testing.assert_array_equal(study.indices_[ONLY, "top 30 %", "reference"], expected)
 
 
 def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
@@ -178,10 +179,10 @@ def test_progressive_damage_counts_from_its_onset(fem):
     results = study.run(WEATHER).drop(columns=["scenario", "band_lowest", "band_highest"])  # one repeat has no band
     by_time, by_number = results.itertuples(index=False)
     assert by_time == by_number
-    index = study.indices_["by time", "data-informed"]
-    assert by_time.rate == probability_of_detection(index[index.index >= onset], study.threshold_)
+    index = study.indices_[ONLY, "by time", "data-informed"]
+    assert by_time.rate == probability_of_detection(index[index.index >= onset], study.thresholds_[ONLY])
     assert by_time.n_records == 306
-    assert by_time.time_to_detection == time_to_detection(index, study.threshold_, onset)
+    assert by_time.time_to_detection == time_to_detection(index, study.thresholds_[ONLY], onset)
     growing = index[onset:"2025-09-01"]
     assert growing[-60:].mean() > 2 * growing[:60].mean()
 
@@ -193,7 +194,9 @@ def test_uncertain_damage_takes_another_draw_in_every_repeat(fem):
     alarms = study.run(WEATHER)["n_alarms"][0]
     seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(4, 2))[:, 0]
     expected = [
-        study.detector_.predict(fem.simulate(WEATHER, damage={"top": draws[r % 2]}, noise=0.01, random_state=int(seed)))
+        study.detectors_[study.detector_name()].predict(
+            fem.simulate(WEATHER, damage={"top": draws[r % 2]}, noise=0.01, random_state=int(seed))
+        )
         for r, seed in enumerate(seeds)
     ]
     assert alarms == np.count_nonzero(np.array(expected) == -1)
@@ -227,7 +230,9 @@ def test_any_outlier_detector_can_be_studied(fem, detector):
     single = DetectabilityStudy(fem, detector, study.scenarios, n_repeats=1, noise=0.01, random_state=0)
     rates = single.run(WEATHER)["rate"]
     for rate, index in zip(rates, single.indices_.values(), strict=True):
-        assert rate == pytest.approx(probability_of_detection(index.dropna(), single.threshold_), abs=1 / 365)
+        assert rate == pytest.approx(
+            probability_of_detection(index.dropna(), single.thresholds_[single.detector_name()]), abs=1 / 365
+        )
 
 
 def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
@@ -273,7 +278,7 @@ def test_records_that_cannot_be_judged_do_not_count():
     n_records, n_not_judged = results.loc[0, ["n_records", "n_not_judged"]]
     assert 0.4 * 730 < n_records < 0.75 * 730
     assert n_records + n_not_judged == 730
-    assert study.indices_["healthy", "data-informed"].iloc[5:15].isna().all()
+    assert study.indices_["OutlierDetector", "healthy", "data-informed"].iloc[5:15].isna().all()
 
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
@@ -297,13 +302,13 @@ def test_weather_outside_the_training_range_is_said_once(fem):
         ({"scenarios": [Scenario("a", {"pier": 0.1})]}, r"\['pier'\] are unknown; expected some of"),
         ({"n_repeats": 0}, "n_repeats is 0"),
         ({"noise": "measured"}, "noise is 'measured'"),
-        ({"detector": LinearRegression()}, "expected an outlier detector"),
+        ({"detectors": LinearRegression()}, "expected an outlier detector"),
     ],
 )
 def test_impossible_studies_are_errors(fem, options, message):
-    arguments = {"fem": fem, "detector": MahalanobisDetector(), "scenarios": [Scenario("healthy")]} | options
-    if isinstance(arguments["detector"], LinearRegression):
-        arguments["detector"] = make_pipeline(StandardScaler())
+    arguments = {"fem": fem, "detectors": MahalanobisDetector(), "scenarios": [Scenario("healthy")]} | options
+    if isinstance(arguments["detectors"], LinearRegression):
+        arguments["detectors"] = make_pipeline(StandardScaler())
     with pytest.raises(ValueError, match=message):
         DetectabilityStudy(**arguments).run(WEATHER)
 
@@ -311,7 +316,6 @@ def test_impossible_studies_are_errors(fem, options, message):
 @pytest.mark.parametrize(
     ("detector", "arguments", "message"),
     [
-        (MahalanobisDetector(), {"baseline": SIDE_BY_SIDE}, "which would judge them"),
         (compensated(), {"baseline": YEAR.frequencies}, "compensates for temperature, and the baseline has none"),
         (MahalanobisDetector(), {"baseline": YEAR.frequencies.add_suffix(" Hz")}, "expected modes"),
         (MahalanobisDetector(), {"baseline": YEAR.temperatures}, "expected modes"),
@@ -350,7 +354,7 @@ def test_a_clone_shares_the_fitted_chain(fem):
     study = DetectabilityStudy(fem, MahalanobisDetector(), [Scenario("healthy")], n_repeats=3)
     twin = clone(study)
     assert twin.fem is fem
-    assert twin.detector is not study.detector
+    assert twin.detectors is not study.detectors
     assert twin.get_params(deep=False)["n_repeats"] == 3
 
 

@@ -1,7 +1,8 @@
-"""Records of one scenario as a detector judges them, and their row in the table of a study."""
+"""Decisions of the detectors of a study, and their rows in its table."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -9,36 +10,47 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo._times import row_times, time_of
+from skthermo._warnings import warnings_of_detector
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.scenarios import BaseScenario
+
+SIMULATED, REFERENCE = "data-informed", "reference"
+
+Answer = TypeVar("Answer")
+Key: TypeAlias = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class JudgedRecords:
-    """Records of one scenario and source: when they were taken, their damage index in the first repeat, and the
-    detector's decision function in each repeat, NaN where there is none."""
+    """Records of one scenario and source as a detector judges them: their damage index in the first repeat, with their
+    index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
 
+    detector: str
     scenario: BaseScenario
     source: str
-    rows: Any
     damage_index: pd.Series
-    decisions: list[Array]
+    decisions: Array
+
+    def from_onset(self) -> tuple[Array, Array]:
+        """Decisions from the onset of the damage on, in order of time, and the times since then."""
+        times, onset = row_times(self.damage_index), self.scenario.onset
+        start = times.min() if onset is None else time_of(self.damage_index, onset, "onset")
+        order = np.argsort(times, kind="stable")
+        order = order[times[order] >= start]
+        return self.decisions[:, order], times[order] - start
 
     def summary(self, confidence: float) -> dict[str, Any]:
         """Rates, bounds and time to detection, from the onset of the damage on."""
-        times, scenario = row_times(self.rows), self.scenario
-        start = times.min() if scenario.onset is None else time_of(self.rows, scenario.onset, "onset")
-        order = np.argsort(times, kind="stable")
-        order = order[times[order] >= start]
-        decisions = np.array(self.decisions)
-        rate = rate_of(decisions[:, order], confidence, whole_repeats=scenario.n_draws > 1)
+        scenario, (decisions, waits) = self.scenario, self.from_onset()
+        rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
         if not rate.n_records:
             raise ValueError(
-                f"none of {len(times)} records of scenario {scenario.name!r}, source {self.source!r}, can be judged: "
-                "they lack what the detector needs, or are before the onset; expected some that it can judge"
+                f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
+                "be judged: they lack what the detector needs, or are before the onset; expected some that it can judge"
             )
-        band_lowest, band_highest = band_of(decisions[:, order], confidence)
+        band_lowest, band_highest = band_of(decisions, confidence)
         return {
+            "detector": self.detector,
             "scenario": scenario.name,
             "family": scenario.family,
             "severity": scenario.severity,
@@ -51,11 +63,54 @@ class JudgedRecords:
             "band_highest": band_highest,
             "n_alarms": rate.n_alarms,
             "n_records": rate.n_records,
-            "n_not_judged": decisions[:, order].size - rate.n_records,
+            "n_not_judged": decisions.size - rate.n_records,
             "n_effective": rate.n_effective,
             "n_repeats": len(decisions),
-            "time_to_detection": _mean_wait(decisions[:, order] < 0, times[order] - start, self.rows),
+            "time_to_detection": _mean_wait(decisions < 0, waits, self.damage_index),
+            "error": "",
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """Decisions of each repeat by detector, scenario and source; those on healthy records with noise of other seeds by
+    detector and source; damage indices of the first repeat; errors of the detectors that failed."""
+
+    decisions: dict[Key, list[Array]] = field(default_factory=dict)
+    calibration: dict[Key, list[Array]] = field(default_factory=dict)
+    indices: dict[Key, pd.Series] = field(default_factory=dict)
+    errors: dict[str, Exception] = field(default_factory=dict)
+
+    def ask(self, detectors: Iterable[str], question: Callable[[str], Answer]) -> dict[str, Answer]:
+        """Answers of detectors that have not failed, nor fail at this question; an error if none is left."""
+        asked, found = [name for name in detectors if name not in self.errors], {}
+        for name in asked:
+            try:
+                with warnings_of_detector(name if len(asked) > 1 else None):
+                    found[name] = question(name)
+            except Exception as error:
+                self.errors[name] = error
+        if not found:
+            raise next(iter(self.errors.values()))
+        return found
+
+    def extend(self, later: "Judgement") -> None:
+        """Add the decisions of a later repeat, and the errors of detectors that failed there."""
+        for mine, added in ((self.decisions, later.decisions), (self.calibration, later.calibration)):
+            for key, decisions in added.items():
+                if key in mine:
+                    mine[key].extend(decisions)
+        self.errors.update(later.errors)
+
+    def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[JudgedRecords]:
+        """What a detector that has not failed has judged, in the order of the scenarios."""
+        keys = [(detector, scenario.name, source) for scenario in scenarios for source in (SIMULATED, REFERENCE)]
+        by_name = {scenario.name: scenario for scenario in scenarios}
+        return [
+            JudgedRecords(detector, by_name[key[1]], key[2], self.indices[key], np.array(self.decisions[key]))
+            for key in keys
+            if key in self.decisions
+        ]
 
 
 def band_of(decisions: Array, confidence: float) -> tuple[float, float]:

@@ -1,94 +1,128 @@
-"""Simulated and reference records of all scenarios, as a detector judges them."""
+"""Simulated and reference records of all scenarios, as the detectors of a study judge them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
-from skthermo.studies.detectability._judged import JudgedRecords
-from skthermo.studies.detectability._view import View
+from skthermo.studies.detectability._candidates import Candidate
+from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
 from skthermo.studies.scenarios import BaseScenario
 
-SIMULATED, REFERENCE = "data-informed", "reference"
+LARGEST_SEED = np.iinfo(np.int32).max
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Records of a scenario from one source: simulated frequencies of all modes at the temperatures T, or others, which
+    may have temperatures of their own; ``rows`` are those whose times they have."""
+
+    scenario: BaseScenario
+    source: str
+    values: Any
+    T: Any
+    rows: Any
+
+    def seen_by(self, candidate: Candidate) -> Any:
+        """The columns that a detector sees."""
+        if self.source == SIMULATED:
+            return candidate.view.table(self.T, self.values)
+        return candidate.view.reference(self.values, self.T, self.scenario.name)
+
+
+@dataclass(frozen=True, eq=False)
 class Simulation:
-    """One weather, a fitted detector, and the frequencies before noise, (n_records, n_modes), of each draw of every
-    scenario; ``reference`` gives true frequencies for a scenario and a seed."""
+    """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
+    every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
 
     fem: Any
-    detector: Any
-    view: View
+    candidates: Mapping[str, Candidate]
     scenarios: Sequence[BaseScenario]
     T: Any
     clean: Mapping[str, Sequence[Array]]
     noise: Any
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
-    def tables(self, repeat: int, seeds: NDArray) -> Iterator[tuple[BaseScenario, str, Any]]:
-        """Records of every scenario and source, one after the other, all with the same noise."""
-        factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
+    def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
+        """Judge the records of the first repeat and measured ones.
+
+        Measured records have times of their own if they are a frame, or differ in number from the weather.
+        """
+        for records in self._records(self.scenarios, 0, seeds):
+            self._judge(records, judgement, with_indices=True)
         for scenario in self.scenarios:
+            if scenario.name in measured:
+                values = measured[scenario.name]
+                is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
+                records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
+                self._judge(records, judgement, with_indices=True)
+        with without_warnings():
+            self._calibrate(judgement, 0, seeds)
+
+    def other_repeats(
+        self, judgement: Judgement, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
+    ) -> None:
+        """Judge the records of later repeats, too; the warnings of the first are the only ones given."""
+        left = replace(self, candidates={k: v for k, v in self.candidates.items() if k not in judgement.errors})
+        with without_warnings():
+            jobs = (delayed(left._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
+            for later in Parallel(n_jobs=n_jobs, verbose=verbose)(jobs):
+                judgement.extend(later)
+
+    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Judgement:
+        judgement = Judgement()
+        with without_warnings(), single_blas_thread():
+            for records in self._records(self.scenarios, number, seeds):
+                self._judge(records, judgement)
+            self._calibrate(judgement, number, seeds)
+        return judgement
+
+    def _records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
+        """Records of scenarios from every source, one after the other, all with the same noise."""
+        factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
+        for scenario in scenarios:
             draws = self.clean[scenario.name]
-            yield scenario, SIMULATED, self.view.table(self.T, draws[repeat % len(draws)] * factors)
-            records = None if self.reference is None else self.reference(scenario, int(seeds[1]))
-            if records is not None:
-                shape = as_columns(records).shape
+            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * factors, self.T, self.T)
+            values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
+            if values is not None:
+                shape = as_columns(values).shape
                 if shape[0] != len(self.T):
                     raise ValueError(
                         f"the reference of scenario {scenario.name!r} has shape {shape}; expected frequencies for the "
                         f"{len(self.T)} rows of T"
                     )
-                yield scenario, REFERENCE, self.view.reference(records, self.T, scenario.name)
+                yield Records(scenario, REFERENCE, values, self.T, self.T)
 
-    def first_repeat(self, measured: Mapping[str, Any], seeds: NDArray) -> list[JudgedRecords]:
-        """Judged records of the first repeat and measured ones, both sources of a scenario side by side.
+    def _judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
+        """Add the decisions of every detector and, if asked, its damage indices."""
 
-        Measured records have times of their own if they are a frame, or differ in number from the weather.
-        """
-        found = [(scenario, source, table, self.T) for scenario, source, table in self.tables(0, seeds)]
-        for scenario in self.scenarios:
-            if scenario.name in measured:
-                records = measured[scenario.name]
-                is_own = isinstance(records, pd.DataFrame) or _num_samples(records) != _num_samples(self.T)
-                table = self.view.reference(records, self.T, scenario.name)
-                found.append((scenario, REFERENCE, table, records if is_own else self.T))
-        found.sort(key=lambda one: self.scenarios.index(one[0]))
-        return [
-            JudgedRecords(scenario, source, rows, self._damage_index(table, rows), [self._decisions(table)])
-            for scenario, source, table, rows in found
-        ]
+        def judged(name: str) -> tuple[Any, Array]:
+            candidate = self.candidates[name]
+            seen = records.seen_by(candidate)
+            return candidate.damage_index(seen, records.rows) if with_indices else None, candidate.decisions(seen)
 
-    def repeat(self, records: Sequence[JudgedRecords], seeds: Any, n_jobs: int | None, verbose: int = 0) -> None:
-        """Add the decisions of later repeats to those of the first, whose warnings are the only ones given."""
-        with without_warnings():
-            jobs = (delayed(self._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            for decisions in Parallel(n_jobs=n_jobs, verbose=verbose)(jobs):
-                for one in records:
-                    one.decisions.extend(decisions.get((one.scenario.name, one.source), []))
+        for name, (index, decisions) in judgement.ask(self.candidates, judged).items():
+            key = name, records.scenario.name, records.source
+            judgement.decisions[key] = [decisions]
+            if with_indices:
+                judgement.indices[key] = index
 
-    def _one_repeat(self, number: int, seeds: NDArray) -> dict[tuple[str, str], list[Array]]:
-        with without_warnings(), single_blas_thread():
-            tables = self.tables(number, seeds)
-            return {(scenario.name, source): [self._decisions(table)] for scenario, source, table in tables}
-
-    def _decisions(self, table: Any) -> Array:
-        """Decision function, NaN where there is none; float32 is as much as alarms and intervals need."""
-        return np.asarray(self.detector.decision_function(table), dtype=np.float32)
-
-    def _damage_index(self, table: Any, rows: Any) -> pd.Series:
-        """Minus the detector's ``score_samples``, on the index of the records."""
-        index = rows.index if isinstance(rows, pd.DataFrame) else None
-        return pd.Series(-np.asarray(self.detector.score_samples(table), dtype=float), index, name="damage_index")
+    def _calibrate(self, judgement: Judgement, repeat: int, seeds: Sequence[int]) -> None:
+        """Add decisions on healthy records with noise of other seeds."""
+        healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
+        others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
+        for records in self._records(healthy, repeat, others) if healthy else ():
+            found = Judgement(errors=judgement.errors)
+            self._judge(records, found)
+            judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
 
 
 def clean_frequencies(fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int) -> dict[str, list[Array]]:

@@ -1,9 +1,8 @@
-"""DetectabilityStudy: which damage a detector would find in this structure's weather."""
+"""DetectabilityStudy: which damage detectors would find in this structure's weather."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -15,14 +14,19 @@ from sklearn.exceptions import NotFittedError
 from skthermo._arguments import check_jobs
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
-from skthermo._validation import Stages, _num_samples, last_step, seed_parts, seeded
+from skthermo._validation import Stages, last_step, seeded
 from skthermo._warnings import warn_user, warnings_once
-from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._arrangement import Arrangement
-from skthermo.studies.detectability._pod_curve import PODCurve, bracket_of, check_probability, pod_curve
-from skthermo.studies.detectability._simulation import SIMULATED, Simulation, clean_frequencies
-from skthermo.studies.detectability._view import read_baseline
-from skthermo.studies.scenarios import BaseScenario, check_chain, check_groups
+from skthermo.studies.detectability._candidates import Candidate
+from skthermo.studies.detectability._families import Family, families_of
+from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
+from skthermo.studies.detectability._simulation import (
+    LARGEST_SEED,
+    SIMULATED,
+    Judgement,
+    Simulation,
+    clean_frequencies,
+)
+from skthermo.studies.scenarios import BaseScenario, as_scenario, check_chain, check_groups
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -30,28 +34,30 @@ Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
 
 class DetectabilityStudy(BaseEstimator):
-    """Simulated test of a detector: which damage it would find, and how often it would raise false alarms.
+    """Simulated test of detectors: which damage each would find, and how often it would raise false alarms.
 
-    A fitted chain simulates the structure in every scenario under the same weather, and a detector that has learned the
-    healthy structure judges the records.
+    A fitted chain simulates the structure in every scenario under the same weather, and detectors that have learned the
+    healthy structure judge the records, all of them the same.
 
     Parameters
     ----------
     fem : DataInformedFEM
         Fitted.
-    detector : detector
+    detectors : detector or mapping of str to detector
         `~skthermo.detection.MahalanobisDetector`, another detector of this package, or a pipeline that ends with one or
-        with any of scikit-learn's outlier detectors; a clone is fitted.
-    scenarios : sequence of Scenario, ProgressiveDamage or UncertainDamage
-        With different names; `sweep` makes them for all damage groups and severities.
+        with any of scikit-learn's outlier detectors; several by name. Clones are fitted. A single one is named by the
+        class of its last step, such as "MahalanobisDetector".
+    scenarios : sequence of Scenario, ProgressiveDamage, UncertainDamage or mapping
+        With different names; `sweep` makes them for all damage groups and severities. A mapping of damage groups to
+        severities is a `Scenario` with a name such as "soil 18 %, piers 5 %"; an empty one is "healthy".
     n_repeats : int, default=20
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
         Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     n_jobs : int, optional
-        Number of parallel jobs (joblib), which share the repeats.
+        Number of parallel jobs (joblib), which share the repeats. Results do not depend on it.
     random_state : int, RandomState or None, default=None
-        Seed of the noise, and of parts of the detector without a seed of their own.
+        Seed of the noise, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are
         done.
@@ -60,14 +66,25 @@ class DetectabilityStudy(BaseEstimator):
     ----------
     results_ : DataFrame
         What `run` returned.
-    detector_ : detector
-        The fitted clone.
-    indices_ : dict of (str, str) to Series
-        Damage index of the records of the first repeat, by scenario and source.
-    arrangement_ : object
-        Columns that the detector sees, and the number of healthy records that it has learned.
-    threshold_ : float or None
+    detectors_ : dict of str to detector
+        The fitted clones by name, without those that failed.
+    thresholds_ : dict of str to (float or None)
         Damage index above which there is an alarm, where the detector has one.
+    indices_ : dict of (str, str, str) to Series
+        Damage index of the records of the first repeat, by detector, scenario and source.
+    decisions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_records)
+        Threshold less damage index in every repeat, by detector, scenario and source: negative is an alarm, and NaN is
+        not judged. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and a
+        year of hours 155 MB.
+    calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
+        Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
+        `ranking` moves thresholds by them; nothing else is judged by them. Measured records have none.
+    arrangements_ : dict of str to object
+        Columns that each detector sees, and the number of healthy records that it has learned.
+    scenarios_ : list of scenarios
+        With those that were given as mappings.
+    errors_ : dict of str to str
+        Error of each detector that failed.
     confidence_ : float
         Of the bounds in ``results_``.
     warnings_ : list of str
@@ -81,7 +98,8 @@ class DetectabilityStudy(BaseEstimator):
     Notes
     -----
     All scenarios and sources have the same weather, and repeat r has the same noise in all scenarios (common random
-    numbers), so that differences between scenarios are more certain than each rate.
+    numbers), and all detectors judge the same records, so that differences between scenarios or detectors are more
+    certain than each rate. A detector's rates do not depend on which others are in the study.
 
     The intervals are those of a rate over noise, for this weather, this baseline and this model: another year, another
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
@@ -121,8 +139,8 @@ class DetectabilityStudy(BaseEstimator):
     def __init__(
         self,
         fem: Any,
-        detector: Any,
-        scenarios: Sequence[BaseScenario],
+        detectors: Any,
+        scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,
         n_repeats: int = 20,
         noise: ArrayLike | Literal["fitted"] = "fitted",
@@ -131,7 +149,7 @@ class DetectabilityStudy(BaseEstimator):
         verbose: bool | int = 0,
     ):
         self.fem = fem
-        self.detector = detector
+        self.detectors = detectors
         self.scenarios = scenarios
         self.n_repeats = n_repeats
         self.noise = noise
@@ -155,22 +173,23 @@ class DetectabilityStudy(BaseEstimator):
             Temperatures in degrees Celsius under which the structure is simulated, in order of time.
         baseline : array-like or DataFrame, optional
             Measured frequencies of the healthy structure, or temperatures and frequencies side by side, which the
-            detector learns. It sees the same columns of simulated records. By default the records that the chain was
-            fitted on: their frequencies, beside temperatures if a part of the detector has ``targets``, as
-            `~skthermo.detection.TemperatureCompensator`.
+            detectors learn. They see the same columns of simulated records; detectors of which no part has ``targets``,
+            as `~skthermo.detection.TemperatureCompensator` has, see the frequencies alone. By default the records that
+            the chain was fitted on.
         reference : mapping or callable, optional
             Truth to compare with: by name of the scenario, measured frequencies, which may have other rows than T, and
-            then temperatures of their own beside them where the detector sees temperatures; or a function of a
-            scenario and an integer seed, which returns frequencies for the rows of T, or None, and is called in every
-            repeat.
+            then temperatures of their own beside them where a detector sees temperatures; or a function of a
+            scenario and an integer seed, which returns frequencies for the rows of T, or None, and is called once in
+            every repeat for each scenario, and once more for the healthy one, by which thresholds are moved.
         confidence : float, default=0.95
             Of the bounds of the rates, two-sided.
 
         Returns
         -------
         DataFrame
-            One row for each scenario and source:
+            One row for each detector, scenario and source:
 
+            - ``detector``;
             - ``scenario``, ``family``, ``severity``;
             - ``source``: "data-informed" (simulated) or "reference";
             - ``measure``: "PFA", the probability of false alarm, of a healthy structure, else "POD", the probability of
@@ -183,52 +202,64 @@ class DetectabilityStudy(BaseEstimator):
               detector can judge;
             - ``n_not_judged``: number of records that it cannot judge, which count neither as healthy nor as alarms;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
-              a ``DatetimeIndex``, in time; the mean over those repeats that have an alarm.
+              a ``DatetimeIndex``, in time; the mean over those repeats that have an alarm;
+            - ``error``: "" where all is well. A detector that fails has one row with its error, and NaN elsewhere.
 
         Raises
         ------
         ValueError
             If names of scenarios repeat, a damage group is unknown, columns do not fit, or no record can be judged.
+            An error of a detector is raised if it is the only one, or if all fail.
 
         Warns
         -----
         UserWarning
             Once for each kind of doubt about the simulations, such as weather outside the training range; if most
-            records of the healthy structure raise an alarm.
+            records of the healthy structure raise an alarm. Detectors are named where there are several.
         """
         check_chain(self.fem)
-        check_detector(self.detector)
+        detectors = self._checked_detectors()
         n_repeats = positive_integer(self.n_repeats, "n_repeats")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         scenarios = self._checked_scenarios(reference)
-        view, healthy = read_baseline(self.fem, self.detector, baseline)
-        seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(n_repeats, 2))
-        self.detector_ = clone(self.detector)
-        seed_parts(self.detector_, seeded(self.random_state))
-        stages = Stages(self, 4)
-        with stages.stage("detector"):
-            self.detector_.fit(healthy)
+        seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
+        judgement, stages = Judgement(), Stages(self, 4)
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"):
+            parts = seeded(self.random_state)
+            candidates = judgement.ask(
+                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts)
+            )
         with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
-            simulation = Simulation(self.fem, self.detector_, view, scenarios, T, clean, self.noise, function)
+            simulation = Simulation(self.fem, candidates, scenarios, T, clean, self.noise, function)
             with stages.stage("first repeat"):
-                records = simulation.first_repeat(measured, seeds[0])
+                simulation.first_repeat(judgement, measured, seeds[0])
         with stages.stage(f"other {n_repeats - 1} repeats"):
-            simulation.repeat(records, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
-        offset = getattr(last_step(self.detector_), "offset_", None)
-        self.threshold_ = None if offset is None else -float(np.squeeze(offset))
-        self.indices_ = {(one.scenario.name, one.source): one.damage_index for one in records}
-        self.results_ = pd.DataFrame([one.summary(confidence) for one in records])
+            simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
+        rows = judgement.ask(
+            candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
+        )
+        self.errors_ = {name: f"{type(error).__name__}: {error}" for name, error in judgement.errors.items()}
+        self.scenarios_, self.confidence_ = scenarios, confidence
+        self.detectors_ = {name: candidates[name].detector for name in rows}
+        self.thresholds_ = {name: candidates[name].threshold for name in rows}
+        self.arrangements_ = {name: candidates[name].arrangement for name in rows}
+        records = [one for name in rows for one in judgement.records(name, scenarios)]
+        self.indices_ = {(one.detector, one.scenario.name, one.source): one.damage_index for one in records}
+        self.decisions_ = {(one.detector, one.scenario.name, one.source): one.decisions for one in records}
+        self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
+        table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
+        columns = list(next(iter(rows.values()))[0])
+        self.results_ = pd.DataFrame([row for some in table for row in some], columns=columns)
         self._warn_of_many_false_alarms()
-        self.confidence_ = confidence
-        columns = [view.names[i] for i in view.positions]
-        self.arrangement_ = Arrangement(clone(self.detector_), columns, _num_samples(healthy), view.is_frame)
         return self.results_
 
-    def pod_curve(self, family: str, source: str = "data-informed", *, log: bool = False) -> PODCurve:
+    def pod_curve(
+        self, family: str, source: str = "data-informed", *, log: bool = False, detector: str | None = None
+    ) -> PODCurve:
         """Probability of detection over severity for one family of scenarios.
 
         Parameters
@@ -239,6 +270,8 @@ class DetectabilityStudy(BaseEstimator):
             "data-informed" or "reference".
         log : bool, default=False
             Whether the logit is linear in the logarithm of the severity.
+        detector : str, optional
+            Name of the detector, where there are several.
 
         Returns
         -------
@@ -248,23 +281,25 @@ class DetectabilityStudy(BaseEstimator):
         Raises
         ------
         ValueError
-            If there is no such family, or the curve cannot be fitted.
+            If there is no such family, the curve cannot be fitted, or there are several detectors and none is named.
 
         Warns
         -----
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
+        name = self.detector_name(detector)
+        families = {key[1:]: found for key, found in self._families().items() if key[0] == name}
         is_known = isinstance(family, str) and isinstance(source, str)
-        rows = self._families().get((family, source)) if is_known else None
-        if rows is None:
-            known = [f"{f!r} ({s})" for f, s in self._families()]
+        found = families.get((family, source)) if is_known else None
+        if found is None:
+            known = [f"{f!r} ({s})" for f, s in families]
             raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
-        detected = rows["rate"] * rows["n_effective"]
-        with _naming(family):
-            return pod_curve(rows["severity"], detected, rows["n_effective"], log=log, confidence=self.confidence_)
+        return found.curve(log)
 
-    def minimum_detectable_damage(self, level: float = 0.9, method: Literal["grid", "curve"] = "grid") -> pd.DataFrame:
+    def minimum_detectable_damage(
+        self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
+    ) -> pd.DataFrame:
         """Smallest severity that is detected reliably, for every family and source.
 
         Parameters
@@ -274,18 +309,22 @@ class DetectabilityStudy(BaseEstimator):
         method : {"grid", "curve"}, default="grid"
             Of the tested severities the smallest from which the rate stays at or above the level (bounds: the same for
             the upper and the lower bounds of the rates); or where the fitted curve and its two-sided bounds reach it.
+        detector : str, optional
+            Name of one of several detectors; by default all.
 
         Returns
         -------
         DataFrame
-            Indexed by family and source, with ``mdd``, ``lowest`` and ``highest``: NaN or infinite where the level is
-            not reached. Where a curve has no finite slope, the POD does not increase, or a family has one severity
-            only, ``mdd`` is NaN and the bounds are the two tested severities between which it lies.
+            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``lowest`` and
+            ``highest``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
+            not increase, or a family has one severity only, ``mdd`` is NaN and the bounds are the two tested severities
+            between which it lies. Detectors that failed are left out.
 
         Raises
         ------
         ValueError
-            If there is no family, the level is not between 0 and 1, or a family has both damage and strengthening.
+            If there is no family, the level is not between 0 and 1, a family has both damage and strengthening, or
+            there is no such detector.
 
         Warns
         -----
@@ -296,15 +335,22 @@ class DetectabilityStudy(BaseEstimator):
         check_probability(level, "level")
         if method not in ("grid", "curve"):
             raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
-        find = self._on_grid if method == "grid" else self._on_curve
+        families = self._families()
+        if detector is not None or len(self.results_["detector"].unique()) == 1:
+            name = self.detector_name(detector)
+            families = {key[1:]: found for key, found in families.items() if key[0] == name}
         with warnings_once("for other families or sources"):
-            found = {key: find(key, rows, level) for key, rows in self._families().items()}
+            found = {
+                key: family.on_grid(level) if method == "grid" else family.on_curve(level)
+                for key, family in families.items()
+            }
         if not found:
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
-        index = pd.MultiIndex.from_tuples(list(found), names=["family", "source"])
+        names = ["detector", "family", "source"][-len(next(iter(found))) :]
+        index = pd.MultiIndex.from_tuples(list(found), names=names)
         return pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
 
-    def is_undetected(self, family: str, source: str = "data-informed") -> bool:
+    def is_undetected(self, family: str, source: str = "data-informed", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.
 
         Parameters
@@ -313,6 +359,8 @@ class DetectabilityStudy(BaseEstimator):
             Of the scenarios.
         source : str, default="data-informed"
             "data-informed" or "reference".
+        detector : str, optional
+            Name of the detector, where there are several.
 
         Returns
         -------
@@ -323,8 +371,11 @@ class DetectabilityStudy(BaseEstimator):
         ------
         NotFittedError
             If the study has no results.
+        ValueError
+            If there is no such family or source, or there are several detectors and none is named.
         """
         rows = self._results()
+        rows = rows[rows["detector"] == self.detector_name(detector)]
         for what, name, known in (("family", family, rows["family"]), ("source", source, rows["source"])):
             if not isinstance(name, str) or name not in set(known):
                 raise ValueError(f"{what} is {name!r:.100}; expected one of {known.dropna().unique().tolist()}")
@@ -333,60 +384,75 @@ class DetectabilityStudy(BaseEstimator):
         rates = rows.loc[(rows["measure"] == "POD") & (rows["family"] == family), "rate"]
         return bool((rates <= healthy).all())
 
+    def detector_name(self, detector: str | None = None) -> str:
+        """Name of the only detector, or a name that is known.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Needed where there are several.
+
+        Returns
+        -------
+        str
+            Of a detector that has results.
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
+        rows = self._results()
+        known = rows.loc[rows["error"] == "", "detector"].unique().tolist()
+        if detector is None and rows["detector"].nunique() == 1:
+            return known[0]
+        if not isinstance(detector, str) or detector not in known:
+            raise ValueError(f"detector is {detector!r:.100}; expected the name of one of {known}")
+        return detector
+
     def _results(self) -> pd.DataFrame:
         if not hasattr(self, "results_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")
         return self.results_
 
-    def _families(self) -> dict[tuple[Any, Any], pd.DataFrame]:
-        """Rows of the results by family and source."""
-        rows = self._results()
-        rows = rows[(rows["measure"] == "POD") & rows["family"].notna() & rows["severity"].notna()]
-        return dict(iter(rows.groupby(["family", "source"], sort=False)))  # type: ignore[arg-type]
-
-    def _on_grid(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
-        with _naming(key[0]):
-            mdd, lowest, highest = (
-                minimum_detectable_damage(rows["severity"], rows[rate], level) for rate in ("rate", "highest", "lowest")
-            )
-        return mdd, lowest, highest
-
-    def _on_curve(self, key: Any, rows: pd.DataFrame, level: float) -> tuple[float, float, float]:
-        bracket = float("nan"), *bracket_of(rows["severity"].abs().to_numpy(), rows["rate"].to_numpy(), level)
-        if len(rows) < 2:
-            return bracket
-        try:
-            curve = self.pod_curve(*key)
-        except ValueError as error:
-            if rows["severity"].min() < 0 < rows["severity"].max():
-                raise
-            rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
-            cause = f"{rare}baseline raise the threshold" if self.is_undetected(*key) else ""
-            warn_user(f"no curve of source {key[1]!r} for {error}{cause}", "family without a curve")
-            return bracket
-        if np.isnan(curve.slope):
-            return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)
-        tail = (1 - self.confidence_) / 2
-        return curve.severity_at(level), curve.severity_at(level, tail), curve.severity_at(level, 1 - tail)
+    def _families(self) -> dict[tuple[Any, ...], Family]:
+        return families_of(self._results(), self.confidence_)
 
     def _warn_of_many_false_alarms(self) -> None:
-        """Warn if the detector takes most simulated records of the healthy structure for damaged."""
+        """Warn if a detector takes most simulated records of the healthy structure for damaged."""
         rows = self.results_[(self.results_["measure"] == "PFA") & (self.results_["source"] == SIMULATED)]
         many = rows[rows["lowest"] > MANY_FALSE_ALARMS]
         if len(many):
+            names = ", ".join(map(repr, many["detector"].unique()))
             text = (
                 f"{many['rate'].iloc[0]:.0%} of the simulated records of scenario {many['scenario'].iloc[0]!r}, where "
                 "nothing is changed, raise an alarm; expected a baseline in Hz of the structure that the chain has "
                 "learned, and weather in degrees Celsius as in the baseline"
+                f"{f' (detectors {names})' if self.results_['detector'].nunique() > 1 else ''}"
             )
             self.warnings_.append(text)
             warn_user(text, "many false alarms")
+
+    def _checked_detectors(self) -> dict[str, Any]:
+        """Detectors by name; an error for what is none."""
+        if not isinstance(self.detectors, Mapping):
+            check_detector(self.detectors, "the detector")
+            return {type(last_step(self.detectors)).__name__: self.detectors}
+        if not self.detectors or not all(isinstance(name, str) and name for name in self.detectors):
+            raise ValueError(
+                f"detectors is {self.detectors!r:.200}; expected a detector, or a mapping of names to detectors"
+            )
+        for name, detector in self.detectors.items():
+            check_detector(detector, f"detector {name!r}")
+        return dict(self.detectors)
 
     def _checked_scenarios(self, reference: Any) -> list[BaseScenario]:
         """The scenarios; an error if they or the names of the reference are wrong."""
         if isinstance(self.scenarios, type) or not isinstance(self.scenarios, Iterable):
             raise ValueError(f"scenarios is {self.scenarios!r:.200}; expected a list of scenarios, as sweep makes it")
-        scenarios, groups = list(self.scenarios), getattr(self.fem.model, "groups", None)
+        scenarios, groups = [as_scenario(one) for one in self.scenarios], getattr(self.fem.model, "groups", None)
         wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
         names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
         if wrong or not names or len(set(names)) < len(names):
@@ -404,23 +470,15 @@ class DetectabilityStudy(BaseEstimator):
         return scenarios
 
     def __sklearn_clone__(self) -> DetectabilityStudy:
-        parameters = self.get_params(deep=False) | {"detector": clone(self.detector)}
-        return type(self)(**parameters)  # the chain is fitted, and shared
+        many = isinstance(self.detectors, Mapping)
+        twins = {k: clone(one) for k, one in self.detectors.items()} if many else clone(self.detectors)
+        return type(self)(**self.get_params(deep=False) | {"detectors": twins})  # the chain is fitted, and shared
 
 
-def check_detector(detector: Any) -> None:
+def check_detector(detector: Any, what: str) -> None:
     """Raise an error for what is not an outlier detector."""
     needed = ("get_params", "fit", "decision_function", "score_samples")
     lacking = [name for name in needed if not hasattr(detector, name)]
     if isinstance(detector, type) or lacking:
         without = f", without {lacking}" if lacking else ", a class"
-        raise ValueError(f"the detector is {detector!r:.200}{without}; expected an outlier detector")
-
-
-@contextmanager
-def _naming(family: Any) -> Iterator[None]:
-    """Begin the text of errors with the family's name."""
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(f"family {family!r}: {error}") from error
+        raise ValueError(f"{what} is {detector!r:.200}{without}; expected an outlier detector")

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import check_same_rows, column_names, frame_like
@@ -20,11 +19,6 @@ class View:
     n_sensors: int
     positions: Any
     is_frame: bool
-
-    @property
-    def sees_temperatures(self) -> bool:
-        """Whether temperatures are among the columns."""
-        return bool((self.positions < self.n_sensors).any())
 
     def table(self, T: Any, F: Array) -> Any:
         """Temperatures and frequencies of all modes as the detector sees them."""
@@ -74,7 +68,10 @@ class View:
 
 
 def read_baseline(fem: Any, detector: Any, baseline: Any) -> tuple[View, Any]:
-    """The detector's view, and the records that it learns from: by default those that the chain has learned from."""
+    """The detector's view, and the records that it learns from: by default those that the chain has learned from.
+
+    Only a detector with a part that has ``targets`` sees temperatures.
+    """
     T, F = fem.training_records_
     names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
     everything = View(names, n_sensors, np.arange(len(names)), False)
@@ -82,17 +79,12 @@ def read_baseline(fem: Any, detector: Any, baseline: Any) -> tuple[View, Any]:
         positions = everything.positions if compensates else everything.positions[n_sensors:]
         view = View(names, n_sensors, positions, isinstance(T, pd.DataFrame) or isinstance(F, pd.DataFrame))
         return view, view.table(T if isinstance(T, pd.DataFrame) else frame_like(F, as_floats(T)), as_floats(F))
-    view = View(
-        names, n_sensors, everything._positions_of(baseline, "the baseline"), isinstance(baseline, pd.DataFrame)
-    )
-    if compensates and not view.sees_temperatures:
+    known = everything._positions_of(baseline, "the baseline")
+    if compensates and not (known < n_sensors).any():
         raise ValueError("the detector compensates for temperature, and the baseline has none; expected both")
-    if view.sees_temperatures and not (compensates or isinstance(detector, Pipeline)):
-        raise ValueError(
-            f"the baseline has temperatures, and the detector is {detector!r:.200}, which would judge them; expected "
-            "frequencies alone, or a pipeline with a TemperatureCompensator"
-        )
-    return view, baseline
+    seen = np.flatnonzero(compensates | (known >= n_sensors))
+    view = View(names, n_sensors, known[seen], isinstance(baseline, pd.DataFrame))
+    return view, baseline.iloc[:, seen] if view.is_frame else as_columns(baseline)[:, seen]
 
 
 def has_targets(detector: Any) -> bool:

@@ -62,6 +62,7 @@ def what_to_add(
     noise: ArrayLike | None = None,
     baseline_factors: Sequence[float] = (2.0,),
     sensors: pd.DataFrame | None = None,
+    detector: str | None = None,
 ) -> pd.DataFrame:
     """Compare further modes, longer baselines and further temperature sensors by the damage that they make detectable.
 
@@ -80,6 +81,8 @@ def what_to_add(
         How many times as many healthy records the detector could learn from.
     sensors : DataFrame of shape (n_training_records, n_candidates), optional
         Further temperatures for the records that the chain was fitted on. The chain is fitted again with each.
+    detector : str, optional
+        Name of the detector, where the study has several.
 
     Returns
     -------
@@ -138,7 +141,9 @@ def what_to_add(
     """
     if not isinstance(study, DetectabilityStudy):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy that has been run")
-    changes, fem, present = changes_by_severity(study), study.fem, study.arrangement_
+    name = study.detector_name(detector)
+    present = study.arrangements_[name]
+    changes, fem = changes_by_severity(study, name), study.fem
     factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
     if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):
         raise ValueError(f"baseline_factors is {baseline_factors!r:.200}; expected numbers above 1, such as [2.0]")
@@ -181,13 +186,13 @@ def what_to_add(
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
 
-def changes_by_severity(study: DetectabilityStudy) -> ChangesBySeverity:
+def changes_by_severity(study: DetectabilityStudy, detector: str | None = None) -> ChangesBySeverity:
     """Changes of the structure by family and severity: around the present a90 where a family is damage of one group."""
     with without_warnings():
-        minimum = study.minimum_detectable_damage(method="curve")
+        minimum = study.minimum_detectable_damage(method="curve", detector=detector)
     changes: dict[tuple[str, float], Any] = {}
     for family in dict.fromkeys(name for name, _ in minimum.index):
-        members = [s for s in study.scenarios if isinstance(s, Scenario) and s.family == family]
+        members = [s for s in study.scenarios_ if isinstance(s, Scenario) and s.family == family]
         tested = np.array([member.severity for member in members], dtype=float)
         groups = {group for member in members for group in member.damage or {}}
         if len(groups) == 1 and all(list(member.changes(None)) == ["damage"] for member in members):

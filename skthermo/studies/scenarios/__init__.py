@@ -2,7 +2,16 @@
 
 from skthermo.studies.scenarios._base import BaseScenario, check_chain, check_groups
 from skthermo.studies.scenarios._progressive import ProgressiveDamage
-from skthermo.studies.scenarios._scenario import Scenario, sweep
+from skthermo.studies.scenarios._scenario import Scenario, as_scenario, sweep
 from skthermo.studies.scenarios._uncertain import UncertainDamage
 
-__all__ = ["BaseScenario", "ProgressiveDamage", "Scenario", "UncertainDamage", "check_chain", "check_groups", "sweep"]
+__all__ = [
+    "BaseScenario",
+    "ProgressiveDamage",
+    "Scenario",
+    "UncertainDamage",
+    "as_scenario",
+    "check_chain",
+    "check_groups",
+    "sweep",
+]
