@@ -2,6 +2,7 @@
 
 import pandas as pd
 from detector_recipes import field_detectors
+from sklearn.pipeline import Pipeline
 from z24_recipes import FREQUENCIES, Records, bridge_model, chain
 
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
@@ -11,9 +12,16 @@ STATES = {"PFA": "false alarms", "POD": "damage found"}
 FIRST = 12  # damaged records that another publication counts as healthy
 
 
-def detectors():
-    """The field's detectors by name; the chain is among those that compensate temperature."""
-    return field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
+def detectors(memory=None):
+    """The field's detectors by name; the chain is among those that compensate temperature.
+
+    A folder as the memory keeps what their compensators have learned, so that one study after the other need not.
+    """
+    found = field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
+    for detector in found.values():
+        if isinstance(detector, Pipeline):
+            detector.set_params(memory=memory)
+    return found
 
 
 def columns_of(name):
@@ -92,17 +100,15 @@ def agreement(table):
     return pd.DataFrame(rows).T
 
 
-def choose(bridge, candidates=None, severities=(0.1, 0.2, 0.3, 0.4, 0.5), n_repeats=10):
-    """A study of every damage group that has seen training rows alone, to choose a detector by.
+def choose(bridge, candidates=None, n_baseline=None, n_repeats=10, every=4):
+    """A study of all damage groups, from training rows and simulation alone, to choose a detector by.
 
-    The detectors learn the first three quarters of them, and judge what the chain simulates in the weather of the last:
-    so choosing meets weather that a baseline lacks, as service will.
+    The chain has learned all training rows. Detectors learn them, too, and judge every fourth row's weather; or they
+    learn the first ``n_baseline`` of them, and judge the weather of the rest.
     """
     T, F = bridge.split()[:2]
-    n = 3 * len(T) // 4
     fem = chain(bridge_model()).fit(T, F)
-    study = DetectabilityStudy(
-        fem, candidates or detectors(), sweep(fem, severities), n_repeats=n_repeats, random_state=0
-    )
-    study.run(T[n:], T.join(F)[:n])
+    weather = T[::every] if n_baseline is None else T[n_baseline:]
+    study = DetectabilityStudy(fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0)
+    study.run(weather, T.join(F)[:n_baseline])
     return study
