@@ -9,8 +9,9 @@ damage detector should raise as many alarms in these as in the true ones: only t
 would be found on the real structure.
 
 Run it with ``python examples/plot_truss_study.py``; the tables are means of ten realisations (``--seeds``). It needs
-two files beside it: :download:`truss_recipes.py` has the paper's tables and a realisation of the study as a class,
-:download:`page_recipes.py` the options and the folder for figures.
+three files beside it: :download:`truss_recipes.py` has the paper's tables and a realisation of the study as a class,
+:download:`detector_recipes.py` the detectors of the field, :download:`page_recipes.py` the options and the folder for
+figures.
 """
 
 # sphinx_gallery_thumbnail_number = 4
@@ -20,6 +21,7 @@ import warnings
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from detector_recipes import field_detectors
 from page_recipes import command_line, save_figures
 from truss_recipes import GROUPS, HALVED, NOISE, SEVERITIES, Realisation, smallest, table_2, table_3
 
@@ -27,7 +29,7 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import add_noise
 from skthermo.metrics import error_table
-from skthermo.plotting import DamageIndexDisplay, HistoryDisplay, PODCurveDisplay
+from skthermo.plotting import AgreementDisplay, DamageIndexDisplay, HistoryDisplay, PODCurveDisplay
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
@@ -139,6 +141,25 @@ for ax, group in zip(axes, GROUPS, strict=True):
     ax.label_outer()
 
 # %%
+# Which detector?
+# ---------------
+# All detectors judge the same simulated records: some see frequencies only, others remove the effect of temperature by
+# a regression before. On a real structure there are no damaged records to choose by. Here the true ones are judged, too
+# (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
+
+several = field_detectors(list(year.frequencies))
+chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "broken lines"]
+tenth = [{}, *({group: 0.1} for group in GROUPS)]
+bench = DetectabilityStudy(fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0)
+bench.run(later.temperatures, reference=true_records)
+print(bench.ranking()[["false_alarms", "pod", "behind", "clearly_behind"]].round(2).to_string())
+print(bench.summary())
+display = AgreementDisplay.from_estimator(bench)
+
+# %%
+# False alarms are the exception. All detectors were set to 2 %, and in truth they are off by what their one baseline
+# year happened to be, which no simulation can know.
+#
 # The paper's tables, beside ours
 # -------------------------------
 # One realisation of noise and weather says little. The tables below are means of some realisations, beside the

@@ -8,7 +8,7 @@ from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
-from skthermo.plotting.comparison import AgreementDisplay
+from skthermo.plotting.comparison import AgreementDisplay, RankingDisplay, ROCDisplay
 from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
 
 __all__ = [
@@ -21,6 +21,8 @@ __all__ = [
     "ModeShapesDisplay",
     "PODCurveDisplay",
     "PredictionDisplay",
+    "ROCDisplay",
+    "RankingDisplay",
     "SensitivityDisplay",
     "StructureDisplay",
 ]

@@ -1,13 +1,16 @@
 """Several detectors beside each other: what is drawn is what the study found, and nothing is left unsaid."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 from sklearn.exceptions import NotFittedError
+from sklearn.metrics import roc_auc_score
 
-from skthermo.plotting import AgreementDisplay
-from skthermo.studies import DetectabilityStudy
+from skthermo.plotting import AgreementDisplay, RankingDisplay, ROCDisplay
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario
 
 FOUND = "piers 18 %"
 
@@ -136,3 +139,138 @@ def test_what_is_no_result_is_named():
         AgreementDisplay.from_estimator(None)
     with pytest.raises(NotFittedError):
         AgreementDisplay.from_estimator(DetectabilityStudy(None, None, []))
+
+
+def ranking_of(**rows):
+    """A ranking of detectors by their false alarms, found damage, found damage at equal false alarms, and distance."""
+    table = pd.DataFrame(rows, index=["false_alarms", "pod", "pod_equal", "behind"], dtype=float).T
+    for name in ("false_alarms", "pod", "behind"):
+        table[f"{name}_lowest"], table[f"{name}_highest"] = table[name] - 0.01, table[name] + 0.01
+    table["keeps_limit"], table["clearly_behind"] = table["false_alarms"] < 0.03, table["behind_lowest"] > 0
+    return table.assign(not_judged=0.0, error="")
+
+
+RANKING = ranking_of(
+    whitened=[0.01, 0.9, 0.92, 0.0],
+    raw=[0.02, 0.5, 0.5, 0.42],
+    good=[0.01, 0.9, 0.915, 0.005],
+    loud=[0.3, 1, 0.7, 0.22],
+)
+
+
+def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
+    failed = pd.DataFrame({"error": "LinAlgError: singular", "keeps_limit": False, "clearly_behind": False}, ["none"])
+    ranking = pd.concat([RANKING, failed])
+    ranking.loc["raw", "not_judged"] = 0.25
+    display = RankingDisplay.from_predictions(ranking)
+    names = rows_named(display.axes_[0])
+    assert names == [
+        *("not clearly behind the best", "whitened", "good", "clearly behind", "raw"),
+        *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
+    ]
+    assert texts(display.axes_[0]) == ["LinAlgError: singular"]
+    assert texts(display.axes_[1]) == ["25\N{NO-BREAK SPACE}% not judged"]
+    assert display.limit_line_.get_xdata()[0] == 2
+    heights = [names.index(name) for name in RANKING.index]
+    for name, points in display.points_.items():
+        np.testing.assert_allclose(points.get_offsets(), np.c_[100 * RANKING[name], heights])
+    for name, bounds in display.bounds_.items():
+        ends = [segment[:, 0] for segment in bounds.get_segments()]
+        np.testing.assert_allclose(ends, 100 * RANKING[[f"{name}_lowest", f"{name}_highest"]])
+    colours = [tuple(colour) for colour in display.bounds_["pod"].get_colors()]
+    assert colours[0] == colours[2]
+    assert len(set(colours)) == 3
+
+
+def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
+    asked = []
+    study = SimpleNamespace(scenarios=[], results_=None, ranking=lambda *given: asked.append(given) or RANKING)
+    display = RankingDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
+    assert asked == [(0.05, "reference")]
+    assert display.limit_line_.get_xdata()[0] == 5
+    with pytest.raises(ValueError, match=r"the ranking lacks the columns \['behind'\]"):
+        RankingDisplay.from_predictions(RANKING.drop(columns="behind"))
+
+
+def test_a_curve_passes_its_own_threshold_and_has_the_area_of_scikit_learn():
+    random = np.random.default_rng(0)
+    y = np.repeat([1, -1], [300, 200])
+    good, poor = random.normal(size=(2, 500)) + 1.5
+    good[300:] -= 2
+    unjudged = np.where(np.arange(500) % 10 == 0, np.nan, poor)
+    display = ROCDisplay.from_predictions(y, {"poor": poor, "good": good, "partly": unjudged})
+    assert next(iter(display.auc_)) == "good"
+    judged = ~np.isnan(unjudged)
+    assert display.auc_["good"] == pytest.approx(roc_auc_score(y, good))
+    assert display.auc_["partly"] == pytest.approx(roc_auc_score(y[judged], poor[judged]))
+    ((x, found),) = display.thresholds_["good"].get_xydata()
+    assert (x, found) == pytest.approx((100 * (good[:300] < 0).mean(), 100 * (good[300:] < 0).mean()))
+    curve = display.lines_["good"].get_xydata()
+    assert np.interp(x, *curve.T) >= found - 1e-9
+    legend = [text.get_text() for text in display.ax_.get_legend().get_texts()]
+    assert sum("10\N{NO-BREAK SPACE}% not judged" in text for text in legend) == 1
+    assert display.ax_.lines[-2].get_label() == "chance: AUC 0.5"
+
+
+def made_study():
+    """Decisions of two detectors on a healthy and two damaged states, one of which begins with the record 5."""
+    scenarios = [
+        Scenario("healthy"),
+        Scenario("deck", {"deck": 0.1}),
+        ProgressiveDamage("later", {"deck": 0.1}, onset=5),
+    ]
+    random, rows, decisions = np.random.default_rng(0), [], {}
+    for detector in ("raw", "whitened"):
+        for number, scenario in enumerate(scenarios):
+            key = (detector, scenario.name, "data-informed")
+            decisions[key] = (random.normal(size=(3, 20)) + 1 - number).astype("f4")
+            row = {"detector": detector, "scenario": scenario.name, "source": key[2], "error": ""}
+            rows.append(row | {"measure": "POD" if number else "PFA", "rate": (decisions[key] < 0).mean()})
+    indices = {key: pd.Series(np.zeros(20)) for key in decisions}
+    return SimpleNamespace(
+        scenarios=scenarios,
+        scenarios_=scenarios,
+        results_=pd.DataFrame(rows),
+        decisions_=decisions,
+        indices_=indices,
+    )
+
+
+def test_curves_of_a_study_are_of_records_from_the_onset_on():
+    study = made_study()
+    display = ROCDisplay.from_estimator(study)
+    for name in ("raw", "whitened"):
+        healthy, deck, later = (study.decisions_[name, s.name, "data-informed"] for s in study.scenarios)
+        damaged = np.concatenate([deck.ravel(), later[:, 5:].ravel()])
+        y = np.repeat([1, -1], [healthy.size, damaged.size])
+        assert display.auc_[name] == pytest.approx(roc_auc_score(y, np.r_[healthy.ravel(), damaged]))
+    display = ROCDisplay.from_estimator(study, detectors=["raw"], scenarios="later")
+    assert [len(part) for part in display.decisions["raw"]] == [60, 45]
+    with pytest.raises(ValueError, match=r"detectors are \['other'\]; expected some of \['raw', 'whitened'\]"):
+        ROCDisplay.from_estimator(study, detectors=["other"])
+    with pytest.raises(ValueError, match=r"scenarios are \['healthy'\]; expected some of"):
+        ROCDisplay.from_estimator(study, scenarios=["healthy"])
+
+
+@pytest.mark.parametrize(
+    ("y", "decisions", "message"),
+    [
+        ([1, 0], {"a": [1, 2]}, "y is .1, 0.; expected 1 for each healthy record"),
+        ([1, -1], {"a": [1, 2, 3]}, r"decisions of 'a' have shape \(3,\); expected \(2,\), as y"),
+        ([1, -1], [1, 2], "decisions is .1, 2.; expected a mapping"),
+        ([1, -1], {"a": [1, np.nan]}, "'a' has judged 1 healthy and 0 damaged records; expected some of both"),
+    ],
+)
+def test_wrong_decisions_are_named(y, decisions, message):
+    with pytest.raises(ValueError, match=message):
+        ROCDisplay.from_predictions(y, decisions)
+
+
+def test_many_curves_have_their_legend_beside_them_and_differ():
+    y = np.repeat([1, -1], 50)
+    decisions = {f"detector {k}": np.r_[np.ones(50), np.linspace(-1, k, 50)] for k in range(10)}
+    display = ROCDisplay.from_predictions(y, decisions)
+    styles = {(line.get_color(), line.get_linestyle()) for line in display.lines_.values()}
+    assert len(styles) == 10
+    display.figure_.canvas.draw()
+    assert display.ax_.get_legend().get_window_extent().x0 > display.ax_.get_window_extent().x1

@@ -1,5 +1,7 @@
 """Several detectors beside each other."""
 
 from skthermo.plotting.comparison._agreement import AgreementDisplay
+from skthermo.plotting.comparison._ranking import RankingDisplay
+from skthermo.plotting.comparison._roc import ROCDisplay
 
-__all__ = ["AgreementDisplay"]
+__all__ = ["AgreementDisplay", "ROCDisplay", "RankingDisplay"]

@@ -15,12 +15,12 @@ from skthermo.plotting._axes import Axes, figure_legend, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, marker_style, shortened
 from skthermo.plotting.comparison._rows import (
     both_ends,
+    check_study,
     in_percent,
     name_rows,
     note,
     places_of,
     read_table,
-    results_of,
     size_of_rows,
     small_rates,
 )
@@ -127,7 +127,8 @@ class AgreementDisplay:
         ValueError
             If no scenario has both simulated and measured records.
         """
-        return cls.from_predictions(results_of(study), groups=groups, **options)
+        check_study(study)
+        return cls.from_predictions(study.results_, groups=groups, **options)
 
     @classmethod
     def from_predictions(
@@ -283,7 +284,7 @@ class AgreementDisplay:
         self.bands_[name] = ax.barh(y, high - low, 0.62, low, color=ORANGE, alpha=0.35, label=label)
         style = {"linestyle": "", "marker": "|", "markersize": 10, "markeredgewidth": 2, "color": ORANGE}
         self.simulated_[name] = ax.plot(simulated, y, **style, label="simulated, mean")[0]
-        style = {"linestyle": "", "marker": "o", "markersize": 5.5, "color": BLUE, "clip_on": False}
+        style = {"linestyle": "", "marker": "o", "markersize": 5.5, "color": BLUE}
         is_outside = (rows["inside"] == 0).to_numpy()
         self.measured_[name] = [
             ax.plot(measured[~is_outside], y[~is_outside], **style, label="measured")[0],
@@ -320,11 +321,11 @@ class AgreementDisplay:
         groups = self.groups or {}
         self.points_[name] = []
         for number, group in enumerate(dict.fromkeys([*groups.values(), None])):
-            some = rows[[groups.get(detector) == group for detector in rows.index]]
+            some = rows[[groups.get(detector) == group for detector in rows.index]].dropna(subset=["measured"])
             low, high, simulated, measured = in_percent(some[RATES]).T
             ends = np.clip([simulated - low, high - simulated], 0, None)
             style = marker_style(number, 1) | {"clip_on": False, "elinewidth": 0.8}
-            if group is not None or len(some):
+            if len(some):
                 label = label_of(group) if group is not None else "others" if groups else None
                 self.points_[name].append(ax.errorbar(simulated, measured, xerr=ends, **style, label=label))
 

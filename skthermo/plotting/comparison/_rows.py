@@ -16,17 +16,17 @@ ROW, MARGINS = 0.26, 1.5
 """Inches that a row takes, and all that is above and below the rows."""
 
 PERCENT = (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100)  # ticks of an axis of small rates
+MARGIN = 0.02  # share of an axis of small rates that is below 0
 CLOSEST = 0.07  # share of the axis that two ticks are apart at least
 LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
 
 
-def results_of(study: Any) -> pd.DataFrame:
-    """The results of a study."""
+def check_study(study: Any) -> None:
+    """Raise an error for what is no study, or one without results."""
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
-    return study.results_
 
 
 def read_table(results: Any, needed: Sequence[str], what: str) -> pd.DataFrame:
@@ -80,19 +80,19 @@ def note(ax: Axes, height: float, text: str, is_right: bool = True) -> None:
     text = printable(text)
     text = text if len(text) <= LONGEST_NOTE else f"{text[:LONGEST_NOTE].rstrip()} ..."
     place = {"x": 0.99 if is_right else 0.01, "ha": "right" if is_right else "left"}
-    style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True}
+    style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True, "in_layout": False}
     ax.text(y=height, s=plain(text), transform=ax.get_yaxis_transform(), **place, **style)
 
 
 def small_rates(ax: Axes, drawn: Array, direction: str = "x") -> None:
     """An axis from 0 to the largest of some rates in percent, whose square root is even: small ones are told apart."""
-    largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 100.0))
-    functions = (lambda value: np.sqrt(np.clip(value, 0, None)), np.square)
+    largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
+    functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []
     for value in PERCENT:
         if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > CLOSEST * np.sqrt(largest)):
             ticks.append(value)
-    _scale(ax, direction, functions, (0.0, largest), ticks)
+    _scale(ax, direction, functions, (-(MARGIN**2) * largest, largest), ticks)
 
 
 def both_ends(ax: Axes, direction: str) -> None:

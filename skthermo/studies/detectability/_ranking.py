@@ -1,0 +1,177 @@
+"""Detectors of a study in the order of what they find."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t
+
+from skthermo._arrays import Array
+from skthermo.studies.detectability._families import families_of
+from skthermo.studies.detectability._judged import JudgedRecords
+
+LEVEL = 0.9  # probability of detection that counts as reliable
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """One detector's decisions on records of one source: of the healthy structure, of every damaged scenario, and of
+    healthy records with other noise, by which a threshold is moved; each (n_repeats, n_records), or None."""
+
+    healthy: Array
+    damaged: Sequence[Array]
+    calibration: Array | None
+
+    def pod(self, limit: float | None = None, left_out: int | None = None) -> float:
+        """Mean probability of detection over the damaged scenarios, without one of the repeats if asked.
+
+        With a limit, the threshold is moved so that as many of the calibration's records are alarms; NaN without any.
+        """
+        threshold = 0.0 if limit is None else self._threshold(limit, left_out)
+        parts = [_without(decisions, left_out) for decisions in self.damaged]
+        shares = [(part < threshold).sum() / np.count_nonzero(~np.isnan(part)) for part in parts]
+        return float("nan") if np.isnan(threshold) else float(np.mean(shares))
+
+    def jackknife(self, limit: float | None = None) -> Array:
+        """Pseudo-values of that probability, whose mean has its error and that of the moved threshold.
+
+        Empty where repeats differ in number, or have no noise in which they could differ.
+        """
+        n = len(self.damaged[0])
+        if n < 2 or any(len(one) != n or np.array_equal(one, one[[0] * n], equal_nan=True) for one in self.damaged):
+            return np.empty(0)
+        return n * self.pod(limit) - (n - 1) * np.array([self.pod(limit, number) for number in range(n)])
+
+    def auc(self) -> float:
+        """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
+        damaged scenarios."""
+        healthy = np.sort(self.healthy[~np.isnan(self.healthy)])
+        areas = []
+        for decisions in self.damaged:
+            judged = decisions[~np.isnan(decisions)]
+            below = (healthy.searchsorted(judged, "left") + healthy.searchsorted(judged, "right")) / 2
+            areas.append(1 - below.mean() / len(healthy))
+        return float(np.mean(areas))
+
+    def _threshold(self, limit: float, left_out: int | None) -> float:
+        """Decision below which as many of the calibration's records lie as the limit allows."""
+        if self.calibration is None:
+            return float("nan")
+        known = _without(self.calibration, left_out)
+        known = known[~np.isnan(known)]
+        place = int(limit * known.size + 1e-9)  # of products such as 0.29 * 100
+        return float(np.partition(known, place)[place]) if known.size else float("nan")
+
+
+def _without(decisions: Array, left_out: int | None) -> Array:
+    return decisions if left_out is None else np.delete(decisions, left_out, axis=0)
+
+
+def rank(
+    records: Sequence[JudgedRecords],
+    rows: pd.DataFrame,
+    calibration: Mapping[str, Array],
+    errors: Mapping[str, str],
+    limit: float,
+    confidence: float,
+    by: Literal["pod", "pod_equal"],
+) -> pd.DataFrame:
+    """One row for each detector, best first, from its records of one source and their rows in the results.
+
+    By NaN of the moved threshold, which measured records have, the order is that of the probability of detection.
+    """
+    names = list(dict.fromkeys(one.detector for one in records))
+    contenders = {name: _contender(name, records, calibration.get(name)) for name in names}
+    families = {key[:2]: family for key, family in families_of(rows, confidence).items()}
+    table = pd.DataFrame.from_dict(
+        {
+            name: _rates(rows[rows["detector"] == name], limit)
+            | {"pod_equal": contender.pod(limit), "auc": contender.auc()}
+            | _by_family(name, rows[rows["detector"] == name], families)
+            for name, contender in contenders.items()
+        },
+        orient="index",
+    )
+    table = table.infer_objects().rename_axis("detector")
+    keys = ["keeps_limit", by, "auc", "false_alarms", "detector"]
+    table = table.sort_values(keys, ascending=[False, False, False, True, True])
+    pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
+    table["behind"] = table[by].iloc[0] - table[by]
+    margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
+    table["behind_lowest"], table["behind_highest"] = table["behind"] - margin, table["behind"] + margin
+    table["clearly_behind"] = table["behind_lowest"] > 0
+    first = ["false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit"]
+    first += ["pod", "pod_lowest", "pod_highest", "pod_equal", "behind", "behind_lowest", "behind_highest"]
+    first += ["clearly_behind", "auc", "time_to_detection", "not_judged"]
+    table = table[[*first, *(name for name in table if name not in first)]].assign(error="")
+    failed = {"keeps_limit": False, "clearly_behind": False, "error": list(errors.values())}
+    return pd.concat([table, pd.DataFrame(failed, index=list(errors))]).rename_axis("detector") if errors else table
+
+
+def _contender(name: str, records: Sequence[JudgedRecords], calibration: Array | None) -> Contender:
+    mine = [one for one in records if one.detector == name]
+    healthy = np.hstack([one.decisions.ravel() for one in mine if one.scenario.is_healthy])
+    return Contender(healthy, [one.from_onset()[0] for one in mine if not one.scenario.is_healthy], calibration)
+
+
+def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:
+    """Means over the scenarios; means of bounds hold however much the scenarios have in common."""
+    means = rows.groupby("measure")[["rate", "lowest", "highest"]].mean()
+    waits = rows.loc[rows["measure"] == "POD", "time_to_detection"].tolist()
+    is_known = len({type(wait) for wait in waits}) == 1 and not any(pd.isna(wait) for wait in waits)
+    return {
+        **dict(zip(["false_alarms", "false_alarms_lowest", "false_alarms_highest"], means.loc["PFA"], strict=True)),
+        "keeps_limit": bool(means.loc["PFA", "lowest"] <= limit),
+        **dict(zip(["pod", "pod_lowest", "pod_highest"], means.loc["POD"], strict=True)),
+        "time_to_detection": pd.Series(waits).mean() if is_known else np.nan,
+        "not_judged": rows["n_not_judged"].sum() / (rows["n_not_judged"] + rows["n_records"]).sum(),
+    }
+
+
+def _by_family(name: str, rows: pd.DataFrame, families: Mapping[Any, Any]) -> dict[str, float]:
+    """Probability of detection of each family, and its smallest severity that is found reliably."""
+    found = {}
+    for family, some in rows[(rows["measure"] == "POD") & rows["family"].notna()].groupby("family", sort=False):
+        rates = some[["rate", "lowest", "highest"]].mean()
+        found |= dict(zip([f"pod {family}", f"pod {family} lowest", f"pod {family} highest"], rates, strict=True))
+        try:
+            found[f"mdd {family}"] = families[name, family].on_grid(LEVEL)[0]
+        except (KeyError, ValueError):  # no severity, or one twice, or of both signs
+            found[f"mdd {family}"] = np.nan
+    return found
+
+
+def _margin(best: Array, other: Array, confidence: float, n_comparisons: int) -> float:
+    """Half the width of the interval of a mean difference of pseudo-values, one of several that hold together."""
+    n = len(best)
+    if n < 2 or len(other) != n:
+        return float("nan")
+    tail = (1 - confidence) / 2 / max(n_comparisons, 1)
+    return float(t.isf(tail, n - 1) * (best - other).std(ddof=1) / np.sqrt(n))
+
+
+def in_words(table: pd.DataFrame, limit: float) -> str:
+    """What a ranking says, in plain sentences."""
+    failed, ranked = table[table["error"] != ""], table[table["error"] == ""]
+    quiet, loud = ranked[ranked["keeps_limit"]], ranked[~ranked["keeps_limit"]]
+    best = (quiet if len(quiet) else ranked).iloc[0]
+    lines = [
+        f"{best.name!r} finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
+    ]
+    if not len(quiet):
+        lines.append(f"No detector keeps the limit of {limit:.1%} false alarms.")
+    behind = quiet.drop(index=best.name, errors="ignore")
+    if len(behind) and behind["behind_lowest"].isna().all():
+        lines.append("Records of one repeat do not tell which detectors are clearly worse.")
+    else:
+        is_clear = behind["clearly_behind"]
+        for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):
+            shares = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
+            lines += [f"{text}: {', '.join(shares)}."] if shares else []
+    if len(quiet):
+        shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
+        lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
+    lines += [f"Failed: {name!r} ({row['error']})." for name, row in failed.iterrows()]
+    return "\n".join(lines)
