@@ -8,6 +8,7 @@ from z24_recipes import FREQUENCIES, Records, bridge_model, chain
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
 
 ASSUMED = {"soil": 0.18}  # damage that one may have expected of a pier that is to be lowered
+DAMAGED = "pier lowered"
 STATES = {"PFA": "false alarms", "POD": "damage found"}
 FIRST = 12  # damaged records that another publication counts as healthy
 
@@ -74,7 +75,7 @@ def bench(bridge, fem, damage, candidates=None, n_repeats=40):
 def bench_of_a_warning(bridge, **options):
     """The bench of a chain that has learned the baseline alone, and an assumed damage, as before the first alarm."""
     fem = chain(bridge_model()).fit(*bridge.split()[:2])
-    return bench(bridge, fem, Scenario("damaged", ASSUMED), **options)
+    return bench(bridge, fem, Scenario(DAMAGED, ASSUMED), **options)
 
 
 def side_by_side(results):

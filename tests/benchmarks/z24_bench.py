@@ -86,7 +86,7 @@ def main():
         candidates = z24_bench.detectors(memory)
         print("(a) chain of all healthy records, identified damage\n")
         fem, found = z24_damage.identify(bridge)
-        results = z24_bench.bench(bridge, fem, found.scenario("damaged"), candidates, options.repeats)
+        results = z24_bench.bench(bridge, fem, found.scenario(z24_bench.DAMAGED), candidates, options.repeats)
         missed, measured = print_agreement("a", results)
         print("(b) chain of the first four fifths, soil -18 %\n")
         results = z24_bench.bench_of_a_warning(bridge, candidates=candidates, n_repeats=options.repeats)
