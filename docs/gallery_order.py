@@ -4,6 +4,7 @@ ORDER = [
     "plot_truss_study.py",
     "plot_your_own_structure.py",
     "plot_accelerations.py",
+    "plot_detectors.py",
     "plot_z24_bridge.py",
     "plot_z24_detection.py",
     "plot_z24_damage.py",

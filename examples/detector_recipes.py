@@ -114,5 +114,5 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
     for name in ("isolation forest", "20 neighbours"):
         detectors[f"broken lines, {name}"] = compensated(regressors["broken lines"], detector=outlier(name))
     nearby = make_pipeline(StandardScaler(), KNeighborsRegressor(50))
-    detectors["conditional mean and covariance"] = compensated(nearby, "local")
+    detectors["conditional covariance"] = compensated(nearby, "local")
     return detectors

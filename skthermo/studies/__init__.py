@@ -1,17 +1,19 @@
 """Studies of what a monitoring system would detect."""
 
-from skthermo.studies.detectability import DetectabilityStudy, PODCurve, pod_curve
+from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
 from skthermo.studies.extension import what_to_add
 from skthermo.studies.identification import IdentifiedDamage, identify_damage
 from skthermo.studies.scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
 
 __all__ = [
     "DetectabilityStudy",
+    "DetectionTask",
     "IdentifiedDamage",
     "PODCurve",
     "ProgressiveDamage",
     "Scenario",
     "UncertainDamage",
+    "detection_task",
     "identify_damage",
     "pod_curve",
     "sweep",

@@ -56,7 +56,7 @@ class Simulation:
 
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
-        for records in self._records(self.scenarios, 0, seeds):
+        for records in self.records(self.scenarios, 0, seeds):
             self._judge(records, judgement, with_indices=True)
         for scenario in self.scenarios:
             if scenario.name in measured:
@@ -80,12 +80,12 @@ class Simulation:
     def _one_repeat(self, number: int, seeds: Sequence[int]) -> Judgement:
         judgement = Judgement()
         with without_warnings(), single_blas_thread():
-            for records in self._records(self.scenarios, number, seeds):
+            for records in self.records(self.scenarios, number, seeds):
                 self._judge(records, judgement)
             self._calibrate(judgement, number, seeds)
         return judgement
 
-    def _records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
+    def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
         """Records of scenarios from every source, one after the other, all with the same noise."""
         factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
         for scenario in scenarios:
@@ -119,7 +119,7 @@ class Simulation:
         """Add decisions on healthy records with noise of other seeds."""
         healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
-        for records in self._records(healthy, repeat, others) if healthy else ():
+        for records in self.records(healthy, repeat, others) if healthy else ():
             found = Judgement(errors=judgement.errors)
             self._judge(records, found)
             judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})

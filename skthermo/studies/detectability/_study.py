@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -26,7 +26,7 @@ from skthermo.studies.detectability._simulation import (
     Simulation,
     clean_frequencies,
 )
-from skthermo.studies.scenarios import BaseScenario, as_scenario, check_chain, check_groups
+from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -580,16 +580,8 @@ class DetectabilityStudy(BaseEstimator):
 
     def _checked_scenarios(self, reference: Any) -> list[BaseScenario]:
         """The scenarios; an error if they or the names of the reference are wrong."""
-        if isinstance(self.scenarios, type) or not isinstance(self.scenarios, Iterable):
-            raise ValueError(f"scenarios is {self.scenarios!r:.200}; expected a list of scenarios, as sweep makes it")
-        scenarios, groups = [as_scenario(one) for one in self.scenarios], getattr(self.fem.model, "groups", None)
-        wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
-        names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
-        if wrong or not names or len(set(names)) < len(names):
-            raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
-        for scenario in scenarios:
-            if groups is not None:
-                check_groups(scenario.groups, groups)
+        scenarios = read_scenarios(self.scenarios, self.fem.model)
+        names = [scenario.name for scenario in scenarios]
         if reference is not None and not callable(reference) and not isinstance(reference, Mapping):
             raise ValueError(
                 f"reference is {reference!r:.200}; expected {{name of scenario: frequencies}} or a function"

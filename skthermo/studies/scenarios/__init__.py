@@ -2,7 +2,7 @@
 
 from skthermo.studies.scenarios._base import BaseScenario, check_chain, check_groups
 from skthermo.studies.scenarios._progressive import ProgressiveDamage
-from skthermo.studies.scenarios._scenario import Scenario, as_scenario, sweep
+from skthermo.studies.scenarios._scenario import Scenario, read_scenarios, sweep
 from skthermo.studies.scenarios._uncertain import UncertainDamage
 
 __all__ = [
@@ -10,8 +10,8 @@ __all__ = [
     "ProgressiveDamage",
     "Scenario",
     "UncertainDamage",
-    "as_scenario",
     "check_chain",
     "check_groups",
+    "read_scenarios",
     "sweep",
 ]

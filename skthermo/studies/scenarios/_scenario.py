@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -111,7 +111,22 @@ class Scenario(BaseScenario):
         return f"Scenario({', '.join([repr(self.name), *(f'{k}={_short(v)}' for k, v in self.changes(None).items())])})"
 
 
-def as_scenario(given: Any) -> Any:
+def read_scenarios(given: Any, model: Any) -> list[BaseScenario]:
+    """Scenarios of a study of a model, mappings of groups to severities among them; an error if they are wrong."""
+    if isinstance(given, type) or not isinstance(given, Iterable):
+        raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
+    scenarios, groups = [_as_scenario(one) for one in given], getattr(model, "groups", None)
+    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
+    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
+    if wrong or not names or len(set(names)) < len(names):
+        raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
+    for scenario in scenarios:
+        if groups is not None:
+            check_groups(scenario.groups, groups)
+    return scenarios
+
+
+def _as_scenario(given: Any) -> Any:
     """A scenario of a mapping of groups to severities, with a name such as "soil 18 %, piers 5 %"; others as they are.
 
     An empty mapping is the healthy structure.

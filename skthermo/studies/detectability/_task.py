@@ -1,0 +1,453 @@
+"""detection_task: labelled records on which the searches of scikit-learn tune a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
+from sklearn.utils import Bunch
+
+from skthermo._arguments import check_names, check_size
+from skthermo._arrays import as_columns, as_floats, as_random_state, positive_integer
+from skthermo._frames import column_names
+from skthermo._threads import single_blas_thread
+from skthermo._times import has_stamps, row_times, time_of
+from skthermo._validation import BaseSearchCV, _num_samples, last_step
+from skthermo._warnings import warn_user, warnings_once
+from skthermo.studies.detectability._intervals import rate_of
+from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
+from skthermo.studies.detectability._study import check_detector
+from skthermo.studies.detectability._task_scorer import TaskScorer
+from skthermo.studies.detectability._view import View
+from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+
+YEAR = 365.2425  # days
+SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
+
+
+class DetectionTask(Bunch):
+    """Labelled records, measured and simulated, on which a detector is tuned; `detection_task` makes it.
+
+    Parameters
+    ----------
+    **kwargs : dict
+        The attributes.
+
+    Attributes
+    ----------
+    X : DataFrame of shape (n_records, n_columns)
+        Temperatures in degrees Celsius beside frequencies in Hz: the baseline, then all scenarios of the first repeat,
+        of the second, and so on.
+    y : Series of shape (n_records,)
+        +1 for healthy records, -1 for damaged ones.
+    cv : list of (ndarray, ndarray)
+        Positions of the baseline, on which a detector is fitted, and of the simulated records of some repeats, by which
+        it is judged.
+    scoring : callable
+        ``scoring(detector, X, y)``: share of the damaged records found within the limit of false alarms.
+    baseline : DataFrame
+        The measured records in ``X``.
+    states : DataFrame of shape (n_records, 2)
+        Name of the ``scenario`` (missing for the baseline) and number of the ``repeat`` (-1) of each record.
+
+    fem, T, scenarios, noise, seeds : object
+        What the records were simulated with.
+
+    See Also
+    --------
+    detection_task : Makes it, and says what the score is.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector
+    >>> from skthermo.studies import detection_task, sweep
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> scenarios = [{}, {"bottom": 0.2}]
+    >>> task = detection_task(fem, weather, scenarios, columns=fem.mode_names_, n_repeats=2, random_state=0)
+    >>> detector = task.refit(MahalanobisDetector())
+    >>> train, test = task.cv[0]
+    >>> print(f"{task.scoring(detector, task.X.iloc[test], task.y.iloc[test]):.1f} found")
+    0.9 found
+    """
+
+    X: pd.DataFrame
+    y: pd.Series
+    cv: list[tuple[NDArray[np.intp], NDArray[np.intp]]]
+    scoring: TaskScorer
+    baseline: pd.DataFrame
+    states: pd.DataFrame
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+
+    def refit(self, detector: Any) -> Any:
+        """A detector, or the best one of a search, fitted to the baseline alone.
+
+        Parameters
+        ----------
+        detector : detector or search
+            A detector with the settings that it shall have, or a fitted search.
+
+        Returns
+        -------
+        detector
+            A clone, fitted to ``baseline``.
+
+        Raises
+        ------
+        ValueError
+            If there is no such detector, or a search that is not fitted.
+
+        Warns
+        -----
+        UserWarning
+            If the search has fitted its best detector to all records of the task, damaged ones among them.
+        """
+        if isinstance(detector, BaseSearchCV):
+            if not hasattr(detector, "best_params_"):
+                raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
+            if hasattr(detector, "best_estimator_"):
+                warn_user(
+                    "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
+                    "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
+                    "search that refits",
+                )
+            detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
+        check_detector(detector, "the detector")
+        return clone(detector).fit(self.baseline)
+
+    def confirm(
+        self,
+        detectors: Any,
+        T: ArrayLike,
+        *,
+        n_repeats: int | None = None,
+        confidence: float = 0.95,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> pd.DataFrame:
+        """Judge tuned detectors in fresh weather and with fresh noise.
+
+        Parameters
+        ----------
+        detectors : detector, search or mapping of str to these
+            What was tuned and, to compare with, what was not, such as ``{"tuned": search, "default": detector}``. Each
+            is fitted to the baseline, as in `refit`.
+        T : array-like or DataFrame of shape (n_records, n_sensors)
+            Temperatures that took no part in the tuning, such as another year, in degrees Celsius.
+        n_repeats : int, optional
+            How often the records are simulated; by default as often as in the task.
+        confidence : float, default=0.95
+            Of the bounds, two-sided.
+        random_state : int, RandomState or None, default=None
+            Seed of the noise, which is another than that of a task with the same seed.
+
+        Returns
+        -------
+        DataFrame
+            One row for each detector:
+
+            - ``tuned``: score in the task, mean over its splits;
+            - ``fresh``, ``fresh_lowest``, ``fresh_highest``: the same score in the fresh records, and its bounds;
+            - ``optimism``: ``tuned`` less ``fresh``;
+            - ``false_alarms``, ``false_alarms_lowest``, ``false_alarms_highest``: share of the healthy fresh records
+              beyond the detector's own threshold, and its bounds;
+            - ``keeps_limit``: False where all of these bounds exceed the limit of the task. The detector needs a
+              higher threshold, and ``fresh`` is what it finds with one;
+            - ``not_judged``: share of the fresh records that are not judged.
+
+        Raises
+        ------
+        ValueError
+            If a detector or the weather is wrong.
+
+        Warns
+        -----
+        UserWarning
+            As in `refit`; if the weather is that of the task, so that only the noise is fresh.
+        """
+        check_probability(confidence, "confidence")
+        named = detectors if isinstance(detectors, Mapping) else {"": detectors}
+        if not named:
+            raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
+        seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
+        fresh = _task(self.fem, T, self.scenarios, self.baseline, self.noise, self.scoring.max_false_alarms, 1, seeds)
+        if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
+            warn_user(
+                "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
+                "was tuned",
+                "same weather",
+            )
+        rows = []
+        for name, detector in named.items():
+            fitted = self.refit(detector)
+            tuned = np.mean([self.scoring(fitted, self.X.iloc[test], self.y.iloc[test]) for _, test in self.cv])
+            row = {"detector": name or type(last_step(fitted)).__name__, "tuned": float(tuned)}
+            rows.append(row | fresh._rates(fitted, confidence))
+        table = pd.DataFrame(rows).set_index("detector")
+        table.insert(4, "optimism", table["tuned"] - table["fresh"])
+        return table
+
+    def _rates(self, detector: Any, confidence: float) -> dict[str, Any]:
+        """Score and false alarms of a fitted detector on all simulated records, with bounds."""
+        limit = self.scoring.max_false_alarms
+        found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
+        raised, shape = found.raised(limit), (len(self.seeds), -1)
+        drawn = [scenario.n_draws > 1 for scenario in self.scenarios]
+        missed = np.where(np.isnan(found.values), 0.0, found.values - raised)  # not judged is not found
+        pods = [
+            rate_of(missed[rows].reshape(shape), confidence, drawn[found.scenario[rows[0]]]) for rows in found.damaged()
+        ]
+        alarms = rate_of(found.values[found.healthy()].reshape(shape), confidence)
+        return {
+            "fresh": found.found(limit),
+            "fresh_lowest": float(np.mean([pod.lowest for pod in pods])),
+            "fresh_highest": float(np.mean([pod.highest for pod in pods])),
+            "false_alarms": alarms.rate,
+            "false_alarms_lowest": alarms.lowest,
+            "false_alarms_highest": alarms.highest,
+            "keeps_limit": alarms.lowest <= limit,
+            "not_judged": float(np.isnan(found.values).mean()),
+        }
+
+
+def detection_task(
+    fem: Any,
+    T: ArrayLike,
+    scenarios: Sequence[BaseScenario | Mapping[str, float]],
+    *,
+    baseline: ArrayLike | None = None,
+    columns: Sequence[Hashable] | None = None,
+    n_repeats: int = 10,
+    noise: ArrayLike | Literal["fitted"] = "fitted",
+    max_false_alarms: float = 0.02,
+    n_splits: int = 2,
+    random_state: int | np.random.RandomState | None = None,
+) -> DetectionTask:
+    """Labelled records on which scikit-learn's searches tune a detector for this structure and its weather.
+
+    Every detector learns the measured baseline, and is judged by simulated records of the healthy and of the damaged
+    structure: a search over its settings, its compensator, lags, windows and covariance needs no damaged record.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted.
+    T : array-like or DataFrame of shape (n_records, n_sensors)
+        Temperatures in degrees Celsius under which the structure is simulated, in order of time; best a year, and one
+        other than that of the baseline. With a baseline on a ``DatetimeIndex``, T needs one too.
+    scenarios : sequence of Scenario, ProgressiveDamage, UncertainDamage or mapping
+        At least one healthy and one damaged; mappings are severities by damage group.
+    baseline : array-like or DataFrame, optional
+        Measured records of the healthy structure: temperatures and frequencies side by side, or frequencies alone. By
+        default those that the chain was fitted on.
+    columns : sequence of str, optional
+        Those columns of the baseline that the detector shall see, such as ``fem.mode_names_`` for one that sees no
+        temperature; by default all.
+    n_repeats : int, default=10
+        How often the records are simulated, each time with other noise.
+    noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
+        As in `~skthermo.surrogate.DataInformedFEM.simulate`.
+    max_false_alarms : float, default=0.02
+        Limit of the share of healthy records in alarm.
+    n_splits : int, default=2
+        Into how many groups the repeats are divided. In each split, the detector is fitted anew to the same baseline
+        and judged by one of the groups.
+    random_state : int, RandomState or None, default=None
+        Seed of the noise.
+
+    Returns
+    -------
+    DetectionTask
+        With ``X``, ``y``, ``cv`` and ``scoring`` for a search, and the methods ``refit`` and ``confirm``.
+
+    Raises
+    ------
+    ValueError
+        If the chain is not fitted; if no scenario, or each, is healthy; if there are fewer repeats than splits; if
+        columns, stamps or an argument are wrong.
+
+    Warns
+    -----
+    UserWarning
+        Once for each kind of doubt about the simulations, such as weather outside the training range.
+
+    See Also
+    --------
+    DetectabilityStudy : What a detector, or several, would find, with bounds.
+
+    Notes
+    -----
+    Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
+    among them. ``task.refit(search)`` fits it to the baseline.
+
+    The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
+    threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
+    until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
+    scenarios, which count alike. A damaged record that is not judged is not found.
+
+    All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
+    settings are compared more certainly than each is known.
+
+    Each state (a scenario in one repeat) is judged by a call of its own: no lag and no window reaches from one state
+    into another. Its first records, for which lags and windows lack records before, may not be judged: T should be long
+    beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
+    so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
+    single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+
+    The best of many settings is partly the luckiest: its score is too good. ``confirm`` judges it in weather and with
+    noise that took no part.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import GridSearchCV
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.detection import WindowedAlarm
+    >>> from skthermo.studies import detection_task, sweep
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> scenarios = sweep(fem, (0.1,), ["bottom", "top"])
+    >>> task = detection_task(fem, weather, scenarios, columns=fem.mode_names_, n_repeats=4, random_state=0)
+    >>> task.X.shape, task.states["scenario"].value_counts().to_dict()
+    ((4745, 6), {'healthy': 1460, 'bottom 10 %': 1460, 'top 10 %': 1460})
+    >>> grid = {"window": [1, 3, 7], "rule": ["mean", "m-of-n"]}
+    >>> search = GridSearchCV(WindowedAlarm(1), grid, cv=task.cv, scoring=task.scoring, refit=False)
+    >>> search.fit(task.X, task.y).best_params_
+    {'rule': 'mean', 'window': 7}
+    >>> later = make_truss_campaign(random_state=2).temperatures
+    >>> detectors = {"tuned": search, "single records": WindowedAlarm(1)}
+    >>> task.confirm(detectors, later, random_state=0)[["tuned", "fresh", "fresh_lowest", "fresh_highest"]].round(2)
+                    tuned  fresh  fresh_lowest  fresh_highest
+    detector
+    tuned            0.65   0.65          0.61           0.69
+    single records   0.14   0.15          0.13           0.17
+    """
+    seeds = _seeds(n_repeats, random_state)[:, 0]
+    n_splits = positive_integer(n_splits, "n_splits")
+    if n_splits > len(seeds):
+        raise ValueError(f"n_splits is {n_splits} for {len(seeds)} repeats; expected at most as many splits as repeats")
+    limit = check_size(max_false_alarms, "max_false_alarms", 0.0, 1.0, "a share between 0 and 1, such as 0.02")
+    check_chain(fem)
+    table = _baseline(fem, baseline)
+    table = table[_columns(table, columns, fem.mode_names_)]
+    return _task(fem, T, read_scenarios(scenarios, fem.model), table, noise, limit, n_splits, seeds)
+
+
+def _task(
+    fem: Any, T: Any, scenarios: Any, baseline: pd.DataFrame, noise: Any, limit: float, n_splits: int, seeds: Any
+) -> DetectionTask:
+    """A task with the noise of some seeds."""
+    names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
+    positions = [names.index(name) for name in baseline.columns]
+    labels = _labels(scenarios, T)
+    n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
+    index = _moved(T, baseline, n_repeats * n_scenarios)
+    with warnings_once("in the simulations of this task"), single_blas_thread():
+        clean = clean_frequencies(fem, scenarios, T, len(seeds))
+        simulation = Simulation(fem, {}, scenarios, T, clean, noise, None)
+        tables = [
+            np.hstack([as_floats(T), one.values])[:, positions]
+            for repeat, seed in enumerate(seeds)
+            for one in simulation.records(scenarios, repeat, [seed])
+        ]
+    X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)]).rename_axis(baseline.index.name)
+    y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
+    state = np.repeat(np.arange(len(tables)), n_records)
+    codes = np.r_[np.full(n_baseline, -1), state % n_scenarios]
+    scenario = pd.Categorical.from_codes(codes, [one.name for one in scenarios])
+    states = {"scenario": scenario, "repeat": np.r_[np.full(n_baseline, -1), state // n_scenarios]}
+    groups = np.array_split(np.arange(n_repeats), n_splits)
+    tests = [n_baseline + np.flatnonzero(np.isin(state // n_scenarios, group)) for group in groups]
+    return DetectionTask(
+        X=X,
+        y=y,
+        cv=[(np.arange(n_baseline), test) for test in tests],
+        scoring=TaskScorer(y.iloc[n_baseline:], state, n_scenarios, names[: fem.n_features_in_], limit),
+        baseline=baseline,
+        states=pd.DataFrame(states, X.index),
+        fem=fem,
+        T=T,
+        scenarios=scenarios,
+        noise=noise,
+        seeds=seeds,
+    )
+
+
+def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
+    """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
+    T, F = fem.training_records_
+    names, n_sensors = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_
+    if baseline is None:
+        stamped = T if has_stamps(T) else F
+        index = stamped.index if has_stamps(stamped) else None
+        return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
+    known = View(names, n_sensors, np.arange(len(names)), False)._positions_of(baseline, "the baseline")
+    index = baseline.index if has_stamps(baseline) else None
+    return pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
+
+
+def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
+    """Rows of all states, one after the other: stamps of T moved into the future, or numbers after the baseline's."""
+    if not has_stamps(baseline):
+        return pd.RangeIndex(len(baseline), len(baseline) + n_states * _num_samples(T))
+    stamps = getattr(T, "index", None)
+    if (
+        not has_stamps(T)
+        or (stamps.tz is None) != (baseline.index.tz is None)
+        or not stamps.is_unique
+        or stamps.hasnans
+    ):
+        raise ValueError(
+            f"T has the index {stamps!r:.200}, and the baseline stamps in the time zone {baseline.index.tz}; expected "
+            "T on a DatetimeIndex as well, with a time zone if the baseline has one, and each stamp once"
+        )
+    day, gap = pd.Timedelta(days=1), pd.Timedelta(days=SHORTEST_GAP)
+    wait, period = (baseline.index.max() + gap - stamps.min()) / day, (stamps.max() - stamps.min() + gap) / day
+    room = (pd.Timestamp.max.tz_localize(stamps.tz) - stamps.max()) / day - 1
+    for length in (YEAR, 1.0):
+        days = np.round(length * (max(np.ceil(wait / length), 0) + np.ceil(period / length) * np.arange(n_states)))
+        if days[-1] < room:
+            return pd.DatetimeIndex(np.concatenate([stamps + one * day for one in days]))
+    raise ValueError(
+        f"{n_states} states of {period:.0f} days, each with stamps of its own, would end after the year 2262; expected "
+        "fewer scenarios or repeats, or a shorter T"
+    )
+
+
+def _labels(scenarios: Sequence[BaseScenario], T: Any) -> NDArray[np.intp]:
+    """+1 where a scenario is healthy or its damage has not begun, else -1, (n_scenarios, n_records)."""
+    times = row_times(T)
+    labels = np.ones((len(scenarios), len(times)), dtype=int)
+    for one, row in zip(scenarios, labels, strict=True):
+        if not one.is_healthy:
+            row[times >= (-np.inf if one.onset is None else time_of(T, one.onset, "onset"))] = -1
+    for name, label in (("healthy", 1), ("damaged", -1)):
+        if not (labels == label).any():
+            raise ValueError(
+                f"none of the scenarios {[one.name for one in scenarios]} has {name} records; expected a healthy "
+                "scenario and a damaged one, as sweep makes them"
+            )
+    return labels
+
+
+def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) -> list[Hashable]:
+    """Those columns of the baseline that a detector shall see, in the order of the baseline."""
+    chosen = list(baseline.columns) if columns is None else check_names(columns, "columns")
+    unknown = [name for name in chosen if name not in baseline.columns]
+    if unknown or not set(chosen) & set(modes):
+        raise ValueError(f"columns are {chosen}; expected some of {list(baseline.columns)}, modes among them")
+    return [name for name in baseline.columns if name in chosen]
+
+
+def _seeds(n_repeats: Any, random_state: Any) -> NDArray[np.intp]:
+    """Seeds of the noise of each repeat: of a task, and of its confirmation."""
+    size = positive_integer(n_repeats, "n_repeats"), 2
+    return as_random_state(random_state).randint(LARGEST_SEED, size=size)

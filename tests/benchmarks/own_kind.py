@@ -1,0 +1,182 @@
+"""Records that a chain simulates, judged by compensators of the chain's own kind and of others.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/own_kind.py
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=path/to/data python tests/benchmarks/own_kind.py --bridges Z24
+
+Chains whose temperature mapper is made of broken lines, boosted trees or a network simulate the healthy and the damaged
+structure, and detectors judge: residuals of regressors of the same three kinds, of the chains themselves, and raw
+frequencies. Beside them stand the same alarms on true records of the truss, or on those of Z24, with the chain
+of the baseline and assumed damage. The own kind's advantage is the alarms in records of the own kind of chain, less the
+mean of those in records of the two others; the regret is what the choice by one simulation, or by two of different
+kinds, finds less of true damage than the best detector does.
+"""
+
+import argparse
+import os
+import sys
+import warnings
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from sklearn.ensemble import GradientBoostingRegressor
+from sklearn.multioutput import MultiOutputRegressor
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.fem import add_noise
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+sys.path.append(str(Path(__file__).parents[2] / "examples"))
+from detector_recipes import field_detectors
+
+NOISE, LIMIT = 0.01, 0.03
+RAW = ("raw, Mahalanobis", "raw, 20 neighbours")
+DAMAGES = {f"{group} {s:.0%}": {group: s} for group, s in (("bottom", 0.05), ("bottom", 0.1), ("diagonal", 0.05))}
+
+
+def kinds():
+    """Regressors for the chain's temperature mapper, and for compensators."""
+    network = MLPRegressor(
+        hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
+    )
+    trees = MultiOutputRegressor(GradientBoostingRegressor(random_state=0))
+    regressors = {"broken lines": None, "boosted trees": trees, "network": network}
+    return {name: TemperatureMapper(regressor, random_state=0) for name, regressor in regressors.items()}
+
+
+def judges(targets, chains, scale, block=None):
+    """Detectors that learn the baseline, by name."""
+    estimators = kinds() | {f"chain, {name}": chain for name, chain in chains.items()}
+    raw = field_detectors(targets, block=block)
+    compensated = {
+        name: make_pipeline(TemperatureCompensator(one, targets=targets, scale=scale), MahalanobisDetector())
+        for name, one in estimators.items()
+    }
+    return {name: raw[name] for name in RAW} | compensated
+
+
+def truss_case(seed):
+    """Chains to fit, a baseline, and for each state the weather, the damage and the true records of one repeat."""
+    year, later = (make_truss_campaign(noise=NOISE, random_state=2 * seed + i) for i in range(2))
+    inverse = InverseSurrogate(make_truss(), bounds=0.2, noise=NOISE)
+    chains = {
+        name: DataInformedFEM(make_truss(), inverse=inverse, mapper=mapper, random_state=seed)
+        for name, mapper in kinds().items()
+    }
+    states = {name: (later.temperatures, damage) for name, damage in ({"healthy": {}} | DAMAGES).items()}
+    clean = {name: later.model.damaged(damage).frequencies(later.theta) for name, (_, damage) in states.items()}
+
+    def true(state, repeat):
+        F = add_noise(clean[state], NOISE, random_state=1000 * seed + repeat)
+        return later.temperatures.join(pd.DataFrame(F, later.temperatures.index, year.frequencies.columns))
+
+    return chains, year.temperatures.join(year.frequencies), states, true
+
+
+def z24_case(seed):
+    """The same with measured records, of which there is one repeat."""
+    import z24_recipes
+
+    bridge = z24_recipes.Bridge(z24_recipes.find(Path(os.environ["SKTHERMO_DATA"])))
+    records, model = z24_recipes.Records.of(bridge), z24_recipes.bridge_model()
+    chains = {name: z24_recipes.chain(model).set_params(mapper=mapper) for name, mapper in kinds().items()}
+    measured = {"healthy": records.later, "damaged": records.damaged}
+    damages = {"healthy": {}, "damaged": {"soil": 0.18}}
+    states = {name: (frame[list(bridge.T)], damages[name]) for name, frame in measured.items()}
+    return chains, records.baseline, states, lambda state, repeat: measured[state]
+
+
+def alarms(case, seed, n_repeats):
+    """Share of records in alarm, by judge, source and state."""
+    chains, baseline, states, true = case(seed)
+    on_truss = case is truss_case
+    temperatures = list(next(iter(states.values()))[0])
+    targets = [name for name in baseline if name not in temperatures]
+    fitted = {name: chain.fit(baseline[temperatures], baseline[targets]) for name, chain in chains.items()}
+    detectors = judges(targets, chains, None if on_truss else "local", None if on_truss else "1D")
+    for name, detector in detectors.items():
+        detector.fit(baseline[targets] if name in RAW else baseline)
+    rates = {}
+    for repeat in range(n_repeats):
+        for state, (T, damage) in states.items():
+            options = {"damage": damage, "noise": "fitted", "random_state": repeat}
+            records = {name: T.join(fem.simulate(T, **options)) for name, fem in fitted.items()}
+            records["truth"] = true(state, repeat)
+            for source, frame in records.items():
+                for name, detector in detectors.items():
+                    decisions = detector.predict(frame[targets] if name in RAW else frame)
+                    rates.setdefault((name, source, state), []).append((decisions == -1).sum() / (decisions != 0).sum())
+    return pd.Series({key: np.mean(found) for key, found in rates.items()}).rename_axis(
+        ["judge", "simulated by", "state"]
+    )
+
+
+def by_measure(rates):
+    """False alarms, and the mean share of damaged records found, in percent: judges over sources."""
+    table = 100 * rates.unstack("state")
+    found = table.drop(columns="healthy").mean(axis=1)
+    return pd.concat({"false alarms": table["healthy"], "found": found}, axis=1).unstack("simulated by")
+
+
+def advantage(table):
+    """Points by which alarms differ in records of the own kind of chain."""
+    names, rows = list(kinds()), {}
+    for judge in table.index.drop(list(RAW)):
+        own = judge.removeprefix("chain, ")
+        others = [name for name in names if name != own]
+        rows[judge] = {
+            measure: table.loc[judge, (measure, own)] - table.loc[judge, measure][others].mean()
+            for measure in ("false alarms", "found")
+        }
+    return pd.DataFrame(rows).T
+
+
+def regret(table):
+    """True damage that the choice by a simulation, or by the worse of two, finds less than the best, in points.
+
+    Only detectors that keep the limit of false alarms there are chosen from.
+    """
+    found, lost = table["found", "truth"], {}
+    for how, size in (("one kind", 1), ("two kinds", 2)):
+        chosen = [_choice(table, list(sources)) for sources in combinations(kinds(), size)]
+        lost[how] = found[_choice(table, ["truth"])] - found[chosen].mean()
+    return lost
+
+
+def _choice(table, sources):
+    false, found = (table[measure][sources] for measure in ("false alarms", "found"))
+    kept = (false <= 100 * LIMIT).all(axis=1)
+    return found[kept].min(axis=1).idxmax() if kept.any() else false.max(axis=1).idxmin()
+
+
+BRIDGES = {"truss": truss_case, "Z24": z24_case}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=10, help="of the truss; Z24 has one baseline")
+    parser.add_argument("--repeats", type=int, default=10)
+    parser.add_argument("--bridges", nargs="*", default=["truss"], choices=BRIDGES)
+    options = parser.parse_args()
+    warnings.filterwarnings("ignore", category=UserWarning)
+    for bridge in options.bridges:
+        seeds = range(options.seeds if bridge == "truss" else 1)
+        tables = [by_measure(alarms(BRIDGES[bridge], seed, options.repeats)) for seed in seeds]
+        mean = sum(tables) / len(tables)
+        print(f"{bridge}, alarms in percent, {len(tables)} baselines of {options.repeats} repeats\n")
+        for measure in ("false alarms", "found"):
+            print(f"{mean[[(measure, source) for source in (*kinds(), 'truth')]].round(1).to_string()}\n")
+        each = pd.concat([advantage(table) for table in tables], keys=seeds)
+        gains = each.groupby(level=1, sort=False).agg(["mean", "sem"])
+        print(f"Own kind's advantage, points, and its standard error\n\n{gains.round(2).to_string()}\n")
+        print(
+            "Regret, points:", pd.DataFrame([regret(table) for table in tables]).mean().round(2).to_dict(), flush=True
+        )
+
+
+if __name__ == "__main__":
+    main()

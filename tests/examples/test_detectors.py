@@ -1,0 +1,139 @@
+"""The field's detectors: laws of those that scikit-learn lacks, and the rate of false alarms of each."""
+
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.distance import cdist
+from scipy.stats import betabinom
+from sklearn.covariance import EmpiricalCovariance
+from sklearn.linear_model import Ridge
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from tests.examples.pages import recipes
+
+FIELD = recipes("detector")
+RECORDS = np.random.default_rng(0).multivariate_normal([0, 1, 2], [[2, 1, 0], [1, 2, 1], [0, 1, 3]], 200)
+
+
+@pytest.fixture(scope="module")
+def baseline():
+    year = make_truss_campaign(random_state=0)
+    return year.temperatures.join(year.frequencies)
+
+
+@pytest.fixture(scope="module")
+def later():
+    years = make_truss_campaign(5, random_state=1)
+    return years.temperatures.join(years.frequencies)
+
+
+@pytest.fixture(scope="module")
+def targets(baseline):
+    return [name for name in baseline if name.startswith("f")]
+
+
+@pytest.fixture(scope="module")
+def fitted(baseline, targets):
+    """Every detector, with the columns that it sees."""
+    detectors = FIELD.field_detectors(targets, Ridge())
+    for name in ("boosted trees", "boosted trees, whitened"):
+        detectors[name].set_params(temperaturecompensator__estimator__estimator__n_estimators=10)
+    sees = {name: targets if name.startswith("raw") else list(baseline) for name in detectors}
+    return {name: (detector.fit(baseline[sees[name]]), sees[name]) for name, detector in detectors.items()}
+
+
+def test_there_are_many_with_and_without_temperatures(targets):
+    names = list(FIELD.field_detectors(targets))
+    assert len(names) >= 17
+    assert sum(name.startswith("raw") for name in names) >= 8
+    assert not [name for name in names if name.startswith("chain")]
+    few = FIELD.field_detectors(["f1", "f2"])
+    assert "raw, less 1 component" in few
+    assert "raw, less 2 components" not in few
+
+
+def test_every_rate_of_false_alarms_is_the_one_asked_for(fitted, baseline, later):
+    """The rate after a baseline of n independent records has a beta distribution, alarms a beta-binomial one."""
+    n, asked = len(baseline), 0.02
+    rank = int(np.ceil((n + 1) * (1 - asked)))
+    lowest, highest = betabinom(len(later), n + 1 - rank, rank).ppf([0.0005, 0.9995])
+    alarms = {name: (detector.predict(later[sees]) == -1).sum() for name, (detector, sees) in fitted.items()}
+    assert {"chain", "chain, whitened"} <= set(alarms)
+    assert not {name: n for name, n in alarms.items() if not lowest <= n <= highest}
+
+
+def test_every_detector_finds_much_damage(fitted):
+    damaged = make_truss_campaign(damage={"bottom": 0.4}, random_state=2)
+    records = damaged.temperatures.join(damaged.frequencies)
+    found = {name: (detector.predict(records[sees]) == -1).mean() for name, (detector, sees) in fitted.items()}
+    assert not {name: share for name, share in found.items() if share < 0.9}
+
+
+@pytest.mark.filterwarnings(r"ignore:\d of \d rows have no temperature at all")
+def test_gaps_are_not_judged_by_those_that_need_complete_rows(fitted, later, targets):
+    gaps = later[:6].copy()
+    gaps.iloc[1, list(later).index("f2")] = np.nan
+    gaps.iloc[3] = np.nan
+    for name, (detector, sees) in fitted.items():
+        with pytest.warns(UserWarning, match=r"rows? (is|are) not judged"):
+            decisions = detector.predict(gaps[sees])
+        last = detector[-1] if hasattr(detector, "steps") else detector
+        unknown = [3] if isinstance(last, MahalanobisDetector) else [1, 3]
+        np.testing.assert_array_equal(np.flatnonzero(decisions == 0), unknown, err_msg=name)
+
+
+def test_the_distance_to_the_kth_neighbour_is_that_of_sorted_distances():
+    new = RECORDS[:5] + 0.1
+    scores = FIELD.NeighbourDistance(7).fit(RECORDS).score_samples(new)
+    np.testing.assert_allclose(scores, -np.sort(cdist(new, RECORDS))[:, 6])
+
+
+def test_components_that_are_left_out_do_not_count():
+    whole = EmpiricalCovariance().fit(RECORDS).mahalanobis(RECORDS) * (len(RECORDS) - 1) / len(RECORDS)
+    np.testing.assert_allclose(FIELD.MinorComponents(0).fit(RECORDS).score_samples(RECORDS), -np.sqrt(whole))
+    first = np.linalg.eigh(np.cov(RECORDS.T))[1][:, -1]
+    less = FIELD.MinorComponents(1).fit(RECORDS)
+    np.testing.assert_allclose(less.score_samples(RECORDS + 9 * first), less.score_samples(RECORDS))
+
+
+def test_a_factor_common_to_all_columns_counts_little():
+    random, loadings = np.random.default_rng(0), np.array([1.0, -2.0, 1.5, 1.0])
+    rows = random.normal(size=(500, 1)) * loadings + 0.1 * random.normal(size=(500, 4))
+    specific = FIELD.SpecificFactors().fit(rows)
+    across = np.array([2.0, 1.0, 0.0, 0.0])
+    along, other = -specific.score_samples(np.array([3 * loadings, 3 * across]))
+    assert along < 0.1 * other
+    length = np.sqrt(8 / np.pi)  # mean of that of three unit deviations: the factor takes one of four
+    assert -specific.score_samples(rows).mean() == pytest.approx(length, rel=0.05)
+
+
+def test_columns_that_wander_together_are_judged_by_what_keeps_them_together():
+    random = np.random.default_rng(0)
+    walk = random.normal(size=600).cumsum()
+    noise = random.normal(size=600)
+    rows = np.column_stack([walk, 2 * walk + noise])
+    together = FIELD.Cointegration().fit(rows)
+    assert together.vector_[0] / together.vector_[1] == pytest.approx(-2, rel=0.02)
+    expected = np.abs(noise - noise.mean()) / noise.std()
+    np.testing.assert_allclose(-together.score_samples(rows), expected, atol=0.2)
+    moved = together.score_samples(rows + [[50.0, 100.0]])
+    np.testing.assert_allclose(moved, together.score_samples(rows), atol=1)
+
+
+def test_without_statsmodels_the_error_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "statsmodels.tsa.vector_ar.vecm", None)
+    with pytest.raises(ImportError, match="cointegration needs statsmodels; get it with: pip install statsmodels"):
+        FIELD.Cointegration().fit(RECORDS)
+
+
+def test_blocks_are_as_long_as_wanted(targets):
+    stamps = pd.date_range("2025", periods=400, freq="h")
+    rows = pd.DataFrame(np.random.default_rng(0).normal(size=(400, 6)), stamps, targets)
+    for name, detector in FIELD.field_detectors(targets, block="1D").items():
+        if "neighbours" in name:
+            last = detector[-1] if hasattr(detector, "steps") else detector
+            assert last.block == "1D"
+    FIELD.field_detectors(targets, block="1D")["raw, 20 neighbours"].fit(rows)

@@ -1,0 +1,339 @@
+"""Tasks on which searches tune a detector."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+import sklearn
+from sklearn.base import BaseEstimator, OutlierMixin, clone
+from sklearn.ensemble import IsolationForest
+from sklearn.experimental import enable_halving_search_cv  # noqa: F401
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import GridSearchCV, HalvingRandomSearchCV, cross_val_score
+from sklearn.neighbors import LocalOutlierFactor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.preprocessing import LagFeatures
+from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER, OTHER = LATER.temperatures[:120], LATER.temperatures[120:240]
+SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
+MODES = list(YEAR.frequencies)
+SCENARIOS = [Scenario("healthy"), Scenario("a tenth", {"bottom": 0.1}), Scenario("a fifth", {"top": 0.2})]
+
+
+def task_of(fem, scenarios=SCENARIOS, T=WEATHER, **options):
+    return detection_task(fem, T, scenarios, **{"n_repeats": 2, "random_state": 3} | options)
+
+
+def with_memory(window, lags=4, targets=MODES):
+    """A detector in which lags and windows reach back."""
+    regression = make_pipeline(LagFeatures(lags), LinearRegression())
+    return make_pipeline(TemperatureCompensator(regression, targets=targets), WindowedAlarm(window))
+
+
+def rows_of(task, scenario, repeat):
+    return np.flatnonzero((task.states["scenario"] == scenario) & (task.states["repeat"] == repeat))
+
+
+class Noted(OutlierMixin, BaseEstimator):
+    """A detector with given decisions for the rows of X."""
+
+    def __init__(self, decisions=None):
+        self.decisions = decisions
+
+    def fit(self, X, y=None):
+        return self
+
+    def decision_function(self, X):
+        return self.decisions[X.index].to_numpy()
+
+    score_samples = decision_function
+
+
+def noted(task, values):
+    return Noted(pd.Series(values, task.X.index))
+
+
+@pytest.fixture(scope="module")
+def task(fem):
+    return task_of(fem)
+
+
+def test_the_baseline_is_measured_and_the_rest_is_what_the_chain_simulates(fem, task):
+    pd.testing.assert_frame_equal(task.baseline, SIDE_BY_SIDE)
+    pd.testing.assert_frame_equal(task.X[:365], SIDE_BY_SIDE, check_freq=False)
+    assert (task.y[:365] == 1).all()
+    assert task.states["scenario"][:365].isna().all()
+    seeds = np.random.RandomState(3).randint(np.iinfo(np.int32).max, size=(2, 2))[:, 0]
+    for repeat, seed in enumerate(seeds):
+        for one in SCENARIOS:
+            records = fem.simulate(WEATHER, damage=one.damage or None, noise="fitted", random_state=int(seed))
+            rows = rows_of(task, one.name, repeat)
+            np.testing.assert_array_equal(task.X.iloc[rows], WEATHER.join(records))
+            assert (task.y.iloc[rows] == (1 if one.name == "healthy" else -1)).all()
+
+
+def test_same_seed_same_bits(fem, task):
+    again, other = task_of(fem), task_of(fem, random_state=4)
+    pd.testing.assert_frame_equal(again.X, task.X)
+    assert (other.X[MODES][365:] != task.X[MODES][365:]).to_numpy().mean() > 0.95
+
+
+def test_splits_train_on_the_baseline_and_judge_all_scenarios_of_different_repeats(fem):
+    task = task_of(fem, n_repeats=5, n_splits=3)
+    assert len(task.cv) == 3
+    repeats = []
+    for train, test in task.cv:
+        np.testing.assert_array_equal(train, np.arange(365))
+        states = task.states.iloc[test]
+        counts = states.groupby(["repeat", "scenario"], observed=False).size()
+        assert counts.size == states["repeat"].nunique() * 3
+        assert (counts == 120).all()
+        repeats += [states["repeat"].unique()]
+    assert sorted(np.concatenate(repeats)) == list(range(5))
+
+
+@pytest.mark.parametrize("n_repeats", [2, 44])
+def test_states_have_stamps_of_their_own(fem, n_repeats):
+    task = task_of(fem, T=LATER.temperatures[::30], n_repeats=n_repeats, scenarios=sweep(fem, (0.1,)))
+    stamps = task.X.index
+    assert stamps.is_monotonic_increasing
+    assert stamps.is_unique
+    state = np.r_[-1 * np.ones(365, dtype=int), task.scoring.state]
+    steps = np.diff(stamps)[np.diff(state) != 0]
+    assert (steps >= pd.Timedelta(days=30)).all()
+    assert len(steps) == 5 * n_repeats
+    moved = stamps[365:].to_numpy().reshape(-1, 13) - LATER.temperatures.index[::30].to_numpy()
+    days = moved / np.timedelta64(1, "D")
+    assert (days == days[:, :1]).all()
+    assert (days % 1 == 0).all()
+    if n_repeats == 2:  # whole years fit
+        assert (np.abs(days / 365.2425 - np.round(days / 365.2425)) * 365.2425 <= 1).all()
+
+
+@pytest.mark.parametrize("window", ["5D", 5])
+def test_no_lag_and_no_window_reaches_from_one_state_into_another(fem, task, window):
+    detector = task.refit(with_memory(window))
+    found = task.scoring.decisions(detector, task.X[365:]).values
+    assert np.isnan(found).any()
+    assert not np.isnan(found).all()
+    apart = WEATHER.index + pd.Timedelta(days=10000)
+    for start in range(0, len(found), 120):
+        alone = pd.DataFrame(task.X[365:].iloc[start : start + 120].to_numpy(), apart, task.X.columns)
+        np.testing.assert_allclose(found[start : start + 120], detector.decision_function(alone), rtol=1e-9)
+    together = detector.decision_function(task.X[365:])
+    if window == "5D":  # stamps alone keep states apart
+        np.testing.assert_allclose(together, found, rtol=1e-9)
+    else:
+        assert (np.isnan(together) < np.isnan(found)).any()
+
+
+def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
+    T = WEATHER.to_numpy()
+    task = task_of(fem_of_arrays, T=T)
+    assert list(task.X.index) == list(range(365 + 6 * 120))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*(rows have no stamps|lags reach|weather that)")
+        detector = task.refit(with_memory(3, targets=[3, 4, 5, 6, 7, 8]))
+        found = task.scoring.decisions(detector, task.X[365:]).values
+        for start in range(0, len(found), 120):
+            alone = task.X[365:].iloc[start : start + 120].reset_index(drop=True)
+            np.testing.assert_array_equal(found[start : start + 120], detector.decision_function(alone))
+
+
+def test_rows_are_judged_in_order_of_time(task):
+    detector = task.refit(with_memory("5D"))
+    test = task.cv[0][1]
+    shuffled = np.random.default_rng(0).permutation(test)
+    ordered = task.scoring(detector, task.X.iloc[test], task.y.iloc[test])
+    assert task.scoring(detector, task.X.iloc[shuffled], task.y.iloc[shuffled]) == ordered
+
+
+@pytest.mark.parametrize(("own", "expected"), [(0.005, 0.005), (0.02, 0.02), (0.2, 0.02)])
+def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
+    task = task_of(fem, n_repeats=40, columns=MODES)
+    decisions = np.random.default_rng(0).uniform(size=len(task.X)) - own
+    score = task.scoring(noted(task, decisions), task.X[365:], task.y[365:])
+    assert abs(score - expected) < 4 * np.sqrt(2 * expected / (40 * 120))
+
+
+def test_a_raised_threshold_keeps_the_limit(fem):
+    task = task_of(fem, columns=MODES)
+    random = np.random.default_rng(1)
+    values = random.standard_normal(len(task.X)).round(1)  # with ties
+    for limit in (0.01, 0.05, 0.3):
+        found = task.scoring.decisions(noted(task, values), task.X[365:])
+        raised = found.raised(limit)
+        healthy = values[365:][(task.y[365:] == 1).to_numpy()]
+        assert (healthy < raised).mean() <= limit < (healthy < raised + 0.11).mean()
+    strict = task.scoring.decisions(noted(task, values + 10), task.X[365:])
+    assert strict.raised(0.05) == 0  # a threshold that keeps the limit is left alone
+
+
+def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
+    late = ProgressiveDamage("late", {"bottom": 0.1}, onset=WEATHER.index[100])
+    task = task_of(fem, [Scenario("healthy"), Scenario("early", {"top": 0.1}), late], columns=MODES)
+    assert (task.y[task.states["scenario"] == "late"] == 1).sum() == 200
+    for name, share in (("early", 0.5), ("late", 0.5)):
+        values = np.where((task.states["scenario"] == name) & (task.y == -1), -1.0, 1.0)
+        assert task.scoring(noted(task, values), task.X[365:], task.y[365:]) == share
+    values = np.where(task.y == -1, -1.0, 1.0)
+    values[rows_of(task, "early", 0)] = np.nan
+    assert task.scoring(noted(task, values), task.X[365:], task.y[365:]) == 0.75
+    values[task.y == 1] = np.nan
+    with pytest.raises(ValueError, match="none of 240 healthy records is judged"):
+        task.scoring(noted(task, values), task.X[365:], task.y[365:])
+
+
+def test_a_search_finds_what_each_setting_scores(task):
+    detector, grid = with_memory("1D"), {"windowedalarm__window": ["1D", "7D"]}
+    grid["temperaturecompensator__estimator__lagfeatures__lags"] = [1, 3]
+    search = GridSearchCV(detector, grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
+    for setting, score in zip(search.cv_results_["params"], search.cv_results_["mean_test_score"], strict=True):
+        fitted = clone(detector).set_params(**setting).fit(SIDE_BY_SIDE)
+        scores = [task.scoring(fitted, task.X.iloc[test], task.y.iloc[test]) for _, test in task.cv]
+        assert np.mean(scores) == pytest.approx(score, abs=1e-12)
+    assert search.best_params_["windowedalarm__window"] == "7D"
+    two = clone(search).set_params(n_jobs=2).fit(task.X, task.y)
+    np.testing.assert_array_equal(two.cv_results_["mean_test_score"], search.cv_results_["mean_test_score"])
+    with sklearn.config_context(enable_metadata_routing=True):
+        routed = clone(search).fit(task.X, task.y)
+    np.testing.assert_array_equal(routed.cv_results_["mean_test_score"], search.cv_results_["mean_test_score"])
+
+
+@pytest.mark.parametrize(
+    "detector",
+    [
+        IsolationForest(n_estimators=20, random_state=0),
+        LocalOutlierFactor(novelty=True),
+        make_pipeline(StandardScaler(), IsolationForest(n_estimators=20, random_state=0)),
+    ],
+)
+def test_other_detectors_are_judged_too(fem, detector):
+    task = task_of(fem, columns=MODES)
+    assert list(task.X) == MODES
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*LocalOutlierFactor was fitted with feature names")
+        scores = cross_val_score(detector, task.X, task.y, cv=task.cv, scoring=task.scoring)
+    assert ((scores >= 0) & (scores < 1)).all()
+    only = task_of(fem, baseline=YEAR.frequencies)
+    pd.testing.assert_frame_equal(only.X, task.X)
+
+
+def test_halving_takes_a_parameter_as_its_resource(fem):
+    task = task_of(fem, columns=MODES)
+    grid = {"max_features": [0.3, 0.6, 1.0], "max_samples": [0.2, 0.5]}
+    options = {"resource": "n_estimators", "max_resources": 40, "min_resources": 10, "factor": 2, "random_state": 0}
+    options |= {"cv": task.cv, "scoring": task.scoring, "refit": False}
+    options["return_train_score"] = False  # the baseline has no damaged records
+    search = HalvingRandomSearchCV(IsolationForest(random_state=0), grid, **options).fit(task.X, task.y)
+    assert search.n_resources_ == [10, 20, 40]
+    assert np.isfinite(search.cv_results_["mean_test_score"]).all()
+    best = task.refit(search)
+    assert best.n_estimators == search.best_params_["n_estimators"]
+    assert best.n_features_in_ == 6
+
+
+def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
+    grid = {"windowedalarm__window": ["1D", "7D"]}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*weather that the other folds have not seen")
+        search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
+    with pytest.warns(UserWarning, match="fitted best_estimator_ to all records of the task, damaged ones"):
+        best = task.refit(search)
+    expected = with_memory("7D").fit(SIDE_BY_SIDE)
+    assert best[-1].threshold_ == expected[-1].threshold_ != search.best_estimator_[-1].threshold_
+
+
+def test_confirmation_judges_fresh_noise_and_weather(fem):
+    task = task_of(fem, columns=MODES, n_repeats=3, n_splits=1)
+    grid = {"window": [1, 7]}
+    search = GridSearchCV(WindowedAlarm(1), grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
+    table = task.confirm({"tuned": search, "single": WindowedAlarm(1)}, OTHER, random_state=3)
+    assert list(table.index) == ["tuned", "single"]
+    tuned = table.loc["tuned"]
+    assert tuned["tuned"] == pytest.approx(search.best_score_)
+    assert tuned["optimism"] == pytest.approx(tuned["tuned"] - tuned["fresh"])
+    seeds = np.random.RandomState(3).randint(np.iinfo(np.int32).max, size=(3, 2))[:, 1]  # the task has the others
+    detector = WindowedAlarm(7).fit(YEAR.frequencies)
+    decisions = {
+        one.name: [
+            detector.decision_function(
+                fem.simulate(OTHER, damage=one.damage or None, noise="fitted", random_state=seed)
+            )
+            for seed in map(int, seeds)
+        ]
+        for one in SCENARIOS
+    }
+    healthy = np.array(decisions.pop("healthy"))
+    known = np.sort(healthy[~np.isnan(healthy)])
+    limit = min(known[int(0.02 * len(known))], 0)
+    assert tuned["fresh"] == pytest.approx(np.mean([np.mean(np.array(each) < limit) for each in decisions.values()]))
+    assert tuned["false_alarms"] == pytest.approx((known < 0).mean())
+    assert tuned["not_judged"] == pytest.approx(np.isnan(healthy).mean())
+    assert tuned["fresh_lowest"] < tuned["fresh"] < tuned["fresh_highest"]
+    assert tuned["keeps_limit"] == (tuned["false_alarms_lowest"] <= 0.02)
+    single = task.confirm(WindowedAlarm(1), OTHER, random_state=3)
+    pd.testing.assert_series_equal(single.loc["WindowedAlarm"], table.loc["single"], check_names=False)
+
+
+def test_confirmation_in_the_same_weather_says_so(fem):
+    task = task_of(fem, columns=MODES)
+    with pytest.warns(UserWarning, match="the weather is that of the task, and only the noise is fresh"):
+        table = task.confirm(MahalanobisDetector(), WEATHER, random_state=3)
+    assert table["optimism"].item() != 0  # also with the seed of the task, the noise is fresh
+
+
+def test_scenarios_of_uncertain_severity_are_drawn_anew(fem):
+    uncertain = UncertainDamage("uncertain", pd.DataFrame({"bottom": [0.1, 0.2]}))
+    task = task_of(fem, [Scenario("healthy"), uncertain])
+    first, second = (task.X[MODES].iloc[rows_of(task, "uncertain", repeat)].to_numpy() for repeat in (0, 1))
+    assert np.log(first / second).mean() > 0.005
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scenarios": [Scenario("healthy")]}, "has damaged records"),
+        ({"scenarios": [Scenario("damaged", {"top": 0.1})]}, "has healthy records"),
+        ({"scenarios": [Scenario("one"), Scenario("one", {"top": 0.1})]}, "each with a name of its own"),
+        ({"scenarios": [Scenario("one"), Scenario("two", {"roof": 0.1})]}, "damage groups"),
+        ({"scenarios": None}, "expected a list of scenarios"),
+        ({"n_splits": 3}, "n_splits is 3 for 2 repeats"),
+        ({"n_repeats": 0}, "n_repeats"),
+        ({"max_false_alarms": 2}, "a share between 0 and 1"),
+        ({"columns": ["f1", "f9"]}, "columns are"),
+        ({"columns": ["T1"]}, "modes among them"),
+        ({"baseline": SIDE_BY_SIDE.rename(columns={"f1": "g1"})}, "the baseline has the columns"),
+        ({"T": WEATHER.to_numpy()}, "T on a DatetimeIndex as well"),
+        ({"T": WEATHER.tz_localize("UTC")}, "time zone"),
+        ({"n_repeats": 4000, "T": WEATHER}, "after the year 2262"),
+    ],
+)
+def test_what_is_wrong_is_said(fem, options, message):
+    with pytest.raises(ValueError, match=message):
+        task_of(fem, **options)
+
+
+def test_a_scorer_refuses_other_rows_and_what_it_cannot_judge(fem, task):
+    detector = task.refit(with_memory("5D"))
+    with pytest.raises(ValueError, match="365 of 365 rows are no simulated records"):
+        task.scoring(detector, SIDE_BY_SIDE, np.ones(365))
+    with pytest.raises(ValueError, match="expected a frame"):
+        task.scoring(detector, task.X.to_numpy(), task.y)
+    with pytest.raises(ValueError, match="would judge them"):
+        task.scoring(MahalanobisDetector().fit(task.baseline), task.X[365:], task.y[365:])
+    with pytest.raises(ValueError, match="rows is damaged"):
+        task.scoring(detector, task.X.iloc[rows_of(task, "healthy", 0)], np.ones(120))
+    with pytest.raises(ValueError, match="expected an outlier detector"):
+        task.scoring(LinearRegression(), task.X[365:], task.y[365:])
+    with pytest.raises(ValueError, match="expected a search that is fitted"):
+        task.refit(GridSearchCV(with_memory(1), {}))
+    with pytest.raises(ValueError, match="detectors is empty"):
+        task.confirm({}, OTHER)
