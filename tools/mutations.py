@@ -282,6 +282,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
     ],
+    ("plotting/comparison/_agreement.py", "plotting/test_comparison.py"): [
+        ("measured rates outside their bands", '(rows["inside"] == 0)', '(rows["inside"] == 2)'),
+        ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
+    ],
+    ("reporting/_choice.py", "reporting/test_choice.py"): [
+        ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
+    ],
+    ("plotting/comparison/_roc.py", "plotting/test_comparison.py"): [
+        ("records before the onset in a curve", "-np.inf if onset is None", "-np.inf if True"),
+    ],
     ("plotting/structures/_view.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
