@@ -81,13 +81,13 @@ def bench_of_a_warning(bridge, **options):
 def side_by_side(results):
     """Measured and simulated rates by detector, and the band of simulated campaigns, in percent."""
     rates = results[results["error"] == ""].pivot(index="detector", columns=["measure", "source"])
-    order = results["detector"].unique()
+    order = [name for name in results["detector"].unique() if name in rates.index]
     columns = {}
     for measure, state in STATES.items():
         columns[state, "measured"] = rates["rate", measure, "reference"]
         simulated = {"simulated": "rate", "lowest": "band_lowest", "highest": "band_highest"}
         columns |= {(state, key): rates[value, measure, "data-informed"] for key, value in simulated.items()}
-    return 100 * pd.DataFrame(columns).reindex(order).dropna().astype(float)
+    return 100 * pd.DataFrame(columns).loc[order].astype(float)
 
 
 def agreement(table):
@@ -101,15 +101,15 @@ def agreement(table):
     return pd.DataFrame(rows).T
 
 
-def choose(bridge, candidates=None, n_baseline=None, n_repeats=10, every=4):
+def choose(bridge, candidates=None, n_repeats=10, ahead=True):
     """A study of all damage groups, from training rows and simulation alone, to choose a detector by.
 
-    The chain has learned all training rows. Detectors learn them, too, and judge every fourth row's weather; or they
-    learn the first ``n_baseline`` of them, and judge the weather of the rest.
+    The chain has learned all training rows. Detectors learn the first three quarters of them, and judge the weather of
+    the last, which is ahead of them as it will be in service; or they learn all, and judge every fourth row's weather.
     """
     T, F = bridge.split()[:2]
+    n = 3 * len(T) // 4 if ahead else len(T)
     fem = chain(bridge_model()).fit(T, F)
-    weather = T[::every] if n_baseline is None else T[n_baseline:]
     study = DetectabilityStudy(fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0)
-    study.run(weather, T.join(F)[:n_baseline])
+    study.run(T[n:] if ahead else T[::4], T.join(F)[:n])
     return study
