@@ -272,6 +272,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
+    ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
+        ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(state[order])) + 1", "[]"),
+        (
+            "records that are not judged",
+            "np.mean(self.values[rows] < limit)",
+            "np.mean(~(self.values[rows] >= limit))",
+        ),
+    ],
+    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
+        ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
+        ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
+    ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
