@@ -174,7 +174,35 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 # %%
 # .. code-block:: none
 #
-#    TABLE_A
+#                                    false alarms                          damage found
+#                                        measured simulated lowest highest     measured simulated lowest highest
+#    detector
+#    raw, Mahalanobis                         0.0       0.0    0.0     0.0          0.0       0.0    0.0     0.0
+#    raw, isolation forest                    0.4       0.5    0.0     1.1         89.2      95.0   57.9   100.0
+#    raw, 20 neighbours                       1.2       1.6    0.7     2.5         91.5      97.8   73.5   100.0
+#    raw, local outlier factor               16.6      16.4   12.3    21.2         96.2      99.8   91.7   100.0
+#    raw, one-class SVM                       0.0       0.0    0.0     0.0         61.5      62.0    4.6   100.0
+#    raw, less 1 component                    0.4       0.7    0.0     1.2          4.6       2.1    0.0    13.8
+#    raw, less 2 components                   0.4       0.5    0.2     1.1          4.6       2.4    0.0    22.0
+#    raw, less 3 components                   1.1       1.0    0.5     1.6          7.7       2.8    0.0    12.1
+#    raw, factor analysis                     0.2       0.5    0.0     1.1          5.4       2.6    0.0    19.0
+#    raw, Gaussian mixture                    3.0       3.5    2.5     5.0         83.8      85.3   33.1   100.0
+#    raw, cointegration                       0.9       1.1    0.4     2.0          4.6       2.2    0.0     6.1
+#    broken lines                             0.0       0.1    0.0     0.4         89.2      80.5    2.0   100.0
+#    broken lines, whitened                   0.9       1.3    0.4     2.0         90.8      93.6   25.1   100.0
+#    boosted trees                            0.2       0.3    0.0     0.9         20.8      31.5    3.8    89.0
+#    boosted trees, whitened                  1.1       1.3    0.5     2.3         82.3      84.3   33.2   100.0
+#    linear regression                       12.1      12.9   11.3    14.1         93.1      97.8   88.5   100.0
+#    linear regression, whitened             22.9      23.2   20.4    25.2         98.5      99.8   95.5   100.0
+#    chain                                    0.0       0.1    0.0     0.4         90.0      83.7    3.0   100.0
+#    chain, whitened                          0.7       1.3    0.4     2.0         90.8      94.7   26.0   100.0
+#    broken lines, isolation forest           0.0       0.0    0.0     0.2         12.3       6.8    0.0    34.5
+#    broken lines, 20 neighbours              0.0       0.0    0.0     0.2         88.5      79.0    0.3   100.0
+#    conditional mean and covariance          1.2       1.2    0.4     2.3         87.7      90.4   43.2   100.0
+#
+#                  rank correlation  in the band  detectors
+#    false alarms             0.953          1.0       22.0
+#    damage found             0.954          1.0       22.0
 
 groups = {name: "raw frequencies" if name.startswith("raw") else "with temperatures" for name in candidates}
 AgreementDisplay.from_predictions(results, groups=groups)
@@ -184,7 +212,10 @@ AgreementDisplay.from_predictions(results, groups=groups)
 #    :alt: Rates of alarms of 22 detectors, measured as dots on simulated bands: false alarms from 0 to 23 %, damage
 #          found from 0 to 98 %; every dot lies in its band
 #
-# TEXT_A
+# All measured rates lie in their bands, and the detectors stand in nearly the same order. Failures are foretold, too:
+# the 17 % false alarms of the local outlier factor, and the 12 and 23 % of linear regression. But the bands of found
+# damage are wide, since the severities are uncertain, and the damage was identified from the very records that it is
+# compared with.
 #
 # A promise before the damage
 # ---------------------------
@@ -198,9 +229,42 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 # %%
 # .. code-block:: none
 #
-#    TABLE_B
+#                                    false alarms                          damage found
+#                                        measured simulated lowest highest     measured simulated lowest highest
+#    detector
+#    raw, Mahalanobis                         0.0       0.0    0.0     0.0          0.0       0.0    0.0     0.0
+#    raw, isolation forest                    0.4       4.3    2.9     5.5         89.2      98.2   95.4   100.0
+#    raw, 20 neighbours                       1.2      12.1   10.4    13.8         91.5      99.9   99.2   100.0
+#    raw, local outlier factor               16.6      38.8   35.5    41.9         96.2     100.0  100.0   100.0
+#    raw, one-class SVM                       0.0       0.2    0.0     0.7         61.5      80.7   70.8    86.2
+#    raw, less 1 component                    0.4       0.6    0.0     1.4          4.6       0.0    0.0     0.0
+#    raw, less 2 components                   0.4       0.4    0.0     0.9          4.6       0.0    0.0     0.0
+#    raw, less 3 components                   1.1       0.7    0.0     1.8          7.7       2.0    0.0     6.1
+#    raw, factor analysis                     0.2       0.3    0.0     0.7          5.4       0.0    0.0     0.0
+#    raw, Gaussian mixture                    3.0      14.0   12.3    15.9         83.8      96.6   93.1    99.2
+#    raw, cointegration                       0.9       0.2    0.0     0.9          4.6       1.2    0.0     3.8
+#    broken lines                             0.0       0.1    0.0     0.5         89.2      34.7   22.4    46.1
+#    broken lines, whitened                   0.9       0.4    0.0     1.1         90.8      94.4   88.5    99.2
+#    boosted trees                            0.2       2.2    0.9     3.2         20.8      71.4   66.9    75.4
+#    boosted trees, whitened                  1.1      10.0    7.7    11.8         82.3      96.0   91.6    99.2
+#    linear regression                       12.1       4.3    3.4     5.5         93.1      92.3   87.7    94.6
+#    linear regression, whitened             22.9      10.1    7.7    13.9         98.5      99.7   98.5   100.0
+#    chain                                    0.0       0.1    0.0     0.5         90.0      50.8   39.3    63.1
+#    chain, whitened                          0.7       0.3    0.0     1.1         90.8      97.4   92.3   100.0
+#    broken lines, isolation forest           0.0       0.1    0.0     0.4         12.3       0.6    0.0     1.5
+#    broken lines, 20 neighbours              0.0       0.1    0.0     0.5         88.5      74.4   60.2    81.5
+#    conditional mean and covariance          1.2      12.7   10.7    14.6         87.7      99.5   97.7   100.0
 #
-# TEXT_B
+#                  rank correlation  in the band  detectors
+#    false alarms             0.882        0.591       22.0
+#    damage found             0.822        0.136       22.0
+#
+# Who finds much and who finds little is still told, but the order is not as good, and most rates of found damage lie
+# outside these narrow bands. The cause is the chain, not the damage: the baseline's pavement is never warmer than
+# 15 °C, and the damaged month has 18 to 41 °C. There this chain expects the first, third and fourth frequency 0.7 to
+# 1.2 % lower than that of all healthy records does, and detectors take its error for damage. With the chain of all
+# healthy records, the same assumed damage gives a rank correlation of 0.98.
+# :meth:`~skthermo.surrogate.DataInformedFEM.applicability` warns of such weather.
 #
 # Which detector would simulation have chosen?
 # --------------------------------------------

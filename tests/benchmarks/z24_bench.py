@@ -92,6 +92,10 @@ def main():
         print("(b) chain of the first four fifths, soil -18 %\n")
         results = z24_bench.bench_of_a_warning(bridge, candidates=candidates, n_repeats=options.repeats)
         missed += print_agreement("b", results)[0]
+        print("The assumed damage by the chain of all healthy records, which knows the warm weather\n")
+        scenario = z24_bench.Scenario(z24_bench.DAMAGED, z24_bench.ASSUMED)
+        results = z24_bench.bench(bridge, fem, scenario, candidates, options.repeats)
+        print(z24_bench.agreement(z24_bench.side_by_side(results)).round(3).to_string(), end="\n\n", flush=True)
         print("Choice, in the last quarter of the baseline's weather, of detectors that have learned the others\n")
         missed += print_choice(z24_bench.choose(bridge, candidates), measured)
         print("For comparison: the weather that the detectors have learned\n")
