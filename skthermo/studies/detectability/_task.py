@@ -302,8 +302,9 @@ def detection_task(
     so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
     single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
 
-    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a regression
-    of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured records.
+    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
+    regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
+    records.
 
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` judges it in weather and with
     noise that took no part.
