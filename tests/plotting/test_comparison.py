@@ -183,7 +183,7 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
     display = RankingDisplay.from_predictions(ranking)
     names = rows_named(display.axes_[0])
     assert names == [
-        *("not clearly behind the best", "whitened", "good", "clearly behind", "raw"),
+        *("best, or not clearly behind", "whitened", "good", "clearly behind", "raw"),
         *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
     ]
     assert texts(display.axes_[0]) == ["LinAlgError: singular"]
