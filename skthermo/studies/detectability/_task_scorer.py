@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,8 @@ from skthermo._warnings import warnings_once
 from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._view import has_targets
+
+FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,7 @@ class TaskScorer:
         order = np.argsort(rows, kind="stable")
         state, values = self.state[rows[order]], []
         with warnings_once("in other states of the task"):
+            warnings.filterwarnings("ignore", FIRST_ROWS)
             for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
         repeat, scenario = np.divmod(state, self.n_scenarios)
