@@ -5,6 +5,7 @@ ORDER = [
     "plot_your_own_structure.py",
     "plot_accelerations.py",
     "plot_detectors.py",
+    "plot_detector_tuning.py",
     "plot_z24_bridge.py",
     "plot_z24_detection.py",
     "plot_z24_damage.py",

@@ -276,6 +276,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
+    ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
+        ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(state[order])) + 1", "[]"),
+        (
+            "records that are not judged",
+            "np.mean(self.values[rows] < limit)",
+            "np.mean(~(self.values[rows] >= limit))",
+        ),
+    ],
+    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
+        ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
+        ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
+    ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
@@ -285,6 +298,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/_limits.py", "plotting/test_limits.py"): [
         ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
+    ],
+    ("plotting/comparison/_agreement.py", "plotting/test_comparison.py"): [
+        ("measured rates outside their bands", '(rows["inside"] == 0)', '(rows["inside"] == 2)'),
+        ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
+    ],
+    ("reporting/_choice.py", "reporting/test_choice.py"): [
+        ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
+    ],
+    ("plotting/comparison/_roc.py", "plotting/test_comparison.py"): [
+        ("records before the onset in a curve", "-np.inf if onset is None", "-np.inf if True"),
     ],
     ("plotting/structures/_view.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
 from skthermo.plotting._limits import hold_outliers, mark_unjudged
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
-from skthermo.plotting._tables import as_tables, in_time
+from skthermo.plotting._tables import as_tables, check_study, in_time, names_from
 
 
 @dataclass(eq=False, repr=False)
@@ -25,7 +25,8 @@ class DamageIndexDisplay:
     Records without an index, which are not judged, are grey ticks at the bottom, with their number. A few indices far
     above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
-    It is best made by `from_estimator`, `from_predictions` or, with a panel for each scenario, `from_scenarios`.
+    It is best made by `from_estimator`, `from_predictions`, `from_study` with a panel for each detector or
+    `from_scenarios` with one for each scenario.
 
     Parameters
     ----------
@@ -109,6 +110,58 @@ class DamageIndexDisplay:
         indices = {label: index_of(estimator, records) for label, records in tables.items()}
         name = DAMAGE_INDEX if isinstance(last, MahalanobisDetector) else "damage index"
         return cls.from_predictions(indices, threshold, onset=onset, **{"label": name, **options})
+
+    @classmethod
+    def from_study(
+        cls,
+        study: Any,
+        scenarios: Sequence[str] | None = None,
+        *,
+        detectors: Sequence[str] | None = None,
+        source: str = "data-informed",
+        onset: Any = None,
+        **options: Any,
+    ) -> DamageIndexDisplay:
+        """Draw the records of the first repeat of a study, one panel for each detector.
+
+        Parameters
+        ----------
+        study : DetectabilityStudy
+            With results.
+        scenarios : sequence of str, optional
+            Those that are drawn beside each other in each panel; by default all.
+        detectors : sequence of str, optional
+            Those that are drawn; by default all that did not fail.
+        source : str, default="data-informed"
+            "data-informed" or "reference".
+        onset : time or number, optional
+            When damage began; on an axis of time, a number is the position of a record of the first table.
+        **options : dict
+            Options of `plot`, and ``label`` of `from_scenarios`.
+
+        Returns
+        -------
+        DamageIndexDisplay
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If a detector or scenario has no records of this source, or a detector no threshold.
+        """
+        check_study(study)
+        keys = [key for key in study.indices_ if key[2] == source]
+        chosen = names_from(detectors, dict.fromkeys(key[0] for key in keys), "detectors")
+        states = names_from(scenarios, dict.fromkeys(key[1] for key in keys), "scenarios")
+        shown = {
+            name: {state: study.indices_[name, state, source] for state in states if (name, state, source) in keys}
+            for name in chosen
+        }
+        thresholds = {name: study.thresholds_[name] for name in chosen}
+        is_distance = all(isinstance(last_step(study.detectors_[name]), MahalanobisDetector) for name in chosen)
+        options = {"label": DAMAGE_INDEX if is_distance else "damage index"} | options
+        return cls.from_scenarios(shown, thresholds, onset=onset, **options)
 
     @classmethod
     def from_predictions(

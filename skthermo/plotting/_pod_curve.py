@@ -10,6 +10,7 @@ import numpy as np
 from skthermo._arrays import Array
 from skthermo.plotting._axes import Axes, one_axes
 from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS, shortened
+from skthermo.plotting._tables import check_study
 
 NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
 QUANTILE = 1.959964
@@ -20,8 +21,8 @@ N_DRAWN = 200
 class PODCurveDisplay:
     """Probability of detection over severity: observed shares, fitted curve and its confidence bounds.
 
-    It is best made by `from_predictions`. Several curves can be drawn into the same axes; each gets its own colour,
-    marker and dashes.
+    It is best made by `from_estimator` or `from_predictions`. Several curves can be drawn into the same axes; each gets
+    its own colour, marker and dashes.
 
     Parameters
     ----------
@@ -65,6 +66,54 @@ class PODCurveDisplay:
     curve: Any
     _: KW_ONLY
     label: str | None = None
+
+    @classmethod
+    def from_estimator(
+        cls,
+        study: Any,
+        family: str,
+        *,
+        detector: str | None = None,
+        source: str = "data-informed",
+        label: str | None = None,
+        **options: Any,
+    ) -> PODCurveDisplay:
+        """Draw the curve of one family of scenarios of a study.
+
+        Parameters
+        ----------
+        study : DetectabilityStudy
+            With results.
+        family : str
+            Of the scenarios.
+        detector : str, optional
+            Name of the detector, where there are several; draw one after the other into the same axes to compare them.
+        source : str, default="data-informed"
+            "data-informed" or "reference".
+        label : str, optional
+            Legend of the curve; by default the name of the detector, or the family where none is named.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        PODCurveDisplay
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If there is no such family or detector, several detectors and none is named, or the curve cannot be fitted.
+
+        Warns
+        -----
+        UserWarning
+            If the curve has no finite slope, or lies outside the bounds of some tested severities.
+        """
+        check_study(study)
+        curve = study.pod_curve(family, source, detector=detector)
+        return cls.from_predictions(curve, label=label or detector or family, **options)
 
     @classmethod
     def from_predictions(cls, curve: Any, *, label: str | None = None, **options: Any) -> PODCurveDisplay:

@@ -1,11 +1,12 @@
 """What is drawn, as frames of columns over time or over the number of the record."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.exceptions import NotFittedError
 
 from skthermo._arrays import as_columns, real_array
 from skthermo._frames import check_same_rows
@@ -72,3 +73,20 @@ def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
     usual = np.median(steps)
     before = np.flatnonzero(steps > LONG_GAP * usual)
     return np.insert(x, before + 1, x[before] + usual), np.insert(values, before + 1, np.nan, axis=0)
+
+
+def check_study(study: Any) -> None:
+    """Raise an error for what is no study, or one without results."""
+    if not hasattr(study, "scenarios"):
+        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
+    if not hasattr(study, "results_"):
+        raise NotFittedError("the study has no results yet; expected a call of run before")
+
+
+def names_from(chosen: Sequence[str] | None, known: Iterable[str], what: str) -> list[str]:
+    """Names that are chosen, or all that are known."""
+    names = list(known) if chosen is None else [chosen] if isinstance(chosen, str) else list(chosen)
+    unknown = [name for name in names if name not in set(known)]
+    if unknown or not names:
+        raise ValueError(f"{what} are {unknown or names}; expected some of {list(known)}, which have results")
+    return names

@@ -118,11 +118,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
             "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
             "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
             "records of the damaged structure above."
-            + (
-                f" {distance}"
-                if isinstance(last_step(study.detectors_[study.detector_name()]), MahalanobisDetector)
-                else ""
-            ),
+            + (f" {distance}" if isinstance(judge, MahalanobisDetector) else ""),
             _damage_indices(study, findings, scenarios),
             "What the alarm system sees",
         ),

@@ -17,6 +17,7 @@ from skthermo._arguments import check_path
 from skthermo._formatting import counted
 from skthermo.fem import Structure
 from skthermo.reporting._answer import answer, found_and_missed
+from skthermo.reporting._choice import Choice
 from skthermo.reporting._findings import findings_of
 from skthermo.reporting._html import Html, bullets, element, page, paragraphs, section, table
 from skthermo.reporting._identified import identified_damage
@@ -29,12 +30,20 @@ PACKAGES = ("skthermo", "numpy", "scipy", "pandas", "sklearn", "matplotlib")
 
 
 def owner_report(
-    study: Any, path: str | os.PathLike[str], *, identified: Any = None, title: str | None = None, structure: Any = None
+    study: Any,
+    path: str | os.PathLike[str],
+    *,
+    identified: Any = None,
+    title: str | None = None,
+    structure: Any = None,
+    detector: str | None = None,
+    max_false_alarms: float = 0.02,
 ) -> Path:
     """Write a report for the owner of a structure: one HTML file, with all drawings in it.
 
     It says in plain sentences which damage the monitoring would find, what was monitored, how good the model is, which
-    damage was identified, and with which settings and warnings all this was computed.
+    damage was identified, and with which settings and warnings all this was computed. Of a study with several
+    detectors, it says which one is recommended and why, and the rest is on that one.
 
     Parameters
     ----------
@@ -48,6 +57,11 @@ def owner_report(
         Heading of the report.
     structure : Structure, optional
         Drawn with the damage groups in colour.
+    detector : str, optional
+        Name of the detector that the report is on, where there are several; by default the first of the study's
+        ranking.
+    max_false_alarms : float, default=0.02
+        Limit of the share of false alarms, by which several detectors are ranked.
 
     Returns
     -------
@@ -59,7 +73,8 @@ def owner_report(
     NotFittedError
         If the study has no results.
     ValueError
-        If the folder does not exist, the path is a folder, or ``study`` or ``identified`` is something else.
+        If the folder does not exist, the path is a folder, ``study`` or ``identified`` is something else, the detector
+        has no results, or several cannot be ranked, as no scenario is healthy or none is damaged.
     ImportError
         If matplotlib is not installed.
 
@@ -101,19 +116,29 @@ def owner_report(
         )
     if file.is_dir():
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
+    choice = None
+    if study.results_["detector"].nunique() > 1:
+        choice = Choice.of(study, detector, max_false_alarms)
+    elif detector is not None:
+        study.detector_name(detector)
     n_states = counted(study.results_["scenario"].nunique(), "state")
-    introduction = paragraphs(f"The alarm system was tested by simulation, in {n_states} of the structure.")
+    tested = "The alarm system was" if choice is None else f"{counted(len(choice.ranking), 'alarm system')} were"
+    introduction = [f"{tested} tested by simulation, in {n_states} of the structure."]
+    introduction += [] if choice is None else [choice.sentence()]
     ending = paragraphs(f"Written by skthermo on {date.today():%Y-%m-%d}.")
-    sections = _sections(study, identified, structure)
-    write_when_complete(file, page(TITLE if title is None else title, introduction, sections, ending))
+    sections = _sections(study if choice is None else choice.only(), identified, structure, choice)
+    heading = TITLE if title is None else title
+    write_when_complete(file, page(heading, paragraphs(*introduction), sections, ending))
     return file
 
 
-def _sections(study: Any, identified: Any, structure: Any) -> dict[str, tuple[str, Html]]:
+def _sections(study: Any, identified: Any, structure: Any, choice: Choice | None) -> dict[str, tuple[str, Html]]:
     findings = findings_of(study)
     now = [] if identified is None else identified.answer()
-    sections = {
-        "answer": ("The answer", answer(study, findings, now)),
+    sections = {"answer": ("The answer", answer(study, findings, now))}
+    if choice is not None:
+        sections["choice"] = ("Which alarm system", choice.section())
+    sections |= {
         "monitored": ("What was monitored", monitored(study, structure, [found.family for found in findings])),
         "model": ("How good the model is", quality(study)),
         "found": ("What would be found", found_and_missed(study, findings)),

@@ -1618,7 +1618,10 @@ use(
         **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}
     ).run(a["T"], a["baseline"], reference=a["reference"], confidence=a["confidence"])["rate"],
     **ARGUMENTS,
-    detector=(detection.MahalanobisDetector(), estimators()),
+    detectors=(
+        detection.MahalanobisDetector(),
+        estimators() | {"empty": {}, "no name": {"": detection.MahalanobisDetector()}, "a number": {3: None}},
+    ),
     scenarios=(
         SCENARIOS,
         {
@@ -1667,6 +1670,15 @@ method(
     level=(0.9, number(-0.1, 90)),
     method=("grid", choice()),
 )
+method(
+    "studies.DetectabilityStudy.ranking",
+    STUDY,
+    max_false_alarms=(0.02, number(-0.1, 2)),
+    source=("data-informed", texts() | {"unknown": "no"}),
+    confidence=(0.9, number(0, 1, 90)),
+    by=("pod", choice()),
+)
+method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | {
     "too long": [1, 2, 3, 4],
     "more than records": [30, 10, 19],

@@ -13,62 +13,31 @@ more than 5 points from what was promised by fresh simulation.
 """
 
 import argparse
+import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import GridSearchCV, ParameterGrid
-from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_truss, make_truss_campaign, steel_modulus
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
-from skthermo.preprocessing import LagFeatures
+from skthermo.datasets import make_truss
 from skthermo.studies import detection_task, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
-LIMIT, PER_DAY = 0.02, 8
+sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
+
+from tuning_recipes import GRID, LIMIT, detector, fitted_chain, true_score, true_year
+
 SCENARIOS = sweep(make_truss(), (0.03, 0.06), ["bottom", "top", "diagonal"])
-GRID = {
-    "temperaturecompensator__estimator__lagfeatures__lags": [1, 4, 8],
-    "temperaturecompensator__scale": ["global", "local"],
-    "windowedalarm__window": ["3h", "24h"],
-}
-
-
-def true_year(seed, damages):
-    """Air temperatures, and frequencies of the truss with each damage, which all have the same noise."""
-    random = np.random.RandomState(seed)
-    campaign = make_truss_campaign(samples_per_year=365 * PER_DAY, samples_per_day=PER_DAY, random_state=random)
-    air = campaign.temperatures
-    steel = air.ewm(halflife=8 / 24 * PER_DAY).mean()
-    cold = steel.mean(axis=1).to_numpy()[:, np.newaxis] < 5
-    noise = np.where(cold, 0.02, 0.007) * random.standard_normal(campaign.frequencies.shape)
-    clean = [campaign.model.damaged(damage).frequencies(steel_modulus(steel)) for damage in damages]
-    return air, [pd.DataFrame(each * (1 + noise), air.index, campaign.frequencies.columns) for each in clean]
-
-
-def detector(targets):
-    regression = make_pipeline(LagFeatures(1), TemperatureMapper(LinearRegression()))
-    return make_pipeline(TemperatureCompensator(regression, targets=targets, scale="global"), WindowedAlarm("3h"))
-
-
-def judged(fitted, T, tables):
-    """Score by true records, at the limit, and false alarms beyond the detector's own threshold."""
-    healthy, *damaged = (fitted.decision_function(T.join(F)) for F in tables)
-    known = np.sort(healthy[~np.isnan(healthy)])
-    limit = min(known[int(LIMIT * len(known))], 0)
-    return np.mean([np.mean(each < limit) for each in damaged]), np.mean(known < 0)
 
 
 def one_seed(seed, n_repeats, n_jobs):
     """Simulated and true scores of the winner, of the first setting and of the best by truth, in percent."""
     first, second, third = (int(number) for number in np.random.SeedSequence(seed).generate_state(3) // 2)
     T, (F,) = true_year(first, [{}])
-    inverse, mapper = InverseSurrogate(bounds=0.2, noise=0.01), make_pipeline(LagFeatures(8), TemperatureMapper())
-    fem = DataInformedFEM(make_truss(), inverse=inverse, mapper=mapper, random_state=seed).fit(T, F)
+    fem = fitted_chain(T, F, seed)
 
-    begun, weather = detector(list(F)), true_year(second, [])[0]
+    begun, weather = detector(list(F)), true_year(second)[0]
     task = detection_task(fem, weather, SCENARIOS, n_repeats=n_repeats, max_false_alarms=LIMIT, random_state=seed)
     search = GridSearchCV(begun, GRID, cv=task.cv, scoring=task.scoring, refit=False, n_jobs=n_jobs)
     search.fit(task.X, task.y)
@@ -76,7 +45,8 @@ def one_seed(seed, n_repeats, n_jobs):
     later, truth = true_year(third, [one.damage for one in SCENARIOS])
     promised = task.confirm({"winner": search, "first": begun}, later, random_state=seed)
     true = {
-        str(setting): judged(task.refit(begun.set_params(**setting)), later, truth) for setting in ParameterGrid(GRID)
+        str(setting): true_score(task.refit(begun.set_params(**setting)), later, truth)
+        for setting in ParameterGrid(GRID)
     }
     simulated = dict(zip(map(str, search.cv_results_["params"]), search.cv_results_["mean_test_score"], strict=True))
     found = pd.DataFrame(true, ["score", "false alarms"]).loc["score"]

@@ -6,11 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import spearmanr
+from sklearn.decomposition import PCA
+from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
 from sklearn.metrics import roc_auc_score
+from sklearn.pipeline import make_pipeline
 
-from skthermo.plotting import AgreementDisplay, RankingDisplay, ROCDisplay
-from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario
+from skthermo.detection import MahalanobisDetector
+from skthermo.plotting import AgreementDisplay, DamageIndexDisplay, PODCurveDisplay, RankingDisplay, ROCDisplay
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, pod_curve
 
 FOUND = "piers 18 %"
 
@@ -184,10 +188,14 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
 
 def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
     asked = []
-    study = SimpleNamespace(scenarios=[], results_=None, ranking=lambda *given: asked.append(given) or RANKING)
+    study = SimpleNamespace(scenarios=[], results_=None)
+    study.ranking = lambda *given, by: asked.append((*given, by)) or RANKING
     display = RankingDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
-    assert asked == [(0.05, "reference")]
+    assert asked == [(0.05, "reference", "pod")]
     assert display.limit_line_.get_xdata()[0] == 5
+    bounds = ["behind_lowest", "behind_highest"]
+    display = RankingDisplay.from_predictions(RANKING.assign(clearly_behind=False, **dict.fromkeys(bounds, np.nan)))
+    assert rows_named(display.axes_[0])[0] == "order not sure: one repeat"
     with pytest.raises(ValueError, match=r"the ranking lacks the columns \['behind'\]"):
         RankingDisplay.from_predictions(RANKING.drop(columns="behind"))
 
@@ -264,6 +272,37 @@ def test_curves_of_a_study_are_of_records_from_the_onset_on():
 def test_wrong_decisions_are_named(y, decisions, message):
     with pytest.raises(ValueError, match=message):
         ROCDisplay.from_predictions(y, decisions)
+
+
+def test_damage_indices_of_a_study_have_a_panel_for_each_detector():
+    study, random = made_study(), np.random.default_rng(1)
+    study.indices_ = {key: pd.Series(random.uniform(1, 3, 20)) for key in study.indices_}
+    study.thresholds_ = {"raw": 2.0, "whitened": 2.5}
+    study.detectors_ = {"raw": MahalanobisDetector(), "whitened": make_pipeline(PCA(), MahalanobisDetector())}
+    display = DamageIndexDisplay.from_study(study, ["healthy", "deck"])
+    assert [ax.get_title() for ax in display.axes_] == ["raw", "whitened"]
+    assert [line.get_ydata()[0] for line in display.threshold_lines_] == [2.0, 2.5]
+    for name, points in display.points_.items():
+        for line, state in zip(points, ["healthy", "deck"], strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), study.indices_[name, state, "data-informed"])
+    assert "unsquared" in display.axes_[0].get_ylabel()
+    study.detectors_["raw"] = IsolationForest()
+    assert "unsquared" not in DamageIndexDisplay.from_study(study).axes_[0].get_ylabel()
+    with pytest.raises(ValueError, match=r"scenarios are \['other'\]; expected some of \['healthy', 'deck', 'later'\]"):
+        DamageIndexDisplay.from_study(study, ["other"])
+    study.thresholds_["raw"] = None
+    with pytest.raises(ValueError, match="threshold of 'raw' is None"):
+        DamageIndexDisplay.from_study(study)
+
+
+def test_a_curve_of_a_study_is_that_of_the_detector_that_is_named():
+    study = made_study()
+    curves = {"raw": pod_curve([0.1, 0.2], [3, 17], [20, 20]), "whitened": pod_curve([0.1, 0.2], [5, 19], [20, 20])}
+    study.pod_curve = lambda family, source, detector: curves[detector]
+    first = PODCurveDisplay.from_estimator(study, "deck", detector="raw")
+    second = PODCurveDisplay.from_estimator(study, "deck", detector="whitened", ax=first.ax_)
+    assert (first.curve, second.curve) == (curves["raw"], curves["whitened"])
+    assert (first.line_.get_label(), second.line_.get_label()) == ("raw", "whitened")
 
 
 def test_many_curves_have_their_legend_beside_them_and_differ():

@@ -24,6 +24,7 @@ YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER, OTHER = LATER.temperatures[:120], LATER.temperatures[120:240]
 SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
 MODES = list(YEAR.frequencies)
+LAGS = "temperaturecompensator__estimator__lagfeatures"
 SCENARIOS = [Scenario("healthy"), Scenario("a tenth", {"bottom": 0.1}), Scenario("a fifth", {"top": 0.2})]
 
 
@@ -192,8 +193,9 @@ def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
 
 
 def test_a_search_finds_what_each_setting_scores(task):
-    detector, grid = with_memory("1D"), {"windowedalarm__window": ["1D", "7D"]}
-    grid["temperaturecompensator__estimator__lagfeatures__lags"] = [1, 3]
+    detector = with_memory("1D")
+    few, many = ({"windowedalarm__window": [w], f"{LAGS}__lags": [n]} for w, n in (("1D", 1), ("7D", 3)))
+    grid = [few, many]
     search = GridSearchCV(detector, grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
     for setting, score in zip(search.cv_results_["params"], search.cv_results_["mean_test_score"], strict=True):
         fitted = clone(detector).set_params(**setting).fit(SIDE_BY_SIDE)
@@ -337,3 +339,10 @@ def test_a_scorer_refuses_other_rows_and_what_it_cannot_judge(fem, task):
         task.refit(GridSearchCV(with_memory(1), {}))
     with pytest.raises(ValueError, match="detectors is empty"):
         task.confirm({}, OTHER)
+
+
+def test_stamps_may_be_of_different_time_zones(fem):
+    baseline = SIDE_BY_SIDE.tz_localize("UTC")
+    task = task_of(fem, T=WEATHER.tz_localize("Europe/Zurich"), baseline=baseline)
+    assert task.X.index.tz == baseline.index.tz
+    assert task.X.index.is_monotonic_increasing

@@ -13,9 +13,9 @@ from scipy.stats import spearmanr
 from skthermo._formatting import share_text
 from skthermo.plotting._axes import Axes, figure_legend, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, marker_style, shortened
+from skthermo.plotting._tables import check_study
 from skthermo.plotting.comparison._rows import (
     both_ends,
-    check_study,
     in_percent,
     name_rows,
     note,

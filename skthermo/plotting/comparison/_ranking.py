@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,8 +12,8 @@ import pandas as pd
 from skthermo._formatting import percent, share_text
 from skthermo.plotting._axes import Axes, figure_legend, panels
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE
+from skthermo.plotting._tables import check_study
 from skthermo.plotting.comparison._rows import (
-    check_study,
     in_percent,
     name_rows,
     note,
@@ -28,6 +28,7 @@ NEEDED = (
     *("pod_equal", "behind", "behind_lowest", "behind_highest", "clearly_behind"),
 )
 LEVEL = "not clearly behind the best"
+ONE_REPEAT = "order not sure: one repeat"
 BEHIND = "clearly behind"
 FAILED = "failed"
 
@@ -37,11 +38,11 @@ class RankingDisplay:
     """Detectors in their order of preference: their false alarms, and the damage that they find.
 
     One row for each detector, and three panels: false alarms with their limit; found damage, the mean over all damaged
-    scenarios, at the detector's own threshold and with a threshold at which all detectors have the same false alarms;
-    and how much less than the best each one finds then, with bounds for all comparisons together. Headings say which
-    detectors are not clearly behind the best, which are (grey), which raise clearly more false alarms than the limit
-    (orange), and which failed. Shares of records that are not judged are told in words. The axis of false alarms is
-    even in their square root, so that small ones are told apart.
+    scenarios, at the detector's own threshold and with thresholds moved to equal false alarms; and how much less than
+    the best each one finds, with bounds for all comparisons together. Headings say which detectors are not clearly
+    behind the best, which are (grey), which raise clearly more false alarms than the limit (orange), and which failed.
+    Shares of records that are not judged are told in words. The axis of false alarms is even in their square root, so
+    that small ones are told apart.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -51,6 +52,8 @@ class RankingDisplay:
         One row for each detector, the best first, as `~skthermo.studies.DetectabilityStudy.ranking` returns it.
     max_false_alarms : float, default=0.02
         Limit of the share of false alarms.
+    by : {"pod", "pod_equal"}, default="pod"
+        What was compared with the best: detectors as they are, or with thresholds moved to equal false alarms.
 
     Attributes
     ----------
@@ -89,10 +92,17 @@ class RankingDisplay:
     ranking: pd.DataFrame
     _: KW_ONLY
     max_false_alarms: float = 0.02
+    by: Literal["pod", "pod_equal"] = "pod"
 
     @classmethod
     def from_estimator(
-        cls, study: Any, *, max_false_alarms: float = 0.02, source: str = "data-informed", **options: Any
+        cls,
+        study: Any,
+        *,
+        max_false_alarms: float = 0.02,
+        source: str = "data-informed",
+        by: Literal["pod", "pod_equal"] = "pod",
+        **options: Any,
     ) -> RankingDisplay:
         """Draw the ranking of the detectors of a study.
 
@@ -104,6 +114,8 @@ class RankingDisplay:
             Limit of the share of false alarms.
         source : str, default="data-informed"
             Records that rank the detectors: "data-informed" (simulated) or "reference".
+        by : {"pod", "pod_equal"}, default="pod"
+            What is compared: detectors as they are, or with thresholds moved to equal false alarms.
         **options : dict
             Options of `plot`.
 
@@ -119,12 +131,17 @@ class RankingDisplay:
             If the study has no healthy scenario, or the limit is not a share.
         """
         check_study(study)
-        ranking = study.ranking(max_false_alarms, source)
-        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, **options)
+        ranking = study.ranking(max_false_alarms, source, by=by)
+        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, by=by, **options)
 
     @classmethod
     def from_predictions(
-        cls, ranking: pd.DataFrame, *, max_false_alarms: float = 0.02, **options: Any
+        cls,
+        ranking: pd.DataFrame,
+        *,
+        max_false_alarms: float = 0.02,
+        by: Literal["pod", "pod_equal"] = "pod",
+        **options: Any,
     ) -> RankingDisplay:
         """Draw a ranking.
 
@@ -134,6 +151,8 @@ class RankingDisplay:
             What `~skthermo.studies.DetectabilityStudy.ranking` returned.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which it was made.
+        by : {"pod", "pod_equal"}, default="pod"
+            What was compared with the best in it.
         **options : dict
             Options of `plot`.
 
@@ -146,7 +165,8 @@ class RankingDisplay:
         ValueError
             If the table lacks columns.
         """
-        return cls(read_table(ranking, NEEDED, "the ranking"), max_false_alarms=max_false_alarms).plot(**options)
+        ranking = read_table(ranking, NEEDED, "the ranking")
+        return cls(ranking, max_false_alarms=max_false_alarms, by=by).plot(**options)
 
     def plot(self, ax: Axes = None) -> RankingDisplay:
         """Draw into axes.
@@ -170,18 +190,20 @@ class RankingDisplay:
         rows = self.ranking[[kinds[name] != FAILED for name in self.ranking.index]]
         heights = {name: height for (_, name), height in places.items() if name is not None}
         y = rows.index.map(heights).to_numpy(dtype=float)
-        colours = [{LEVEL: BLUE, BEHIND: GREY}.get(kinds[name], ORANGE) for name in rows.index]
+        colours = [{LEVEL: BLUE, ONE_REPEAT: BLUE, BEHIND: GREY}.get(kinds[name], ORANGE) for name in rows.index]
         self.bounds_, self.points_ = {}, {}
-        for one, name, marker in zip(self.axes_, ("false_alarms", "pod", "behind"), "ooD", strict=True):
+        markers = "oo" + ("o" if self.by == "pod" else "D")
+        for one, name, marker in zip(self.axes_, ("false_alarms", "pod", "behind"), markers, strict=True):
             value, low, high = in_percent(rows[[name, f"{name}_lowest", f"{name}_highest"]]).T
             self.bounds_[name] = one.hlines(y, low, high, colors=colours, linewidth=1.5)
             style = {"s": 30, "zorder": 3, "marker": marker, "edgecolors": colours}
             faces, label = (colours, "at its own threshold, with bounds") if marker == "o" else ("white", None)
             self.points_[name] = one.scatter(value, y, **style, facecolors=faces, label=label)
         alarms, found, behind = self.axes_
-        label = f"at equal false alarms ({percent(self.max_false_alarms)})"
         equal = in_percent(rows["pod_equal"])
-        self.points_["pod_equal"] = found.scatter(equal, y, **style, facecolors="white", label=label)
+        label = f"at equal false alarms ({percent(self.max_false_alarms)})" if np.isfinite(equal).any() else None
+        style = {"s": 30, "zorder": 3, "marker": "D", "edgecolors": colours, "facecolors": "white"}
+        self.points_["pod_equal"] = found.scatter(equal, y, **style, label=label)
         limit = 100 * self.max_false_alarms
         line = {"color": BLACK, "linestyle": "--", "linewidth": 1}
         self.limit_line_ = alarms.axvline(limit, **line, label="limit of false alarms")
@@ -190,7 +212,8 @@ class RankingDisplay:
         found.set_xlim(-2, 102)
         alarms.set(title="false alarms", xlabel="healthy records in alarm (%)")
         found.set(title="damage found", xlabel="damaged records in alarm (%)")
-        behind.set(title="less found than by the best", xlabel="at equal false alarms (points)")
+        how = "at their own thresholds" if self.by == "pod" else "at equal false alarms"
+        behind.set(title="less found than by the best", xlabel=f"{how} (percentage points)")
         self._write_notes(heights, kinds)
         figure_legend(self.axes_, ax is None)
         return self
@@ -198,13 +221,14 @@ class RankingDisplay:
     def _kinds(self) -> dict[Any, str]:
         """Heading of each detector, the best ones first."""
         limit = f"more than {percent(self.max_false_alarms)} false alarms"
+        level = LEVEL if self.ranking["behind_lowest"].notna().any() else ONE_REPEAT
         kinds = {}
         for name, row in self.ranking.iterrows():
             is_tested = np.isfinite(row["false_alarms"])
-            kinds[name] = FAILED if not is_tested else BEHIND if row["clearly_behind"] else LEVEL
+            kinds[name] = FAILED if not is_tested else BEHIND if row["clearly_behind"] else level
             if is_tested and not row["keeps_limit"]:
                 kinds[name] = limit
-        order = [LEVEL, BEHIND, limit, FAILED]
+        order = [level, BEHIND, limit, FAILED]
         return dict(sorted(kinds.items(), key=lambda one: order.index(one[1])))
 
     def _write_notes(self, heights: Mapping[Any, int], kinds: Mapping[Any, str]) -> None:

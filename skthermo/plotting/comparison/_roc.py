@@ -15,7 +15,8 @@ from skthermo._formatting import share_text
 from skthermo._times import row_times, time_of
 from skthermo.plotting._axes import Axes, one_axes
 from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS, label_of
-from skthermo.plotting.comparison._rows import check_study, in_percent, small_rates
+from skthermo.plotting._tables import check_study, names_from
+from skthermo.plotting.comparison._rows import in_percent, small_rates
 
 MOST_INSIDE = 6  # number of curves up to which their legend stands within the axes
 
@@ -208,15 +209,6 @@ class ROCDisplay:
     def _unjudged(self, name: str) -> str:
         share = float(np.isnan(np.concatenate(self.decisions[name])).mean())
         return f", {share_text(share)} not judged" if share else ""
-
-
-def names_from(chosen: Sequence[str] | None, known: Iterable[str], what: str) -> list[str]:
-    """Names that are chosen, or all that are known."""
-    names = list(known) if chosen is None else [chosen] if isinstance(chosen, str) else list(chosen)
-    unknown = [name for name in names if name not in set(known)]
-    if unknown or not names:
-        raise ValueError(f"{what} are {unknown or names}; expected some of {list(known)}, which have results")
-    return names
 
 
 def since(rows: Any, onset: Any) -> Any:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.exceptions import NotFittedError
 
 from skthermo._arrays import Array
 from skthermo._formatting import printable
@@ -19,14 +18,6 @@ PERCENT = (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100)  # ticks of an axi
 MARGIN = 0.02  # share of an axis of small rates that is below 0
 CLOSEST = 0.07  # share of the axis that two ticks are apart at least
 LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
-
-
-def check_study(study: Any) -> None:
-    """Raise an error for what is no study, or one without results."""
-    if not hasattr(study, "scenarios"):
-        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
-    if not hasattr(study, "results_"):
-        raise NotFittedError("the study has no results yet; expected a call of run before")
 
 
 def read_table(results: Any, needed: Sequence[str], what: str) -> pd.DataFrame:

@@ -173,5 +173,5 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
-    lines += [f"Failed: {name!r} ({row['error']})." for name, row in failed.iterrows()]
+    lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
     return "\n".join(lines)

@@ -302,6 +302,9 @@ def detection_task(
     so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
     single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
 
+    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a regression
+    of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured records.
+
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` judges it in weather and with
     noise that took no part.
 
@@ -415,7 +418,8 @@ def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     for length in (YEAR, 1.0):
         days = np.round(length * (max(np.ceil(wait / length), 0) + np.ceil(period / length) * np.arange(n_states)))
         if days[-1] < room:
-            return pd.DatetimeIndex(np.concatenate([stamps + one * day for one in days]))
+            moved = stamps[:0].append([stamps + one * day for one in days])
+            return moved.tz_convert(baseline.index.tz) if stamps.tz is not None else moved
     raise ValueError(
         f"{n_states} states of {period:.0f} days, each with stamps of its own, would end after the year 2262; expected "
         "fewer scenarios or repeats, or a shorter T"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arguments import check_names
+from skthermo._arguments import as_mapping, check_names
 from skthermo._arrays import HUGE, is_real, real_array
 from skthermo.studies.scenarios._base import (
     BaseScenario,
@@ -131,9 +131,10 @@ def _as_scenario(given: Any) -> Any:
 
     An empty mapping is the healthy structure.
     """
-    if not isinstance(given, Mapping):
+    mapping = as_mapping(given)
+    if not isinstance(mapping, Mapping):
         return given
-    damage = severities_of(given, f"{dict(given)!r:.100}")
+    damage = severities_of(mapping, f"{dict(mapping)!r:.100}")
     name = ", ".join(f"{group} {100 * severity:g} %" for group, severity in damage.items())
     return Scenario(name or "healthy", damage)
 

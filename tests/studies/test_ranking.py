@@ -1,0 +1,292 @@
+"""The ranking of several detectors: what is significant, and at equal false alarms."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binom, ttest_1samp
+from sklearn.base import BaseEstimator, OutlierMixin
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import LinearRegression
+from sklearn.metrics import roc_auc_score
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
+from skthermo.studies.detectability._judged import JudgedRecords
+from skthermo.studies.detectability._ranking import rank
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures
+MODES = list(YEAR.frequencies)
+SIMULATED = "data-informed"
+
+
+class Dice(OutlierMixin, BaseEstimator):
+    """Alarms in a share of the records, at random."""
+
+    def __init__(self, share=0.02, fails=False):
+        self.share = share
+        self.fails = fails
+
+    def fit(self, X, y=None):
+        if self.fails:
+            raise OSError("no dice")
+        self.random_ = np.random.default_rng(0)
+        return self
+
+    def score_samples(self, X):
+        return self.random_.uniform(size=len(X))
+
+    def decision_function(self, X):
+        return self.score_samples(X) - self.share
+
+
+def compensated():
+    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
+
+
+def detectors():
+    return {
+        "raw": MahalanobisDetector(),
+        "twin": MahalanobisDetector(),
+        "dice": Dice(),
+        "loud": MahalanobisDetector(0.1),
+        "lines": compensated(),
+        "broken": Dice(fails=True),
+    }
+
+
+@pytest.fixture(scope="module")
+def study(fem):
+    scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 100, 300)]
+    study = DetectabilityStudy(fem, detectors(), scenarios, n_repeats=8, random_state=0)
+    study.run(WEATHER)
+    return study
+
+
+@pytest.fixture(scope="module")
+def table(study):
+    return study.ranking()
+
+
+def damaged(study, name):
+    """Decisions on damaged records from the onset on, by scenario."""
+    found = [study.decisions_[name, one.name, SIMULATED] for one in study.scenarios_ if not one.is_healthy]
+    return [*found[:-1], found[-1][:, 100:]]
+
+
+def test_best_first_then_those_with_too_many_false_alarms_then_failures(table):
+    assert table.index.tolist() == ["lines", "raw", "twin", "dice", "loud", "broken"]
+    assert table["keeps_limit"].tolist() == [True] * 4 + [False] * 2
+    assert table.loc["loud", "false_alarms_lowest"] > 0.02
+    assert table["error"].tolist() == [""] * 5 + ["OSError: no dice"]
+    assert table.loc["broken"].drop(["keeps_limit", "clearly_behind", "error"]).isna().all()
+    assert table["keeps_limit"].dtype == table["clearly_behind"].dtype == bool
+    ranked = table["pod"][:4]
+    assert ranked.is_monotonic_decreasing
+    assert table.loc["loud", "pod"] > table.loc["raw", "pod"]
+
+
+def test_rates_are_means_of_those_of_the_results(study, table):
+    results = study.results_.set_index(["detector", "scenario"])
+    for name, row in table.drop(index="broken").iterrows():
+        rates = results.loc[name]
+        np.testing.assert_array_equal(
+            row[["false_alarms", "false_alarms_lowest", "false_alarms_highest"]].astype(float),
+            rates.loc["healthy", ["rate", "lowest", "highest"]].astype(float),
+        )
+        assert row["pod"] == pytest.approx(rates["rate"].iloc[1:].mean())
+        assert row["pod bottom"] == pytest.approx(rates["rate"].iloc[1:3].mean())
+        assert row["not_judged"] == 0
+        smallest = study.minimum_detectable_damage(detector=name)["mdd"].iloc[0]
+        assert row["mdd bottom"] == smallest or np.isnan([row["mdd bottom"], smallest]).all()
+        assert row["time_to_detection"] == rates["time_to_detection"].iloc[1:].mean()
+
+
+def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study, table):
+    for name in table.index[:-1]:
+        calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
+        threshold = calibration[int(0.02 * calibration.size)]
+        n_tied = (calibration == threshold).sum()  # resampled noise repeats some records
+        assert 0 <= int(0.02 * calibration.size) - (calibration < threshold).sum() < n_tied
+        pod = np.mean([(decisions < threshold).mean() for decisions in damaged(study, name)])
+        assert table.loc[name, "pod_equal"] == pytest.approx(pod)
+
+
+def test_a_moved_threshold_gives_the_asked_rate_on_fresh_records(fem, study):
+    for name in ("raw", "loud", "dice"):
+        calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
+        threshold = calibration[int(0.02 * calibration.size)]
+        seeds = range(100, 120)
+        fresh = [fem.simulate(WEATHER, noise="fitted", random_state=seed) for seed in seeds]
+        alarms = sum((study.detectors_[name].decision_function(records) < threshold).sum() for records in fresh)
+        # The threshold scatters as a rate of its own number of records, which are fewer.
+        spread = np.sqrt(0.02 * 0.98 * (1 / calibration.size + 1 / (365 * len(seeds))))
+        assert alarms / (365 * len(seeds)) == pytest.approx(0.02, abs=3 * spread)
+
+
+def test_differences_of_the_rates_have_t_intervals_over_the_repeats(study, table):
+    shares = {name: np.mean([(d < 0).mean(axis=1) for d in damaged(study, name)], axis=0) for name in table.index[:-1]}
+    for name in table.index[1:-1]:
+        confidence = 1 - 0.05 / 4  # Bonferroni, four comparisons with the best
+        difference = shares["lines"] - shares[name]
+        lowest, highest = ttest_1samp(difference, 0).confidence_interval(confidence)
+        assert table.loc[name, "behind"] == pytest.approx(difference.mean())
+        np.testing.assert_allclose(
+            table.loc[name, ["behind_lowest", "behind_highest"]].astype(float), [lowest, highest], atol=1e-9
+        )
+        assert table.loc[name, "clearly_behind"] == (lowest > 0)
+    assert table.loc["lines", ["behind", "behind_lowest", "behind_highest"]].tolist() == [0, 0, 0]
+
+
+def test_equal_detectors_tie(study):
+    for by in ("pod", "pod_equal"):
+        table = study.ranking(by=by).drop(index=["lines", "loud"])
+        columns = [name for name in table if not name.startswith("behind")]
+        assert table.loc["raw", columns].tolist() == table.loc["twin", columns].tolist()
+        assert table.loc["raw", "behind"] == table.loc["twin", "behind"]
+    pair = DetectabilityStudy(
+        study.fem,
+        {"b": MahalanobisDetector(), "a": MahalanobisDetector()},
+        [{}, {"top": 0.2}],
+        n_repeats=3,
+        random_state=0,
+    )
+    pair.run(WEATHER)
+    table = pair.ranking()
+    assert table.index.tolist() == ["a", "b"]
+    assert (table[["behind", "behind_lowest", "behind_highest"]] == 0).all(axis=None)
+    assert not table["clearly_behind"].any()
+
+
+def test_by_moved_thresholds_a_detector_that_is_loud_by_its_threshold_alone_is_not_behind(study):
+    table = study.ranking(by="pod_equal")
+    assert table.loc["loud", "pod_equal"] == pytest.approx(table.loc["raw", "pod_equal"], abs=0.01)
+    assert table.loc["lines", "behind"] == 0
+    assert table.loc["raw", "behind_lowest"] < table.loc["raw", "behind"] < table.loc["raw", "behind_highest"]
+    # The bounds hold the error of the moved thresholds, too.
+    widths = [
+        ranked.loc["raw", "behind_highest"] - ranked.loc["raw", "behind_lowest"] for ranked in (table, study.ranking())
+    ]
+    assert widths[0] > widths[1]
+
+
+def test_area_under_the_curve(study, table):
+    assert table.loc["dice", "auc"] == pytest.approx(0.5, abs=0.02)
+    for name in ("raw", "lines"):
+        healthy = study.decisions_[name, "healthy", SIMULATED].ravel()
+        areas = [
+            roc_auc_score(np.repeat([0, 1], [healthy.size, d.size]), -np.concatenate([healthy, d.ravel()]))
+            for d in damaged(study, name)
+        ]
+        assert table.loc[name, "auc"] == pytest.approx(np.mean(areas))
+
+
+def test_a_higher_confidence_has_wider_bounds_of_the_same_rates(study, table):
+    wide = study.ranking(confidence=0.999).loc[table.index]
+    for name in ("false_alarms", "pod", "behind", "pod bottom"):
+        pd.testing.assert_series_equal(wide[name], table[name])
+    own = table.index[1:-1]
+    for name in ("behind_lowest", "pod_lowest", "false_alarms_lowest"):
+        assert (wide.loc[own, name] < table.loc[own, name]).all()
+    pd.testing.assert_frame_equal(study.ranking(confidence=0.95), table)
+
+
+def test_a_limit_that_nobody_keeps_is_said(study):
+    table = study.ranking(0.0001)
+    assert not table["keeps_limit"].any()
+    assert "No detector keeps the limit of 0.0% false alarms." in study.summary(0.0001)
+    assert study.ranking(0.3)["keeps_limit"][:-1].all()
+    assert study.ranking(0.3).index[0] in ("loud", "lines")
+
+
+def test_in_sentences(study, table):
+    said = study.summary().splitlines()
+    best = table.iloc[0]
+    assert (
+        said[0] == f"'lines' finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
+    )
+    assert said[1].startswith("Clearly worse: 'raw' (")
+    assert said[2].startswith("More false alarms than 2.0%: 'loud' (")
+    assert said[3] == "Stopped by an error: 'broken' (OSError: no dice)."
+
+
+@pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
+def test_without_other_noise_nothing_is_significant(fem, options):
+    some = {"raw": MahalanobisDetector(), "lines": compensated()}
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], random_state=0, **options)
+    study.run(WEATHER)
+    for by in ("pod", "pod_equal"):
+        table = study.ranking(by=by)
+        assert table[["behind_lowest", "behind_highest"]].isna().all(axis=None)
+        assert not table["clearly_behind"].any()
+    assert "do not tell which detectors are clearly worse" in study.summary()
+
+
+def test_measured_records_rank_by_what_was_found(fem):
+    some = {"raw": MahalanobisDetector(), "lines": compensated(), "forest": OutlierDetector(IsolationForest())}
+    study = DetectabilityStudy(
+        fem, some, [Scenario("healthy"), Scenario("top", {"top": 0.2})], n_repeats=2, random_state=0
+    )
+    campaigns = {
+        name: make_truss_campaign(damage=d, random_state=1) for name, d in (("healthy", None), ("top", {"top": 0.2}))
+    }
+    study.run(WEATHER, reference={name: one.temperatures.join(one.frequencies) for name, one in campaigns.items()})
+    table = study.ranking(source="reference")
+    results = study.results_[study.results_["source"] == "reference"].set_index(["detector", "scenario"])["rate"]
+    for name, row in table.iterrows():
+        assert (row["false_alarms"], row["pod"]) == (results[name, "healthy"], results[name, "top"])
+    assert table["pod"][table["keeps_limit"]].is_monotonic_decreasing
+    assert table[["pod_equal", "behind_lowest"]].isna().all(axis=None)
+    assert not table["clearly_behind"].any()
+    with pytest.raises(ValueError, match="no healthy records to move thresholds by; expected by='pod'"):
+        study.ranking(source="reference", by="pod_equal")
+
+
+def test_what_cannot_be_ranked_is_an_error(fem, study):
+    for options, message in (
+        ({"max_false_alarms": 2}, "max_false_alarms is 2"),
+        ({"source": "reference"}, r"source is 'reference'; expected one of \['data-informed'\]"),
+        ({"by": "auc"}, "by is 'auc'; expected 'pod' or 'pod_equal'"),
+        ({"confidence": 95}, "confidence is 95"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            study.ranking(**options)
+    for scenario, message in (({}, "none of them damaged"), ({"top": 0.1}, "none of them healthy")):
+        single = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=1, random_state=0)
+        with pytest.raises(ValueError, match="expected a call of run before"):
+            single.ranking()
+        single.run(WEATHER)
+        with pytest.raises(ValueError, match=message):
+            single.ranking()
+
+
+def judged(random, names, pods, n_repeats=10, n_records=50, share=0.02):
+    """Records of detectors that find damage with these probabilities, and their rows in the results."""
+    scenarios = {"healthy": Scenario("healthy"), "damaged": Scenario("damaged", {"deck": 0.1})}
+    shape, index = (n_repeats, n_records), pd.Series(np.zeros(n_records))
+    records = []
+    for name, pod in zip(names, pods, strict=True):
+        for scenario, rate in (("healthy", share), ("damaged", pod)):
+            decisions = random.uniform(size=shape) - rate
+            records.append(JudgedRecords(name, scenarios[scenario], SIMULATED, index, decisions))
+    return records, pd.DataFrame([one.summary(0.95) for one in records])
+
+
+def test_the_best_is_seldom_called_clearly_behind():
+    random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
+    n = 300
+    for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
+        records, rows = judged(random, names, [0.5] * 6)
+        table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
+        wrong += table["clearly_behind"][random.choice(names)]
+    assert wrong <= binom.ppf(0.999, n, 0.05)
+
+
+def test_what_is_clearly_worse_is_called_so():
+    random = np.random.default_rng(0)
+    records, rows = judged(random, ["good", "bad"], [0.6, 0.3])
+    table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
+    assert table["clearly_behind"].to_dict() == {"good": False, "bad": True}
+    assert table.loc["bad", "behind_lowest"] < 0.3 < table.loc["bad", "behind_highest"]

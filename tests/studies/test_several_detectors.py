@@ -1,0 +1,306 @@
+"""Several detectors in one study, which all judge the same simulated records."""
+
+import warnings
+from collections import Counter
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import BaseEstimator, OutlierMixin
+from sklearn.ensemble import IsolationForest
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import (
+    FusedDetector,
+    MahalanobisDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
+from skthermo.fem import AffineModel
+from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
+from skthermo.surrogate import DataInformedFEM
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures
+SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
+MODES = list(YEAR.frequencies)
+SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
+
+
+def compensated(last=None):
+    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
+
+
+def detectors():
+    return {
+        "raw": MahalanobisDetector(),
+        "forest": OutlierDetector(IsolationForest(n_estimators=20)),
+        "lines": compensated(),
+    }
+
+
+class Trouble(OutlierMixin, BaseEstimator):
+    """Fails in ``fit``, from the given call of ``decision_function`` on, or judges nothing."""
+
+    def __init__(self, fails=None, first=0):
+        self.fails = fails
+        self.first = first
+
+    def fit(self, X, y=None):
+        if self.fails == "fit":
+            raise KeyError("no such column")
+        self.n_calls_ = 0
+        return self
+
+    def score_samples(self, X):
+        return np.full(len(X), np.nan)
+
+    def decision_function(self, X):
+        self.n_calls_ += 1
+        if self.fails == "judge" and self.n_calls_ > self.first:
+            raise RuntimeError("out of order")
+        return np.full(len(X), np.nan)
+
+
+@pytest.fixture(scope="module")
+def study(fem):
+    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=3, random_state=0)
+    study.run(WEATHER)
+    return study
+
+
+def test_one_row_for_each_detector_and_scenario(study):
+    results = study.results_
+    assert results.columns[0] == "detector"
+    assert results.columns[-1] == "error"
+    assert results["detector"].tolist() == [name for name in detectors() for _ in SCENARIOS]
+    assert results["scenario"].tolist() == ["healthy", "bottom 10 %", "top 20 %"] * 3
+    assert (results["error"] == "").all()
+    assert study.errors_ == {}
+    assert list(study.detectors_) == list(study.thresholds_) == list(detectors())
+    for (name, scenario, source), decisions in study.decisions_.items():
+        assert decisions.dtype == np.float32
+        assert decisions.shape == (3, 365)
+        row = results[(results["detector"] == name) & (results["scenario"] == scenario)].iloc[0]
+        assert (decisions < 0).mean() == row["rate"]
+        np.testing.assert_allclose(
+            decisions[0], study.thresholds_[name] - study.indices_[name, scenario, source], atol=1e-4
+        )
+
+
+@pytest.mark.parametrize("name", list(detectors()))
+def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
+    alone = DetectabilityStudy(fem, detectors()[name], SCENARIOS, n_repeats=3, random_state=0)
+    results = alone.run(WEATHER).drop(columns="detector")
+    together = study.results_[study.results_["detector"] == name].drop(columns="detector").reset_index(drop=True)
+    pd.testing.assert_frame_equal(results, together)
+    for (_, scenario, source), decisions in alone.decisions_.items():
+        np.testing.assert_array_equal(decisions, study.decisions_[name, scenario, source])
+    for (_, source), decisions in alone.calibration_.items():
+        np.testing.assert_array_equal(decisions, study.calibration_[name, source])
+
+
+def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
+    backwards = dict(reversed(detectors().items()))
+    other = DetectabilityStudy(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2, random_state=0)
+    results = other.run(WEATHER).set_index(["detector", "scenario"])
+    pd.testing.assert_frame_equal(results, study.results_.set_index(["detector", "scenario"]).loc[results.index])
+    for mine, others in ((study.decisions_, other.decisions_), (study.calibration_, other.calibration_)):
+        assert mine.keys() == others.keys()
+        for key, decisions in mine.items():
+            np.testing.assert_array_equal(decisions, others[key])
+    pd.testing.assert_frame_equal(other.ranking(), study.ranking())
+
+
+def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
+    counts = Counter()
+
+    def counted(owner, name):
+        original = getattr(owner, name)
+
+        def count(self, *arguments, **options):
+            counts[name] += 1
+            return original(self, *arguments, **options)
+
+        monkeypatch.setattr(owner, name, count)
+
+    for owner, name in ((DataInformedFEM, "simulate"), (DataInformedFEM, "draw_noise"), (AffineModel, "frequencies")):
+        counted(owner, name)
+    found = []
+    for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):
+        counts.clear()
+        DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0).run(WEATHER)
+        found.append(dict(counts))
+    assert found[0] == found[1]
+    assert found[0]["simulate"] == len(SCENARIOS)
+
+
+def test_the_truth_is_asked_once_for_all_detectors(fem):
+    asked = Counter()
+
+    def truth(scenario, seed):
+        asked[scenario.name, seed] += 1
+        return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
+
+    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=2, random_state=0)
+    results = study.run(WEATHER, reference=truth)
+    assert set(asked.values()) == {1}
+    assert Counter(name for name, _ in asked) == {"healthy": 4, "bottom 10 %": 2, "top 20 %": 2}  # two calibrate
+    assert (results["source"] == "reference").sum() == 9
+    assert study.calibration_["lines", "reference"].shape == (2, 365)
+
+
+def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
+    for name in detectors():
+        calibration, healthy = (
+            study.calibration_[name, "data-informed"],
+            study.decisions_[name, "healthy", "data-informed"],
+        )
+        assert calibration.shape == healthy.shape
+        assert (calibration == healthy).mean() < 0.05
+        assert np.median(calibration) == pytest.approx(np.median(healthy), abs=0.1 * float(np.std(healthy)))
+
+
+def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
+    given = [{}, {"bottom": 0.18, "top": 0.05}, pd.Series({"top": -0.1}), Scenario("other", {"top": 0.2})]
+    study = DetectabilityStudy(fem, MahalanobisDetector(), given, n_repeats=1, random_state=0)
+    results = study.run(WEATHER)
+    assert results["scenario"].tolist() == ["healthy", "bottom 18 %, top 5 %", "top -10 %", "other"]
+    assert results["measure"].tolist() == ["PFA", "POD", "POD", "POD"]
+    scenarios = [Scenario(name, one.damage) for name, one in zip(results["scenario"], study.scenarios_, strict=True)]
+    pd.testing.assert_frame_equal(study.set_params(scenarios=scenarios).run(WEATHER), results)
+
+
+@pytest.mark.parametrize("given", [{"deck": 0.1}, {"top": 20}, {"top": None}, {3: 0.1}])
+def test_impossible_mappings_are_errors(fem, given):
+    with pytest.raises(ValueError, match=r"deck|severit|group"):
+        DetectabilityStudy(fem, MahalanobisDetector(), [{}, given], n_repeats=1).run(WEATHER)
+
+
+def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
+    sees = {
+        "raw": (MahalanobisDetector(), MODES),
+        "lines": (compensated(), list(SIDE_BY_SIDE)),
+        "fused": (FusedDetector([("lines", compensated()), ("again", compensated())]), list(SIDE_BY_SIDE)),
+        "week": (compensated(WindowedAlarm(7)), list(SIDE_BY_SIDE)),
+    }
+    study = DetectabilityStudy(
+        fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1, random_state=0
+    )
+    results = study.run(WEATHER, SIDE_BY_SIDE)
+    pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
+    for name, (_, columns) in sees.items():
+        assert list(study.arrangements_[name].columns) == columns
+    few = study.run(WEATHER, YEAR.frequencies)
+    assert few["error"].str.contains("baseline has none").sum() == 3  # those that compensate
+    assert (few.loc[few["detector"] == "raw", "error"] == "").all()
+
+
+@pytest.mark.parametrize(
+    ("trouble", "message"),
+    [
+        (Trouble("fit"), "KeyError: 'no such column'"),
+        (Trouble("judge"), "RuntimeError: out of order"),
+        (Trouble("judge", 5), "RuntimeError: out of order"),
+        (Trouble(), "ValueError: none of 365 records of scenario 'healthy'"),
+    ],
+    ids=["in fit", "in the first repeat", "in a later repeat", "judges nothing"],
+)
+@pytest.mark.parametrize("n_jobs", [None, 2])
+def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, message, n_jobs):
+    some = {"bad": trouble} | detectors()
+    beside = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=3, n_jobs=n_jobs, random_state=0)
+    results = beside.run(WEATHER)
+    bad, others = results.iloc[0], results.iloc[1:].reset_index(drop=True)
+    assert bad["detector"] == "bad"
+    assert bad["error"].startswith(message)
+    assert beside.errors_ == {"bad": bad["error"]}
+    assert bad.drop(["detector", "error"]).isna().all()
+    pd.testing.assert_frame_equal(others, study.results_, check_dtype=False)
+    assert "bad" not in beside.detectors_
+    assert not [key for key in (*beside.decisions_, *beside.indices_, *beside.calibration_) if key[0] == "bad"]
+    assert beside.minimum_detectable_damage().index.unique("detector").tolist() == list(detectors())
+    with pytest.raises(ValueError, match=r"detector is 'bad'; expected the name of one of \['raw'"):
+        beside.pod_curve("top", detector="bad")
+    alone = DetectabilityStudy(fem, {"bad": trouble}, SCENARIOS, n_repeats=3, random_state=0)
+    with pytest.raises((ValueError, KeyError, RuntimeError), match=message.split(": ")[1]):
+        alone.run(WEATHER)
+
+
+def test_what_is_asked_of_one_of_several_detectors(study):
+    with pytest.raises(ValueError, match=r"detector is None; expected the name of one of \['raw', 'forest', 'lines'\]"):
+        study.detector_name()
+    for ask in (study.pod_curve, study.is_undetected):
+        with pytest.raises(ValueError, match="detector is None"):
+            ask("top")
+    assert not study.is_undetected("top", detector="lines")
+    smallest = study.minimum_detectable_damage(0.3)
+    assert smallest.index.names == ["detector", "family", "source"]
+    one = study.minimum_detectable_damage(0.3, detector="lines")
+    assert one.index.names == ["family", "source"]
+    pd.testing.assert_frame_equal(one, smallest.loc["lines"])
+
+
+def test_what_to_add_asks_for_a_detector_of_several(fem):
+    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
+    several = DetectabilityStudy(
+        fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, n_repeats=2, noise=0.01, random_state=0
+    )
+    several.run(WEATHER)
+    with pytest.raises(ValueError, match="detector is None"):
+        what_to_add(several, WEATHER, modes=[6])
+    found = what_to_add(several, WEATHER, modes=[6], detector="raw")
+    alone = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0)
+    alone.run(WEATHER)
+    pd.testing.assert_frame_equal(found, what_to_add(alone, WEATHER, modes=[6]))
+
+
+class Doubtful(MahalanobisDetector):
+    """Has doubts about its baseline and about every record that it judges."""
+
+    def fit(self, X, y=None):
+        warnings.warn("no convergence in 7 steps", ConvergenceWarning, stacklevel=2)
+        return super().fit(X)
+
+    def decision_function(self, X):
+        warnings.warn(f"{len(X)} odd records", UserWarning, stacklevel=2)
+        return super().decision_function(X)
+
+
+def test_one_warning_for_one_cause_names_the_detectors(fem):
+    some = {"raw": MahalanobisDetector(), "first": Doubtful(), "second": Doubtful(0.05)}
+    study = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0)
+    with pytest.warns(UserWarning, match=r"odd|convergence") as caught:
+        study.run(WEATHER)
+    fit, judged = caught
+    assert fit.category is ConvergenceWarning
+    assert str(fit.message) == (
+        "no convergence in 7 steps (detectors 'first', 'second'; and 1 times more in the fits of the detectors)"
+    )
+    assert str(judged.message) == (
+        "365 odd records (detectors 'first', 'second'; and 5 times more in the simulations of this study)"
+    )
+    assert judged.filename == __file__
+    assert study.warnings_ == [str(judged.message)]
+    with pytest.warns(UserWarning, match=r"^365 odd records \(and 2 times more|convergence") as caught:
+        study.set_params(detectors=Doubtful()).run(WEATHER)
+    assert str(caught[0].message) == "no convergence in 7 steps"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "expected a detector, or a mapping of names to detectors"),
+        ({3: MahalanobisDetector()}, "expected a detector, or a mapping of names to detectors"),
+        ({"": MahalanobisDetector()}, "expected a detector, or a mapping of names to detectors"),
+        ({"raw": MahalanobisDetector}, "detector 'raw' is .*a class; expected an outlier detector"),
+        ({"raw": MahalanobisDetector(), "lines": LinearRegression()}, "detector 'lines' is .*without"),
+    ],
+)
+def test_what_is_no_detector_is_an_error(fem, given, message):
+    with pytest.raises(ValueError, match=message):
+        DetectabilityStudy(fem, given, SCENARIOS, n_repeats=1).run(WEATHER)
