@@ -272,6 +272,20 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
+    ("studies/detectability/_judged.py", "studies/test_several_detectors.py"): [
+        ("a detector that failed stays failed", "if name not in self.errors], {}", "], {}"),
+    ],
+    ("studies/detectability/_view.py", "studies/test_several_detectors.py"): [
+        ("temperatures for detectors without targets", "compensates | (known >= n_sensors)", "known >= 0"),
+    ],
+    ("studies/detectability/_ranking.py", "studies/test_ranking.py"): [
+        ("Bonferroni in the ranking", "/ 2 / max(n_comparisons, 1)", "/ 2"),
+        (
+            "a threshold moved on all repeats",
+            "known = _without(self.calibration, left_out)",
+            "known = self.calibration",
+        ),
+    ],
     ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
         ("windows that reach into other states", "np.flatnonzero(np.diff(state[order])) + 1", "[]"),

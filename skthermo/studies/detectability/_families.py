@@ -24,30 +24,36 @@ class Family:
     confidence: float
 
     @property
+    def tested(self) -> pd.DataFrame:
+        """Rows with a severity, which have a place on a curve."""
+        return self.rows[self.rows["severity"].notna()]
+
+    @property
     def is_undetected(self) -> bool:
         """Whether no rate is above that bound."""
         return bool((self.rows["rate"] <= self.false_alarms).all())
 
     def curve(self, log: bool = False) -> PODCurve:
         """Probability of detection over severity, with records as their effective numbers."""
-        detected, n_effective = self.rows["rate"] * self.rows["n_effective"], self.rows["n_effective"]
+        rows = self.tested
+        detected, n_effective = rows["rate"] * rows["n_effective"], rows["n_effective"]
         with self._named():
-            return pod_curve(self.rows["severity"], detected, n_effective, log=log, confidence=self.confidence)
+            return pod_curve(rows["severity"], detected, n_effective, log=log, confidence=self.confidence)
 
     def on_grid(self, level: float) -> tuple[float, float, float]:
         """Smallest tested severity from which the rate stays at or above a level, and that of its bounds."""
         with self._named():
             mdd, lowest, highest = (
-                minimum_detectable_damage(self.rows["severity"], self.rows[rate], level)
+                minimum_detectable_damage(self.tested["severity"], self.tested[rate], level)
                 for rate in ("rate", "highest", "lowest")
             )
         return mdd, lowest, highest
 
     def on_curve(self, level: float) -> tuple[float, float, float]:
         """Severity at which the curve and its bounds reach a level; without a finite slope, NaN and the bracket."""
-        severities, rates = self.rows["severity"], self.rows["rate"]
+        severities, rates = self.tested["severity"], self.tested["rate"]
         bracket = float("nan"), *bracket_of(severities.abs().to_numpy(), rates.to_numpy(), level)
-        if len(self.rows) < 2:
+        if len(severities) < 2:
             return bracket
         try:
             curve = self.curve()
@@ -73,9 +79,9 @@ class Family:
 
 
 def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], Family]:
-    """Families by detector, name and source; those without severities are left out."""
+    """Families by detector, name and source."""
     healthy = results[results["measure"] == "PFA"].groupby(["detector", "source"])["highest"].max()
-    damaged = results[(results["measure"] == "POD") & results["family"].notna() & results["severity"].notna()]
+    damaged = results[(results["measure"] == "POD") & results["family"].notna()]
     return {
         key: Family(key[1], key[2], rows, float(healthy.get((key[0], key[2]), np.nan)), confidence)
         for key, rows in damaged.groupby(["detector", "family", "source"], sort=False)

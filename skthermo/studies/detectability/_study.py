@@ -15,7 +15,7 @@ from skthermo._arguments import check_jobs
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Stages, last_step, seeded
-from skthermo._warnings import warn_user, warnings_once
+from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._families import Family, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
@@ -226,7 +226,7 @@ class DetectabilityStudy(BaseEstimator):
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         judgement, stages = Judgement(), Stages(self, 4)
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"):
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
             candidates = judgement.ask(
                 detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts)
@@ -288,14 +288,7 @@ class DetectabilityStudy(BaseEstimator):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        name = self.detector_name(detector)
-        families = {key[1:]: found for key, found in self._families().items() if key[0] == name}
-        is_known = isinstance(family, str) and isinstance(source, str)
-        found = families.get((family, source)) if is_known else None
-        if found is None:
-            known = [f"{f!r} ({s})" for f, s in families]
-            raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
-        return found.curve(log)
+        return self._family(family, source, detector).curve(log)
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -335,10 +328,10 @@ class DetectabilityStudy(BaseEstimator):
         check_probability(level, "level")
         if method not in ("grid", "curve"):
             raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
-        families = self._families()
-        if detector is not None or len(self.results_["detector"].unique()) == 1:
+        families = {key: one for key, one in families_of(self._results(), self.confidence_).items() if len(one.tested)}
+        if detector is not None or self.results_["detector"].nunique() == 1:
             name = self.detector_name(detector)
-            families = {key[1:]: found for key, found in families.items() if key[0] == name}
+            families = {key[1:]: one for key, one in families.items() if key[0] == name}
         with warnings_once("for other families or sources"):
             found = {
                 key: family.on_grid(level) if method == "grid" else family.on_curve(level)
@@ -374,15 +367,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there is no such family or source, or there are several detectors and none is named.
         """
-        rows = self._results()
-        rows = rows[rows["detector"] == self.detector_name(detector)]
-        for what, name, known in (("family", family, rows["family"]), ("source", source, rows["source"])):
-            if not isinstance(name, str) or name not in set(known):
-                raise ValueError(f"{what} is {name!r:.100}; expected one of {known.dropna().unique().tolist()}")
-        rows = rows[rows["source"] == source]
-        healthy = rows.loc[rows["measure"] == "PFA", "highest"].max()
-        rates = rows.loc[(rows["measure"] == "POD") & (rows["family"] == family), "rate"]
-        return bool((rates <= healthy).all())
+        return self._family(family, source, detector).is_undetected
 
     def ranking(
         self,
@@ -554,8 +539,14 @@ class DetectabilityStudy(BaseEstimator):
             raise NotFittedError("the study has no results yet; expected a call of run before")
         return self.results_
 
-    def _families(self) -> dict[tuple[Any, ...], Family]:
-        return families_of(self._results(), self.confidence_)
+    def _family(self, family: str, source: str, detector: str | None) -> Family:
+        name = self.detector_name(detector)
+        found = {key: one for key, one in families_of(self._results(), self.confidence_).items() if key[0] == name}
+        is_known = isinstance(family, str) and isinstance(source, str)
+        if not is_known or (name, family, source) not in found:
+            known = [f"{f!r} ({s})" for _, f, s in found]
+            raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
+        return found[name, family, source]
 
     def _warn_of_many_false_alarms(self) -> None:
         """Warn if a detector takes most simulated records of the healthy structure for damaged."""
