@@ -109,8 +109,8 @@ def test_images_and_links_of_readme_are_files_of_any_copy():
     images, links = re.findall(r'src="(.*?)"', text), re.findall(r"\]\((.*?)\)", text)
     assert images
     assert links
-    headings = {"#" + title.lower().replace(" ", "-") for title in re.findall(r"^## ([\w ]+)", text, flags=re.MULTILINE)}
-    assert not [target for target in images + links if target not in headings and not (ROOT / target).is_file()]
+    below = {"#" + title.lower().replace(" ", "-") for title in re.findall(r"^## ([\w ]+)", text, flags=re.MULTILINE)}
+    assert not [target for target in images + links if target not in below and not (ROOT / target).is_file()]
 
 
 def test_no_file_names_an_address_of_the_project_that_does_not_exist():
