@@ -288,11 +288,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
-        ("windows that reach into other states", "np.flatnonzero(np.diff(state[order])) + 1", "[]"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
+        ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
         (
             "records that are not judged",
-            "np.mean(self.values[rows] < limit)",
-            "np.mean(~(self.values[rows] >= limit))",
+            "np.mean(self.values[rows] < raised)",
+            "np.mean(~(self.values[rows] >= raised))",
         ),
     ],
     ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
