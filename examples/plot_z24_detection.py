@@ -83,29 +83,29 @@ print(measured_table(records, candidates).round(1).to_string())
 # %%
 # .. code-block:: none
 #
-#                                     false alarms  found of 130  alarms in the first 12  found of the other 118
-#    raw, Mahalanobis                          0.0           0.0                     0.0                     0.0
-#    raw, isolation forest                     0.4          89.2                     8.3                    97.5
-#    raw, 20 neighbours                        1.2          91.5                     8.3                   100.0
-#    raw, local outlier factor                16.6          96.2                    58.3                   100.0
-#    raw, one-class SVM                        0.0          61.5                     0.0                    67.8
-#    raw, less 1 component                     0.4           4.6                     0.0                     5.1
-#    raw, less 2 components                    0.4           4.6                     0.0                     5.1
-#    raw, less 3 components                    1.1           7.7                     0.0                     8.5
-#    raw, factor analysis                      0.2           5.4                     0.0                     5.9
-#    raw, Gaussian mixture                     3.0          83.8                     0.0                    92.4
-#    raw, cointegration                        0.9           4.6                     0.0                     5.1
-#    broken lines                              0.0          89.2                     0.0                    98.3
-#    broken lines, whitened                    0.9          90.8                     0.0                   100.0
-#    boosted trees                             0.2          20.8                     0.0                    22.9
-#    boosted trees, whitened                   1.1          82.3                     8.3                    89.8
-#    linear regression                        12.1          93.1                    25.0                   100.0
-#    linear regression, whitened              22.9          98.5                    83.3                   100.0
-#    chain                                     0.0          90.0                     0.0                    99.2
-#    chain, whitened                           0.7          90.8                     0.0                   100.0
-#    broken lines, isolation forest            0.0          12.3                     0.0                    13.6
-#    broken lines, 20 neighbours               0.0          88.5                     0.0                    97.5
-#    conditional mean and covariance           1.2          87.7                     8.3                    95.8
+#                                    false alarms  found of 130  alarms in the first 12  found of the other 118
+#    raw, Mahalanobis                         0.0           0.0                     0.0                     0.0
+#    raw, isolation forest                    0.4          89.2                     8.3                    97.5
+#    raw, 20 neighbours                       1.2          91.5                     8.3                   100.0
+#    raw, local outlier factor               16.6          96.2                    58.3                   100.0
+#    raw, one-class SVM                       0.0          61.5                     0.0                    67.8
+#    raw, less 1 component                    0.4           4.6                     0.0                     5.1
+#    raw, less 2 components                   0.4           4.6                     0.0                     5.1
+#    raw, less 3 components                   1.1           7.7                     0.0                     8.5
+#    raw, factor analysis                     0.2           5.4                     0.0                     5.9
+#    raw, Gaussian mixture                    3.0          83.8                     0.0                    92.4
+#    raw, cointegration                       0.9           4.6                     0.0                     5.1
+#    broken lines                             0.0          89.2                     0.0                    98.3
+#    broken lines, whitened                   0.9          90.8                     0.0                   100.0
+#    boosted trees                            0.2          20.8                     0.0                    22.9
+#    boosted trees, whitened                  1.1          82.3                     8.3                    89.8
+#    linear regression                       12.1          93.1                    25.0                   100.0
+#    linear regression, whitened             22.9          98.5                    83.3                   100.0
+#    chain                                    0.0          90.0                     0.0                    99.2
+#    chain, whitened                          0.7          90.8                     0.0                   100.0
+#    broken lines, isolation forest           0.0          12.3                     0.0                    13.6
+#    broken lines, 20 neighbours              0.0          88.5                     0.0                    97.5
+#    conditional covariance                   1.2          87.7                     8.3                    95.8
 #
 # This damage can be seen without thermometers: an isolation forest and the distance to the 20th nearest neighbour, on
 # raw frequencies, find as many records as residuals, whitened or not, at 0.4 and 1.2 % false alarms. The paper's

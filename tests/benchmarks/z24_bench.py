@@ -8,8 +8,8 @@ the FE model simulates in the same weather: (a) by a chain of all healthy record
 drawn with its uncertainty; (b) by a chain of the detectors' own baseline, with an assumed damage of the soil of 18 %.
 The band holds 95 % of simulated campaigns: noise is in it and, in (a), uncertain severities; another baseline or an
 error of the model is not. Then simulation chooses a detector from the baseline alone, by damage of every group, and the
-choice is judged by the measured records. The exit code is 1 if a target is missed, as one of (b) is: that chain
-has to go on into weather that is warmer than all that it learned.
+choice is judged by the measured records. The exit code is 1 if a target is missed, as two are: the chain of (b) has to
+go on into weather that is warmer than all that it learned, and the choice is between detectors that are nearly equal.
 """
 
 import argparse
@@ -64,6 +64,7 @@ def print_agreement(name, results):
 def print_choice(study, measured):
     """The ranking, what those that are not clearly behind find on measured records, and whether the first does."""
     ranking = study.ranking(max_false_alarms=LIMIT)
+    equal = study.ranking(max_false_alarms=LIMIT, by="pod_equal").index[0]
     print((ranking[SHOWN].astype(float)).round(3).to_string(), end="\n\n")
     first = ranking.index[0]
     tied = ranking.index[ranking["keeps_limit"].eq(True) & ~ranking["clearly_behind"].eq(True)]
@@ -72,7 +73,8 @@ def print_choice(study, measured):
     print(f"chosen: {first}; measured: {false[first]:.1f} % false alarms, {found[first]:.1f} % found; target at most")
     print(f"{MOST_FALSE:g} and at least {LEAST_FOUND:g} %: {'met' if met else 'MISSED'}")
     others = [f"{name} {false[name]:.1f} / {found[name]:.1f}" for name in tied if name != first]
-    print(f"not clearly behind, measured false alarms / found, %: {', '.join(others) or 'none'}\n", flush=True)
+    print(f"not clearly behind, measured false alarms / found, %: {', '.join(others) or 'none'}")
+    print(f"first at equal false alarms: {equal} {false[equal]:.1f} / {found[equal]:.1f}\n", flush=True)
     return not met
 
 
