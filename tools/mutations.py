@@ -223,6 +223,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("mean of the others", "mean = -_sums(", "mean = _sums("),
         ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
     ],
+    ("detection/_neighbourhoods.py", "detection/test_outlier.py"): [
+        ("blocks of a given length", "if block is not None:", "if False:"),
+        ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
+    ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
