@@ -256,6 +256,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
+    ("_warnings.py", "detection/test_checked_once.py"): [
+        ("what an estimator around has told", "if kind in _told.get():", "if kind in ():"),
+        (
+            "a check that is shared",
+            "content = ALL if ALL in found else content_of(tables)",
+            "content = str(len(found))",
+        ),
+    ],
+    ("detection/_fused.py", "detection/test_checked_once.py"): [
+        ("detectors that share a check", ", checked_once():", ":"),
+    ],
     ("_warnings.py", "surrogate/test_report.py"): [
         ("a warning for each fold", "if kind in kinds:", "if kind in kinds and not in_folds:"),
     ],
