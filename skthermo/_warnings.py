@@ -1,21 +1,33 @@
-"""Warnings that point at the user's line, once each, also where several steps repeat them."""
+"""Warnings that point at the user's line, once each, also where several steps repeat them; records checked once."""
 
 import multiprocessing
 import re
 import sys
 import threading
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
-from weakref import WeakKeyDictionary
+from contextvars import ContextVar
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary, ref
 
+import numpy as np
 from joblib import Parallel
+from joblib import hash as content_of
+from numpy.typing import NDArray
+
+Records = TypeVar("Records")
 
 PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}  # packages whose lines are not the user's
 
 _given: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
 """Kinds of warnings that the jobs of each cross-validation or search, or a worker process, have given."""
+
+_told: ContextVar[frozenset[str]] = ContextVar("kinds of warnings that an estimator around gives", default=frozenset())
+_found: ContextVar[dict[str, Any] | None] = ContextVar("findings of a check by content of its tables", default=None)
+ALL = "all"  # key of findings that stand for those of all records within
+_explained: dict[int, tuple[Any, NDArray[np.bool_]]] = {}
+"""Tables by identity while they exist, and their rows without a value of which a warning has given the cause."""
 
 
 def warn_user(message: str, kind: str) -> None:
@@ -29,6 +41,8 @@ def warn_user(message: str, kind: str) -> None:
         One cross-validation or search gives one warning of each kind, not one for each fold; a worker process, which
         sees only its own folds, one in its life.
     """
+    if kind in _told.get():
+        return
     frame, level, in_folds, jobs = sys._getframe(1), 2, False, None
     while frame.f_back is not None and (module := frame.f_globals.get("__name__", "")).split(".")[0] in PASSED_OVER:
         in_folds = in_folds or module.startswith("sklearn.model_selection")
@@ -49,6 +63,59 @@ def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
     """Give warnings by kind and text."""
     for kind, message in warnings_by_kind:
         warn_user(message, kind)
+
+
+@contextmanager
+def told_around(kinds: Iterable[str], findings: Any = None) -> Iterator[None]:
+    """Parts within give no warnings of some kinds, and check no records: the estimator around them has done so.
+
+    What it has found in its records, if given, is what `findings_of` gives the parts.
+    """
+    told = _told.set(_told.get() | set(kinds))
+    found = _found.set(_found.get() if findings is None else {ALL: findings})
+    try:
+        yield
+    finally:
+        _told.reset(told)
+        _found.reset(found)
+
+
+@contextmanager
+def checked_once() -> Iterator[None]:
+    """Estimators within that learn from the same records share one check of them, and its warnings."""
+    found = _found.get()
+    token = _found.set({} if found is None else found)
+    try:
+        yield
+    finally:
+        _found.reset(token)
+
+
+def findings_of(check: Callable[..., Any], *tables: Any) -> Any:
+    """What a check has found in tables, with its warnings; neither is repeated for records that were checked before."""
+    found = _found.get()
+    if found is None:
+        found, content = {}, ALL
+    else:
+        content = ALL if ALL in found else content_of(tables)
+    if content not in found:
+        found[content] = check(*tables)
+        warn_each(found[content].warnings())
+    return found[content]
+
+
+def explain_rows(table: Records, rows: NDArray[np.bool_] | np.bool_) -> Records:
+    """The table, of which a warning has said why some rows have no value."""
+    if rows.any():
+        key = id(table)
+        _explained[key] = ref(table, lambda _: _explained.pop(key, None)), rows
+    return table
+
+
+def explained_rows(table: Any) -> NDArray[np.bool_] | np.bool_:
+    """Which rows of a table have no value for a cause that a warning has given; False where it has none of them."""
+    known = _explained.get(id(table))
+    return np.False_ if known is None else known[1]
 
 
 @contextmanager

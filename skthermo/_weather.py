@@ -247,6 +247,21 @@ def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str
     return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
 
 
+def told_unpredicted(
+    unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach where none is"
+) -> str:
+    """Text of the warning that counts rows that cannot be predicted, for want of weather or as ``others`` says."""
+    if not unknown.any():
+        return ""
+    empty = np.isnan(weather).all(axis=1)
+    causes = {"without any temperature": unknown & empty, others: unknown & ~empty}
+    counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
+    return (
+        f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}; expected the records "
+        "before them, too, and at least one sensor that works"
+    )
+
+
 def _running_means(columns: Array, length: int) -> Array:
     """Means of so many consecutive values, NaN where most are missing."""
     sums, counts = (

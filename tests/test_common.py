@@ -275,7 +275,7 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
-@pytest.mark.filterwarnings("ignore:1 of 60 rows have no temperature at all")
+@pytest.mark.filterwarnings("ignore:1 of 60 rows cannot be predicted")
 @pytest.mark.parametrize("estimator", TRANSFORMERS_AND_DETECTORS, ids=lambda estimator: type(estimator).__name__)
 def test_fitted_estimators_are_pickled(estimator):
     fitted = pickle.loads(pickle.dumps(estimator)).fit(RECORDS)

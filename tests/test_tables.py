@@ -60,7 +60,7 @@ def test_columns_of_objects_become_floats():
     np.testing.assert_array_equal(as_floats(frame), [[1.0, np.nan], [np.nan, 2.0]])
 
 
-@pytest.mark.filterwarnings("ignore:1 of 60 rows have no temperature at all")
+@pytest.mark.filterwarnings("ignore:2 of 60 rows cannot be predicted")
 @UNRELATED
 @each_estimator
 def test_masked_values_are_missing_to_estimators(estimator):
@@ -212,6 +212,7 @@ def test_temperatures_of_every_climate_pass(T):
 # Polars
 
 
+@UNRELATED
 @each_estimator
 def test_polars_frames_pass_without_a_warning(estimator):
     polars = pytest.importorskip("polars")
@@ -220,6 +221,7 @@ def test_polars_frames_pass_without_a_warning(estimator):
     np.testing.assert_array_equal(output(estimator.fit(frame), frame), expected)
 
 
+@UNRELATED
 @each_transformer
 def test_polars_frames_come_out_where_they_are_asked_for(estimator):
     polars = pytest.importorskip("polars")
@@ -242,6 +244,7 @@ def test_polars_columns_are_paired_by_name():
 # Files of fitted objects
 
 
+@UNRELATED
 @each_estimator
 def test_objects_fitted_on_frames_are_saved_by_skops(estimator):
     io = pytest.importorskip("skops.io")

@@ -15,7 +15,7 @@ from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
-from skthermo._warnings import warn_user
+from skthermo._warnings import explain_rows, explained_rows, warn_user
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -110,9 +110,13 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         check_is_fitted(self)
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
         index = self._index(self._records(X, F))
-        if np.isnan(index).all():
-            self._warn_of_not_judged(X, np.isnan(index))
-        return pd.Series(index, index=X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
+        told = explained_rows(X) | explained_rows(index)
+        untold = np.isnan(index) & ~told
+        if np.isnan(index).all() and untold.any():
+            self._warn_of_not_judged(X, untold)
+        if isinstance(X, pd.DataFrame):
+            return explain_rows(pd.Series(index, index=X.index, name="damage_index"), told)
+        return explain_rows(index, told)
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
         """Negative damage index: higher is healthier.
@@ -127,7 +131,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         ndarray of shape (n_samples,)
             NaN where there is no damage index.
         """
-        return -np.asarray(self.damage_index(X))
+        index = self.damage_index(X)
+        return explain_rows(-np.asarray(index), explained_rows(index))
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
         """Threshold minus damage index: negative is an alarm.
@@ -142,7 +147,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         ndarray of shape (n_samples,)
             NaN where there is no damage index.
         """
-        return self.score_samples(X) - self.offset_
+        scores = self.score_samples(X)
+        return explain_rows(scores - self.offset_, explained_rows(scores))
 
     def predict(self, X: ArrayLike) -> NDArray[np.int64]:
         """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not judged.
@@ -161,12 +167,14 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Warns
         -----
         UserWarning
-            If some rows cannot be judged: how many, the first of them, and what they lack.
+            If some rows cannot be judged: how many, the first of them, and what they lack. Rows of which a
+            `TemperatureCompensator` before has said so are not counted again.
         """
         decision = self.decision_function(X)
         unknown = np.isnan(decision)
-        if unknown.any() and not unknown.all():  # where all are, `damage_index` has said so
-            self._warn_of_not_judged(X, unknown)
+        untold = unknown & ~explained_rows(decision)
+        if untold.any() and not unknown.all():  # where all are, `damage_index` has said so
+            self._warn_of_not_judged(X, untold)
         return np.where(unknown, 0, np.where(decision < 0, -1, 1))
 
     def _warn_of_not_judged(self, X: Any, rows: NDArray[np.bool_]) -> None:

@@ -11,7 +11,7 @@ from sklearn.base import clone
 
 from skthermo._arrays import Array
 from skthermo._validation import _BaseComposition, last_step
-from skthermo._warnings import warnings_once
+from skthermo._warnings import checked_once, explain_rows, explained_rows, warnings_once
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
 
@@ -122,7 +122,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
                 f"detectors is {self.detectors!r:.200}; expected pairs (name, detector) with names of their own"
             )
         self._validate_names([name for name, _ in self.detectors])
-        with warnings_once("for other detectors"):
+        with warnings_once("for other detectors"), checked_once():
             self.detectors_ = [clone(detector).fit(X) for _, detector in self.detectors]
         lasts = [last_step(detector) for detector in self.detectors_]
         for (name, _), last in zip(self.detectors, lasts, strict=True):
@@ -137,7 +137,12 @@ class FusedDetector(DamageDetector, _BaseComposition):
         return conformal_threshold(index, self.contamination)
 
     def _index(self, X: ArrayLike) -> Array:
-        return _mean([-fitted.score_samples(X) / last_step(fitted).threshold_ for fitted in self.detectors_])
+        with warnings_once("for other detectors"):
+            scores = [fitted.score_samples(X) for fitted in self.detectors_]
+        thresholds = [last_step(fitted).threshold_ for fitted in self.detectors_]
+        index = _mean([-score / limit for score, limit in zip(scores, thresholds, strict=True)])
+        told = [explained_rows(score) for score in scores]
+        return explain_rows(index, np.logical_and.reduce(np.broadcast_arrays(np.isnan(index), *told)))
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return f"none of the {len(self.detectors_)} detectors can judge them"

@@ -22,7 +22,7 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._warnings import warn_user
+from skthermo._warnings import explain_rows, warn_user
 from skthermo.preprocessing._stamps import as_duration, as_stamps
 
 DEFAULT_TOLERANCE = 6  # times freq
@@ -206,11 +206,11 @@ class LagFeatures(TransformerMixin, Estimator):
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
         if stamps is None:
-            self._warn_of_padding(values)
+            told = self._warn_of_padding(values)
             lagged = self._by_row(values, self.lags_)
         else:
-            lagged = self._by_time(stamps, values)
-        return frame_like(X, lagged, self._lag_names(getattr(X, "columns", ())))
+            lagged, told = self._by_time(stamps, values)
+        return explain_rows(frame_like(X, lagged, self._lag_names(getattr(X, "columns", ()))), told)
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the columns: sensor_lag0, sensor_lag1, ...
@@ -234,27 +234,32 @@ class LagFeatures(TransformerMixin, Estimator):
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
         return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
-    def _warn_of_padding(self, values: NDArray) -> None:
-        """Warn of first rows whose lags are not known, unless they are those of `fit`."""
+    def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:
+        """Warn of first rows whose lags are not known, unless they are those of `fit`; which rows these are."""
         reach, n_rows = max(self.lags_), len(values)
         begins = values[: reach + 1]
-        if reach and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
+        is_told = bool(reach) and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True)
+        if is_told:
             done = "are padded with the first record" if self.padding == "edge" else "lack lags"
             warn_user(
                 f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
                 f"{reach} rows before, too, or a frame on a DatetimeIndex",
                 "padded lags",
             )
+        return is_told & (np.arange(n_rows) < reach)
 
-    def _warn_of_no_history(self, stamps: pd.DatetimeIndex, unknown: NDArray[np.bool_]) -> None:
-        """Warn if more than half of the rows have lags that reach before the first of them and find no record."""
-        if 2 * unknown.sum() > len(unknown):
+    def _warn_of_no_history(self, stamps: pd.DatetimeIndex, unknown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Warn if more than half of the rows have lags that reach before the first of them and find no record; which
+        rows these are."""
+        is_told = bool(2 * unknown.sum() > len(unknown))
+        if is_told:
             reach = _in_words(max(self.lags_) * self.freq_)
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
                 "no records for lags",
             )
+        return is_told & unknown
 
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
@@ -265,14 +270,15 @@ class LagFeatures(TransformerMixin, Estimator):
             lagged[:, k, :before] = sensors[:, :1] if self.padding == "edge" else np.nan
         return lagged.reshape(-1, n_rows).T
 
-    def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> NDArray:
+    def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
+        """Lagged values, and the rows of which a warning says that they lack lags."""
         if (self.time_zone_ is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {_time_zone(stamps)}; expected {self.time_zone_}, as in fit")
         own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
-            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_])
+            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), np.False_
         only_old = ~np.isin(old, own)
         known = np.concatenate([old[only_old], own])
         order = np.argsort(known)
@@ -286,9 +292,8 @@ class LagFeatures(TransformerMixin, Estimator):
             unknown |= (stale | before) & (wanted < own.min())
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        if not np.isin(own, old).all():
-            self._warn_of_no_history(stamps, unknown)
-        return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources)
+        told = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old).all() else np.False_
+        return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources), told
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

@@ -9,11 +9,14 @@ import pytest
 
 from skthermo.fem import Bar, Structure
 from skthermo.plotting import (
+    AgreementDisplay,
     DamageIndexDisplay,
     FrequencyTemperatureDisplay,
     HistoryDisplay,
     PODCurveDisplay,
     PredictionDisplay,
+    RankingDisplay,
+    ROCDisplay,
     SensitivityDisplay,
     StructureDisplay,
 )
@@ -23,6 +26,20 @@ from skthermo.studies import pod_curve
 HOSTILE = "$E_{x$ & 50% <b>"
 LONG = "a very long name of a damage group that somebody wrote, number 7"
 TABLE = pd.DataFrame(np.linspace(4, 5, 20).reshape(10, 2), columns=[HOSTILE, LONG])
+
+
+RATES = pd.DataFrame(
+    [
+        [name, HOSTILE, source, measure, 0.5, 0.4, 0.6]
+        for name, measure in ((HOSTILE, "POD"), (LONG, "POD"))
+        for source in ("data-informed", "reference")
+    ],
+    columns=["detector", "scenario", "source", "measure", "rate", "band_lowest", "band_highest"],
+)
+SHARES = ["false_alarms", "pod", "behind"]
+RANKED = pd.DataFrame(0.5, [HOSTILE, LONG], [*SHARES, *(f"{n}_{end}" for n in SHARES for end in ("lowest", "highest"))])
+RANKED = RANKED.assign(pod_equal=0.5, keeps_limit=True, clearly_behind=False, not_judged=0.1, error="")
+RANKED.loc[LONG, ["false_alarms", "error"]] = np.nan, HOSTILE
 
 
 def structure():
@@ -44,6 +61,9 @@ def structure():
         lambda: PODCurveDisplay.from_predictions(pod_curve([0.1, 0.2], [3, 17], [20, 20]), label=HOSTILE),
         lambda: PODCurveDisplay.from_predictions(pod_curve([0.1, 0.2], [3, 17], [20, 20]), label=2 * LONG),
         lambda: SensitivityDisplay.from_predictions(TABLE),
+        lambda: AgreementDisplay.from_predictions(RATES, groups={HOSTILE: LONG, LONG: HOSTILE}),
+        lambda: AgreementDisplay.from_predictions(RATES, groups={HOSTILE: LONG, LONG: HOSTILE}, kind="scatter"),
+        lambda: ROCDisplay.from_predictions([1, 1, -1], {HOSTILE: [1, 2, -1], LONG: [1, np.nan, 0]}),
         lambda: StructureDisplay.from_structure(structure(), groups=[HOSTILE, LONG]),
         lambda: StructureDisplay.from_structure(structure(), {HOSTILE: 0.1}, label=HOSTILE),
     ],
@@ -53,6 +73,12 @@ def test_any_name_can_be_drawn_and_leaves_room_for_the_data(draw):
     figure.savefig(BytesIO(), format="png")  # a warning of a layout that does not fit is an error
     assert min(ax.get_position().width for ax in figure.axes[:1]) > 0.3
     plt.close(figure)
+
+
+def test_any_name_of_a_detector_can_be_ranked():
+    display = RankingDisplay.from_predictions(RANKED)
+    display.figure_.savefig(BytesIO(), format="png")
+    assert sum(ax.get_position().width for ax in display.axes_) > 0.7
 
 
 def test_names_keep_their_beginning_and_end_and_their_formulas():

@@ -34,13 +34,13 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
-from skthermo._warnings import warn_each, warn_user, warnings_once
-from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, warn_of_unseen
+from skthermo._warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
+from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted, warn_of_unseen
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._local_covariance import rows_near_in_time
 from skthermo.detection.compensation._whitening import Spread
-from skthermo.preprocessing import check_records
+from skthermo.preprocessing import RecordFindings, check_records
 
 AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
 
@@ -249,8 +249,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         UserWarning
             As in `fit`.
         """
-        temperatures, frequencies = self._read_baseline(X)
-        return frame_like(frequencies, self._learn(temperatures, frequencies))
+        temperatures, frequencies, findings = self._read_baseline(X)
+        return frame_like(frequencies, self._learn(temperatures, frequencies, findings))
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -285,22 +285,23 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
-        if not hasattr(self.estimator_, "applicability"):  # which says so itself
-            outside = self.training_range_.warning(weather)
-            if outside:
-                warn_user(outside, "weather outside the training range")
-            apart = self.sensors_.warning(temperatures)
-            if apart:
-                warn_user(apart, "sensor apart from others")
-        residuals = as_floats(frequencies) - self.regression_.predict(filled)
-        residuals[np.isnan(weather).all(axis=1)] = np.nan
+        outside = self.training_range_.warning(weather)
+        if outside:
+            warn_user(outside, "weather outside the training range")
+        apart = self.sensors_.warning(temperatures)
+        if apart:
+            warn_user(apart, "sensor apart from others")
+        predicted = self.regression_.predict(filled)
+        predicted[np.isnan(weather).all(axis=1)] = np.nan
+        unknown = warn_of_unpredicted(predicted, weather)
+        residuals = as_floats(frequencies) - predicted
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         scaled = (
             self.spread_.shrunk(residuals, fills)
             if self.scale is None
             else self.spread_.whiten(weather, residuals, fills)
         )
-        return frame_like(frequencies, scaled)
+        return explain_rows(frame_like(frequencies, scaled), unknown)
 
     @overload
     def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -339,7 +340,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]
 
-    def _read_baseline(self, X: Any) -> tuple[Any, Any]:
+    def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
         if isinstance(self.estimator, type):
             raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
@@ -350,27 +351,28 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
         named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
-        warn_each(check_records(pd.DataFrame(temperatures), named).warnings())
-        return temperatures, frequencies
+        return temperatures, frequencies, findings_of(check_records, pd.DataFrame(temperatures), named)
 
-    def _learn(self, temperatures: Any, frequencies: Any) -> Array:
+    def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""
         self.sensors_ = SensorRegression.of(temperatures)
         filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
         folds = Folds.of(self._wanted_folds(filled), filled)
-        self.regression_ = Regression.of(self.estimator, filled, frequencies)
-        self.estimator_ = self.regression_.estimator
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         with warnings_once():
-            residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
-            longer = folds.longer(filled, residuals)
+            self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
+            predicted = self.regression_.out_of_fold(filled, frequencies, folds)
+            longer = folds.longer(filled, measured - predicted)
             if longer is not None:
                 folds = longer
-                residuals = measured - self.regression_.out_of_fold(filled, frequencies, folds)
+                predicted = self.regression_.out_of_fold(filled, frequencies, folds)
+        self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
         self.block_ = None if folds.blocks is None else folds.blocks.length(filled)
-        residuals[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
+        predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
+        warn_of_unpredicted(predicted[self.folds_ >= 0], as_floats(filled)[self.folds_ >= 0])
+        residuals = measured - predicted
         fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
         taught = residuals.copy()
         if len(fills.rows) < len(residuals) / 2:
@@ -410,13 +412,17 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     message = told_fills(deviations, column_names(temperatures, "x"), consequence)
     if message:
         warn_user(message, "filled temperatures")
-    empty = np.isnan(as_floats(temperatures)).all(axis=1)
-    if empty.any():
-        warn_user(
-            f"{empty.sum()} of {len(filled)} rows have no temperature at all: they are not judged",
-            "without temperature",
-        )
     return frame_like(temperatures, filled)
+
+
+def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
+    """Rows of which nothing is predicted, so that they are not judged; a warning counts those not yet explained."""
+    unknown = np.isnan(predicted).all(axis=1)
+    others = "of which the estimator predicts nothing, as where lags reach to no record"
+    message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
+    if message:
+        warn_user(message, "rows that cannot be predicted")
+    return unknown
 
 
 def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:

@@ -20,8 +20,16 @@ from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
 from skthermo._regressors import fit_outputs
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
+from skthermo._warnings import explain_rows, explained_rows, told_around
 from skthermo.detection.compensation._folds import Folds
-from skthermo.preprocessing import LagFeatures
+from skthermo.preprocessing import LagFeatures, RecordFindings
+
+TOLD = (
+    "filled temperatures",
+    "rows that cannot be predicted",
+    "weather outside the training range",
+    "sensor apart from others",
+)  # kinds of warnings that the compensator gives
 
 
 @dataclass(frozen=True)
@@ -33,17 +41,18 @@ class Regression:
     rest: CompleteRowsRegressor
 
     @classmethod
-    def of(cls, estimator: BaseEstimator, X: Any, y: Any) -> Regression:
-        """Fit a clone."""
+    def of(cls, estimator: BaseEstimator, X: Any, y: Any, findings: RecordFindings) -> Regression:
+        """Fit a clone to records in which something was found."""
         head, rest = split_pipeline(estimator)
         head = None if head is None else clone(head)
-        fitted = CompleteRowsRegressor(rest).fit(X if head is None else head.fit_transform(X), y)
+        fitted = CompleteRowsRegressor(rest, findings).fit(X if head is None else head.fit_transform(X), y)
         whole = fitted.regressor_ if head is None else joined(estimator, head, fitted.regressor_)
         return cls(whole, head, fitted)
 
     def predict(self, X: Any) -> NDArray[np.float64]:
         """Predictions, NaN for rows that the estimator does not accept."""
-        return self.rest.predict(self._inputs(X))
+        inputs = self._inputs(X)
+        return explain_rows(self.rest.predict(inputs), explained_rows(inputs))
 
     def out_of_fold(self, X: Any, y: Any, folds: Folds) -> Any:
         """Predictions by clones of the rest that are fitted on other rows; the first transformers know all rows."""
@@ -58,12 +67,24 @@ class Regression:
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
-    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN."""
+    """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
 
-    def __init__(self, estimator: BaseEstimator):
+    The compensator around has checked the records with some findings, and warns of what it hands on.
+    """
+
+    def __init__(self, estimator: BaseEstimator, findings: RecordFindings):
         self.estimator = estimator
+        self.findings = findings
 
     def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
+        with told_around(TOLD, self.findings):  # also in a worker process
+            return self._fit(X, y)
+
+    def predict(self, X: Any) -> NDArray[np.float64]:
+        with told_around(TOLD):
+            return self._predict(X)
+
+    def _fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
         self.takes_nan_ = takes_nan(self.estimator)
         self.n_targets_ = y.shape[1]
         usable, present = self._predictable(X), ~np.isnan(as_floats(y))
@@ -87,7 +108,7 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
             ]
         return self
 
-    def predict(self, X: Any) -> NDArray[np.float64]:
+    def _predict(self, X: Any) -> NDArray[np.float64]:
         usable = self._predictable(X)
         predicted = np.full((X.shape[0], self.n_targets_), np.nan)
         if usable.any():

@@ -15,7 +15,7 @@ from skthermo._arguments import check_jobs
 from skthermo._arrays import as_random_state, positive_integer
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Stages, last_step, seeded
-from skthermo._warnings import warn_user, warnings_once
+from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._families import Family, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
@@ -226,7 +226,7 @@ class DetectabilityStudy(BaseEstimator):
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         judgement, stages = Judgement(), Stages(self, 4)
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"):
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
             candidates = judgement.ask(
                 detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts)

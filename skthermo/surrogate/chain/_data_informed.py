@@ -30,8 +30,8 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._warnings import warn_each, warn_user
-from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills
+from skthermo._warnings import findings_of, warn_each, warn_user
+from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import check_records
@@ -218,7 +218,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             or look like others of its modes, parameters far outside the bounds of the inverse.
         """
         T, F = read_records(self, X, y)
-        findings = check_records(T, F)
         tolerance(self.model, self.reduce)
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
@@ -230,7 +229,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        warn_each([*findings.warnings(), *mode_warnings(self.model, F)])
+        findings = findings_of(check_records, T, F)
+        warn_each(mode_warnings(self.model, F))
         stages = Stages(self, 4, X, y)
         with stages.stage("inverse surrogate", self.inverse_):
             aligned = self._fit_inverse(T, F, shapes)
@@ -798,16 +798,9 @@ def gap_warnings(T: Any, deviations: Array, inputs: Array) -> Iterator[tuple[str
     message = told_fills(deviations, column_names(T, "T"), consequence)
     if message:
         yield "filled temperatures", message
-    unknown = np.isnan(inputs).any(axis=1)
-    if unknown.any():
-        empty = np.isnan(as_floats(T)).any(axis=1)
-        causes = {"without any temperature": unknown & empty, "with lags that reach where none is": unknown & ~empty}
-        counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
-        yield (
-            "rows that cannot be predicted",
-            f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}; expected the records "
-            "before them, too, and at least one sensor that works",
-        )
+    message = told_unpredicted(np.isnan(inputs).any(axis=1), as_floats(T))
+    if message:
+        yield "rows that cannot be predicted", message
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:

@@ -147,6 +147,10 @@ class Local:
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[rows] = theirs
 
+    def beside(self, other: "Local") -> "Local":
+        """These rows, and then others."""
+        return Local(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)))
+
     def of(self, rows: NDArray) -> "Local":
         """Some rows."""
         return Local(*(values[rows] for values in vars(self).values()))

@@ -1,6 +1,8 @@
 """Estimates of the inverse surrogate, refined on the FE model."""
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -12,8 +14,10 @@ from skthermo._arguments import check_bounds, check_noise, check_prior
 from skthermo._arrays import Array, spread_evenly
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.refinement._levenberg_marquardt import refine
-from skthermo.surrogate.refinement._posterior import Objective, Prior
+from skthermo.surrogate.refinement._posterior import Local, Objective, Prior
 from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
+
+Refined = tuple[Local, NDArray[np.bool_], NDArray[np.bool_]]
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
@@ -39,6 +43,7 @@ class Refinement:
     """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
     ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
+    ``recent`` holds the rows that the scatter was estimated from until they are asked for, mostly at once.
     """
 
     simulator: Simulator
@@ -47,9 +52,10 @@ class Refinement:
     n_steps: int
     n_jobs: int | None
     shapes: ShapeInputs | None = None
+    recent: list[tuple[Array, Refined]] = field(default_factory=list, repr=False)
 
     @classmethod
-    def of(cls, inverse: Any) -> "Refinement":
+    def of(cls, inverse: Any) -> Refinement:
         """The refinement that the parameters of an `InverseSurrogate` ask for."""
         names = inverse.model.parameter_names
         width = None if inverse.prior is None else check_prior(inverse.prior, names)
@@ -57,7 +63,7 @@ class Refinement:
         noise = check_noise(inverse.noise, inverse.model.n_modes, getattr(inverse, "feature_names_in_", None))
         return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_)
 
-    def refined(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:
+    def refined(self, inputs: Array, guess: Array, scatter: Array, *, remember: bool = False) -> Bunch:
         """What `InverseSurrogate.invert` gives, for rows of inputs and the regressor's guess."""
         frequencies = inputs[:, : len(self.noise)]
         some, gaps = ~np.isnan(inputs).all(axis=1), np.isnan(frequencies).any(axis=1)
@@ -75,8 +81,9 @@ class Refinement:
         noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
         start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
         objective = self._objective(inputs[some], measured, noise)
-        sorts = not getattr(self.simulator.model, "track", False)
-        found, converged, stalled = refine(objective, start, self.n_steps, sorts=sorts)
+        found, converged, stalled = self._refine(inputs[some], objective, start)
+        if remember:
+            self.recent.append((inputs[some], (found, converged, stalled)))
         lost, complete = stalled[:, np.newaxis], self._with_shapes(np.maximum(noise, scatter))
         deviations, at_best = (
             prior.deviations(np.nan_to_num(found.sensitivity), spread)
@@ -90,6 +97,22 @@ class Refinement:
         result.converged[some] = converged
         result.outside[some] = self._contradicts(found.x, deviations)
         return result
+
+    def _refine(self, inputs: Array, objective: Objective, start: Array) -> Refined:
+        """Refine rows, except those that were refined just before; rows do not depend on each other."""
+        sorts = not getattr(self.simulator.model, "track", False)
+        if not self.recent:
+            return refine(objective, start, self.n_steps, sorts=sorts)
+        known_inputs, (found, converged, stalled) = self.recent.pop()
+        places = {row.tobytes(): place for place, row in enumerate(known_inputs)}
+        place = np.array([places.get(row.tobytes(), -1) for row in inputs], dtype=np.intp)
+        new = np.flatnonzero(place < 0)
+        if new.size:
+            place[new] = len(known_inputs) + np.arange(new.size)
+            others, *states = refine(objective.of(new), start[new], self.n_steps, sorts=sorts)
+            found = found.beside(others)
+            converged, stalled = (np.append(*pair) for pair in zip((converged, stalled), states, strict=True))
+        return found.of(place), converged[place], stalled[place]
 
     def _objective(self, inputs: Array, log_measured: Array, noise: Array) -> Objective:
         linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs, relative=True)
@@ -126,7 +149,8 @@ class Refinement:
         rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).any(axis=1)), ROWS_FOR_SCATTER)
         scatter = ASSUMED_SCATTER
         if n_modes > n_parameters and rows.size:
-            residuals = self.refined(inputs[rows], guess[rows], np.maximum(self.noise, EXACT)).residuals
+            exact = np.maximum(self.noise, EXACT)
+            residuals = self.refined(inputs[rows], guess[rows], exact, remember=True).residuals
             residuals = residuals[~np.isnan(residuals).any(axis=1)]
             if len(residuals) > n_parameters:
                 estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))
