@@ -75,8 +75,8 @@ ROCDisplay.from_estimator(study, detectors=few)
 # Would truth have chosen the same?
 # ---------------------------------
 # Measured rates, here those of true records, beside simulated ones. Found damage agrees, and so does its order. False
-# alarms are more than simulated: the simulated noise is drawn from the residuals of the baseline, and the detectors have
-# learned that baseline. Leave room below the limit.
+# alarms are more than simulated: the simulated noise is drawn from residuals of the baseline, and the detectors have
+# learned that very baseline. Leave room below the limit.
 
 results = study.results_
 AgreementDisplay.from_predictions(results[results["scenario"].isin(["healthy", "bottom 10 %", "diagonal 5 %"])])

@@ -60,10 +60,13 @@ def as_floats(values: Any) -> Array:
     values = without_mask(values)
     if scipy.sparse.issparse(values):
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
-    refuse_no_numbers(values)
     is_pandas = hasattr(values, "iloc")
+    dtypes = np.ravel(values.dtypes).tolist() if is_pandas else [getattr(values, "dtype", None)]
+    if dtypes and all(dtype == np.float64 for dtype in dtypes):
+        return np.array(values) if is_pandas else np.asarray(values)
+    refuse_no_numbers(values)
     array: Any = values if is_pandas else np.asarray(values)
-    if any(dtype.kind == "c" for dtype in np.ravel(array.dtypes if is_pandas else array.dtype)):
+    if any(dtype.kind == "c" for dtype in (dtypes if is_pandas else [array.dtype])):
         raise ValueError("the values are complex; expected real numbers")
     try:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
@@ -195,7 +198,7 @@ def refuse_huge(values: Any, what: str) -> None:
 
 def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
     """Columns of a frame that may hold no numbers, by name; of anything else the values themselves."""
-    if not (hasattr(values, "columns") and hasattr(values, "dtypes")):
+    if not (hasattr(type(values), "columns") and hasattr(type(values), "dtypes")):
         yield None, values
         return
     for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):

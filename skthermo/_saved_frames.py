@@ -38,7 +38,7 @@ class SavedLabels:
 class SavedTable:
     """Values and labels of a frame, or of a series where there are no columns."""
 
-    values: NDArray | list
+    values: NDArray | list | SavedLabels
     index: SavedLabels
     columns: SavedLabels | None
     name: Any = None
@@ -68,6 +68,8 @@ def from_saved(value: Any) -> Any:
     if not isinstance(value, SavedTable):
         return value
     index = _from_labels(value.index)
+    if isinstance(value.values, SavedLabels):
+        return pd.Series(_from_labels(value.values), index, name=value.name)
     if value.columns is None:
         return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
     if isinstance(value.values, list):
@@ -83,9 +85,13 @@ def _of_columns(frame: pd.DataFrame, axes: list[Any]) -> Any:
 
 
 def _of_objects(series: pd.Series, axes: list[Any]) -> Any:
-    """A series of texts and numbers as a table of a list, or unchanged."""
+    """A series of texts and numbers as a table of a list, one of times as a table of labels, or unchanged."""
+    if series.dtype.kind == "M":
+        times = _to_labels(pd.DatetimeIndex(series))
+        return series if times is None else SavedTable(times, axes[0], None, series.name)
     values = series.tolist()
-    plain = series.dtype == object and all(isinstance(value, str | int | float | None) for value in values)
+    texts = series.dtype == object or str(series.dtype) == "str"
+    plain = texts and all(isinstance(value, str | int | float | None) for value in values)
     return SavedTable(values, axes[0], None, series.name, str(series.dtype)) if plain else series
 
 

@@ -22,11 +22,12 @@ TABLES = {
     "mixed": pd.DataFrame(VALUES, pd.Index(["a", 1, ("b", 2)], tupleize_cols=False)),
     "series": pd.Series([1.0, np.nan], ["f1", "f2"], name="offset (%)"),
     "empty": pd.Series([], [], dtype="int64"),
+    "texts": pd.DataFrame({"a": [1.0, 2.0], "b": ["x", None], "c": ["y", "z"]}),
+    "times": pd.DataFrame({"from": HOURS, "to": HOURS.tz_localize("Europe/Brussels"), "rows": [1, 2, 3]}),
 }
 OTHERS = {
     "levels": pd.DataFrame(VALUES, pd.MultiIndex.from_tuples([(1, 2), (3, 4), (5, 6)])),
     "periods": pd.DataFrame(VALUES, pd.period_range("2025", periods=3, freq="Y")),
-    "text": pd.DataFrame({"a": [1.0, 2.0], "b": ["x", "y"]}),
     "array": VALUES,
 }
 

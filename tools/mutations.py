@@ -223,6 +223,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("mean of the others", "mean = -_sums(", "mean = _sums("),
         ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
     ],
+    ("detection/_neighbourhoods.py", "detection/test_outlier.py"): [
+        ("blocks of a given length", "if block is not None:", "if False:"),
+        ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
+    ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
@@ -251,6 +255,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("periods of windows", "baseline.away_from(np.isin(np.arange(n_rows), fold))", "np.arange(n_rows)"),
         ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
+    ],
+    ("_warnings.py", "detection/test_checked_once.py"): [
+        ("what an estimator around has told", "if kind in _told.get():", "if kind in ():"),
+        (
+            "a check that is shared",
+            "content = ALL if ALL in found else content_of(tables)",
+            "content = str(len(found))",
+        ),
+    ],
+    ("detection/_fused.py", "detection/test_checked_once.py"): [
+        ("detectors that share a check", ", checked_once():", ":"),
     ],
     ("_warnings.py", "surrogate/test_report.py"): [
         ("a warning for each fold", "if kind in kinds:", "if kind in kinds and not in_folds:"),
@@ -288,11 +303,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
-        ("windows that reach into other states", "np.flatnonzero(np.diff(state[order])) + 1", "[]"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
+        ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
         (
             "records that are not judged",
-            "np.mean(self.values[rows] < limit)",
-            "np.mean(~(self.values[rows] >= limit))",
+            "np.mean(self.values[rows] < raised)",
+            "np.mean(~(self.values[rows] >= raised))",
         ),
     ],
     ("studies/detectability/_task.py", "studies/test_detection_task.py"): [

@@ -1,20 +1,28 @@
 """The Z24 examples on a bridge that freezes by a known law, and without data."""
 
+from copy import copy
+
 import pytest
 
 from skthermo.datasets import make_z24
 from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
 from tests.examples.pages import recipes, run
 
-Z24, DAMAGE = recipes("z24"), recipes("z24_damage")
+Z24, DAMAGE, BENCH = recipes("z24"), recipes("z24_damage"), recipes("z24_bench")
 
 pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside"),
     pytest.mark.filterwarnings("ignore:groups that these modes cannot tell apart"),
+    pytest.mark.filterwarnings(r"ignore:the \d+ baseline records depend on each other"),  # 240 of them
     pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
 ]
 
-LINES = [f"broken lines, {label}" for label in Z24.SCALES]
+FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "broken lines", "broken lines, whitened", "linear regression")
+
+
+def small_model():
+    """A model of the bridge for parameters within 50 %, which is made fast."""
+    return make_z24().reduced(0.5, tol=1e-4, random_state=0)
 
 
 @pytest.fixture(scope="module")
@@ -25,18 +33,48 @@ def frozen(tmp_path_factory):
     return Z24.Bridge(Z24.find(folder))
 
 
-def test_the_damage_is_identified_and_its_alarms_are_foretold(frozen, monkeypatch):
-    monkeypatch.setattr(DAMAGE, "bridge_model", lambda: make_z24().reduced(0.5, tol=1e-4, random_state=0))
-    fem, found = DAMAGE.identify(frozen)
+@pytest.fixture(scope="module")
+def few():
+    """Some of the field's detectors, that learn fast."""
+    return {name: detector for name, detector in BENCH.detectors().items() if name in FEW}
+
+
+@pytest.fixture(scope="module")
+def judged(frozen, few):
+    """The damage that is identified, and what detectors say of it, simulated and measured."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DAMAGE, "bridge_model", small_model)
+        fem, found = DAMAGE.identify(frozen)
+    return found, BENCH.bench(frozen, fem, found.scenario(BENCH.DAMAGED), few, n_repeats=4)
+
+
+def test_the_damage_is_identified(judged):
+    found, _ = judged
     assert found.p_value < 0.01
     for group in ("piers", "soil"):
         assert found.severities[group] == pytest.approx(SEVERITY, abs=2 * found.standard_errors[group])
     assert found.severities.drop(["piers", "soil"]).max() < 0.02
     unexplained = (found.shifts["measured"] - found.shifts["explained"]) / found.shifts["standard_error"]
     assert unexplained.abs().max() < 2
-    table = DAMAGE.simulation_table(frozen, Z24.Records.of(frozen), fem, found, LINES, n_repeats=4)
-    found = table.loc["damage found"]
-    assert (found["measured"].between(found["lowest"] - 5, found["highest"] + 5)).all()
+
+
+def test_its_alarms_are_foretold(judged):
+    table = BENCH.side_by_side(judged[1])
+    assert list(table.index) == list(FEW)
+    rates = table["damage found"]
+    assert (rates["measured"].between(rates["lowest"] - 5, rates["highest"] + 5)).all()
+    assert BENCH.agreement(table).loc["damage found", "rank correlation"] > 0.7
+
+
+def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, judged):
+    records = Z24.Records.of(frozen)
+    table = BENCH.measured_table(records, few)
+    n, first = len(records.damaged), BENCH.FIRST
+    parts = table["alarms in the first 12"] * first + table["found of the other 118"] * (n - first)
+    assert (parts / n).tolist() == pytest.approx(table["found of 130"].tolist())
+    rates = BENCH.side_by_side(judged[1])
+    for state, column in (("false alarms", "false alarms"), ("damage found", "found of 130")):
+        assert rates[state, "measured"].tolist() == pytest.approx(table[column].tolist())
 
 
 def test_the_chain_predicts_as_well_as_a_direct_regression(frozen):
@@ -61,6 +99,18 @@ def test_the_parameter_that_was_damaged_falls(frozen):
     fall = DAMAGE.changes(measured, names).damaged.mean()
     assert fall["piers_soil"] == pytest.approx(-100 * SEVERITY, abs=5)
     assert fall.drop("piers_soil").abs().max() < 5
+
+
+def test_a_choice_sees_training_rows_only(frozen, few, monkeypatch):
+    monkeypatch.setattr(BENCH, "bridge_model", small_model)
+    some = {name: few[name] for name in FEW[1:4]}
+    spoilt = copy(frozen)
+    spoilt.T_damaged = spoilt.F_damaged = None
+    spoilt.T, spoilt.F = frozen.T.copy(), frozen.F.copy()
+    spoilt.T[frozen.n_train :], spoilt.F[frozen.n_train :] = 1e3, 1e3
+    chosen, same = (BENCH.choose(one, some, n_repeats=2).ranking()["pod"] for one in (frozen, spoilt))
+    assert chosen.equals(same)
+    assert chosen.index[0].startswith("broken lines")
 
 
 @pytest.mark.parametrize("page", ["z24_bridge", "z24_detection", "z24_damage"])

@@ -78,6 +78,13 @@ def test_a_band_without_repeats_says_neither_inside_nor_outside():
     assert len(display.measured_["healthy"][1].get_xdata()) == 0
 
 
+def test_means_of_several_repeats_are_not_compared_with_the_band_of_single_ones():
+    means = HEALTHY.assign(n_repeats=np.where(HEALTHY["source"] == "reference", 20, 40))
+    assert AgreementDisplay.from_predictions(means).agreement_.loc["healthy", "n_bands"] == 0
+    single = HEALTHY.assign(n_repeats=np.where(HEALTHY["source"] == "reference", 1, 40))
+    assert AgreementDisplay.from_predictions(single).agreement_.loc["healthy", "n_bands"] == 4
+
+
 def test_points_of_a_scatter_plot_lie_over_the_simulated_rates():
     groups = {name: "raw" for name in SIMULATED if name.startswith("raw")}
     display = AgreementDisplay.from_predictions(BOTH, groups=groups, kind="scatter")
@@ -114,6 +121,13 @@ def test_failures_and_records_that_are_not_judged_are_told(kind):
     assert rows_named(display.axes_[0])[-1] == "cointegration"
     assert texts(display.axes_[0]) == ["20\N{NO-BREAK SPACE}% not judged", "failed: LinAlgError: singular"]
     assert texts(display.axes_[1]) == ["20\N{NO-BREAK SPACE}% not judged"]
+
+
+def test_a_detector_that_failed_in_one_of_two_studies_is_told_there():
+    results = BOTH[(BOTH["detector"] != "linear") | (BOTH["scenario"] == "healthy")]
+    results = pd.concat([results, pd.DataFrame([{"detector": "linear", "error": "ValueError: no"}])])
+    healthy, damaged = AgreementDisplay.from_predictions(results).axes_
+    assert (texts(healthy), texts(damaged)) == ([], ["failed: ValueError: no"])
 
 
 def test_scenarios_can_be_chosen_and_those_without_measured_records_are_not_drawn():
@@ -169,7 +183,7 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
     display = RankingDisplay.from_predictions(ranking)
     names = rows_named(display.axes_[0])
     assert names == [
-        *("not clearly behind the best", "whitened", "good", "clearly behind", "raw"),
+        *("best, or not clearly behind", "whitened", "good", "clearly behind", "raw"),
         *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
     ]
     assert texts(display.axes_[0]) == ["LinAlgError: singular"]

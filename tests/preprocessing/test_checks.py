@@ -218,6 +218,8 @@ class TestTrend:
         table = check_records(two.temperatures, two.frequencies * drift).table
         assert table["what"].tolist() == ["trend"] * 6
         assert "Hz a year" in table["detail"][0]
+        unitless = check_records(two.temperatures, two.frequencies * drift, unit="").table["detail"]
+        assert unitless.tolist() == table["detail"].str.replace(" Hz", "").tolist()
 
     @pytest.mark.parametrize("rho", [0.0, 0.9])
     def test_estimates_scatter_by_their_standard_errors(self, rho):

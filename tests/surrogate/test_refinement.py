@@ -350,3 +350,27 @@ def test_scatter_is_the_noise_given_or_what_the_model_leaves():
     mixed = scatter(TRUSS, F, noise=[0.02, 0, 0, 0, 0, 0])
     assert mixed[0] == 0.02
     assert (mixed[1:] == mixed[1]).all()
+
+
+def test_rows_that_fit_has_refined_are_not_refined_again(monkeypatch):
+    from skthermo.surrogate.refinement import _refinement
+
+    refined = []
+
+    def counted(objective, start, *arguments, **options):
+        refined.append(len(start))
+        return refine(objective, start, *arguments, **options)
+
+    refine = _refinement.refine
+    monkeypatch.setattr(_refinement, "refine", counted)
+    model, random = TRUSS, np.random.RandomState(0)
+    theta = random.uniform(0.85, 1.15, (30, 4))
+    F = model.frequencies(theta) * (1 + 0.001 * random.standard_normal((30, 6)))
+    F[3, 1] = np.nan
+    inverse = InverseSurrogate(model, LinearRegression(), bounds=0.2, n_samples=100, random_state=0).fit(F)
+    rows = np.append(np.arange(30)[::-1], [5, 5])
+    others = model.frequencies(random.uniform(0.85, 1.15, (4, 4)))
+    first, again = (inverse.invert(np.vstack([F[rows], others])) for _ in range(2))
+    assert refined == [29, 5, 36]
+    for name in ("theta", "std", "residuals", "converged"):
+        np.testing.assert_allclose(first[name], again[name], rtol=1e-9, atol=1e-12)

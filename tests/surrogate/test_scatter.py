@@ -1,11 +1,13 @@
 """Scatter of records: what is learned of independent and of lasting parts, and how uncertain it leaves means."""
 
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from scipy.sparse import csr_array
 
 from skthermo.surrogate.chain._scatter import Scatter
 
@@ -19,14 +21,21 @@ def noise(memory, n_records, random, n_columns=2):
     return lfilter([1.0], [1.0, -memory], shocks, axis=0)[300:]
 
 
+@cache
+def neighbours(n_records, season):
+    """Averages over the records with the most similar weather, which has a season and weather of the day."""
+    days, random = np.arange(n_records), np.random.RandomState(0)
+    weather = np.cos(2 * np.pi * days / season) + 0.3 * random.standard_normal(n_records)
+    near = np.abs(weather[:, np.newaxis] - weather).argsort(axis=1)[:, :NEAR].ravel()
+    return csr_array((np.full(near.size, 1 / NEAR), near, np.arange(0, near.size + 1, NEAR)), (n_records, n_records))
+
+
 def residuals(values, season=300):
-    """Residuals of records whose weather has a season and weather of the day, and what similar weather takes away."""
-    days, random = np.arange(len(values)), np.random.RandomState(0)
-    weather = np.cos(2 * np.pi * days / season) + 0.3 * random.standard_normal(len(values))
-    near = np.abs(weather[:, np.newaxis] - weather).argsort(axis=1)[:, :NEAR]
+    """Residuals of records, and what similar weather takes away."""
+    similar = neighbours(len(values), season)
 
     def less_similar(table):
-        return table - table[near].mean(axis=1)
+        return table - similar @ table
 
     return SimpleNamespace(values=values, own=values, is_overfitted=False, less_similar=less_similar)
 

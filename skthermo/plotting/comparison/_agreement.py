@@ -37,9 +37,10 @@ class AgreementDisplay:
 
     One row for each detector and one panel for each scenario of which there are measured records: false alarms of the
     healthy structure, and found damage. A bar is the band in which the rate of one measured campaign should lie, the
-    line in it the mean of all simulated ones. Detectors are in the order of the damage that they find in simulation.
-    Those that failed are told in words, and so are shares of records that are not judged, which count neither as
-    healthy nor as alarms. The axis of false alarms is even in their square root, so that small ones are told apart.
+    line in it the mean of all simulated ones; a reference of several repeats is a mean, too, and not compared with the
+    band. Detectors are in the order of the damage that they find in simulation. Those that failed are told in words,
+    and so are shares of records that are not judged, which count neither as healthy nor as alarms. The axis of false
+    alarms is even in their square root, so that small ones are told apart.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -48,8 +49,8 @@ class AgreementDisplay:
     table : DataFrame
         One row for each ``detector`` and ``scenario``: ``measure`` ("PFA" or "POD"), ``simulated``, ``band_lowest``,
         ``band_highest`` and ``measured``, as shares of the records; ``inside``, whether the measured rate lies in the
-        band (1, 0, or NaN where one of the two is not known); ``not_judged`` and ``not_judged_measured``, shares of
-        all records.
+        band (1, 0, or NaN where one of the two is not known, or the measured one is a mean of several repeats);
+        ``not_judged`` and ``not_judged_measured``, shares of all records.
     errors : dict of str to str, optional
         What kept detectors from being tested, by their names.
     groups : mapping of str to str, optional
@@ -298,7 +299,7 @@ class AgreementDisplay:
             if detector in rows.index:
                 place = rows.index.get_loc(detector)
                 note(ax, height, _unjudged(rows.iloc[place]), is_right=bool(right[place] > left[place]))
-            elif ax is self.axes_[0]:
+            elif ax is self.axes_[0] or detector in set(self.table["detector"]):
                 note(ax, height, self._reason(detector), is_right=False)
 
     def _reason(self, detector: Any) -> str:
@@ -351,9 +352,11 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
         )
     left = simulated.rename(columns={"rate": "simulated"})
     left = left[[*keys, "measure", "simulated", "band_lowest", "band_highest", "not_judged"]]
-    right = measured.set_index(keys)[["rate", "not_judged"]].set_axis(["measured", "not_judged_measured"], axis=1)
+    right = measured.set_index(keys)
+    is_single = right.get("n_repeats", pd.Series(1, right.index)) == 1
+    right = right[["rate", "not_judged"]].set_axis(["measured", "not_judged_measured"], axis=1).assign(single=is_single)
     table = left[left["scenario"].isin(both)].join(right, on=keys).reset_index(drop=True)
-    known = table[["band_lowest", "band_highest", "measured"]].notna().all(axis=1)
+    known = table[["band_lowest", "band_highest", "measured"]].notna().all(axis=1) & (table.pop("single") == 1)
     inside = table["measured"].between(table["band_lowest"], table["band_highest"]).astype(float)
     return table.assign(inside=inside.where(known))
 

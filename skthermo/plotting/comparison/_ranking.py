@@ -27,7 +27,7 @@ NEEDED = (
     *("false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit", "pod", "pod_lowest", "pod_highest"),
     *("pod_equal", "behind", "behind_lowest", "behind_highest", "clearly_behind"),
 )
-LEVEL = "not clearly behind the best"
+LEVEL = "best, or not clearly behind"
 ONE_REPEAT = "order not sure: one repeat"
 BEHIND = "clearly behind"
 FAILED = "failed"
@@ -85,7 +85,7 @@ class RankingDisplay:
     ...      "clearly_behind": [False, True]}, index=["whitened", "raw"])
     >>> display = RankingDisplay.from_predictions(ranking)
     >>> [text.get_text() for text in display.axes_[0].get_yticklabels()]
-    ['not clearly behind the best', 'whitened', 'clearly behind', 'raw']
+    ['best, or not clearly behind', 'whitened', 'clearly behind', 'raw']
     >>> plt.close(display.figure_)
     """
 

@@ -118,7 +118,7 @@ class RecordFindings(SavesFrames):
                 yield kind, f"what the weather leaves of the frequencies has a trend: {details}"
 
 
-def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFindings:
+def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str = "Hz") -> RecordFindings:
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
     It looks for sensors and modes that are stuck, weather that explains nothing, temperatures of another time, modes
@@ -130,7 +130,9 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
     temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
         In degrees Celsius; NaN is allowed.
     frequencies : array-like or DataFrame of shape (n_samples, n_modes)
-        Of the healthy structure, in Hz; NaN is allowed.
+        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed.
+    unit : str, default="Hz"
+        Unit of the second table, as the findings give it: "" for parameters, which are multipliers.
 
     Returns
     -------
@@ -140,7 +142,7 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
     Raises
     ------
     ValueError
-        If the tables differ in length or index, or hold something that is no number.
+        If the tables differ in length or index, or hold something that is no number; if the unit is no text.
 
     See Also
     --------
@@ -181,7 +183,9 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike) -> RecordFind
     0  time shift     305
     """
     check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
-    records = _Records.of(temperatures, frequencies)
+    if not isinstance(unit, str):
+        raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
+    records = _Records.of(temperatures, frequencies, f" {unit}" if unit else "")
     findings = [*_stuck(records)]  # its rows then are NaN, and so on
     findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _absurd(records)
     return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(records.order))
@@ -197,15 +201,16 @@ class _Records:
     modes: list[Hashable]
     order: NDArray[np.intp]
     index: Any
+    unit: str
     has_stuck_sensors: bool = False
 
     @classmethod
-    def of(cls, temperatures: Any, frequencies: Any) -> _Records:
+    def of(cls, temperatures: Any, frequencies: Any, unit: str) -> _Records:
         order = np.argsort(row_times(temperatures), kind="stable")
         index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
         T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
         T, F = (np.where(np.isin(table, MARKERS), np.nan, table) for table in (T, F))  # others tell of these
-        return cls(T, F, columns_by_sensor(temperatures), column_names(frequencies, "f"), order, index[order])
+        return cls(T, F, columns_by_sensor(temperatures), column_names(frequencies, "f"), order, index[order], unit)
 
     @property
     def n_usable(self) -> int:
@@ -323,7 +328,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[
         if len(rows):
             n_known = int((~np.isnan(column)).sum())
             detail = (
-                f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g} Hz in "
+                f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g}{records.unit} in "
                 f"{records.label(rows[0])}"
             )
             yield records.finding("outliers", name, rows, detail)
@@ -360,7 +365,7 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[list[Any]], Array]:
         step = largest_step(inputs[rows], F[:, mode])
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
-            detail = f"{name!r} changes by {step.change:+.2g} Hz about {records.label(rows[step.row])}"
+            detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.label(rows[step.row])}"
             found.append(records.finding("step", name, known, f"{detail}, standard error {step.standard_error:.1g}"))
             continue
         change, error = row["change"], row["standard_error"]
@@ -368,10 +373,10 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[list[Any]], Array]:
         if not (abs(change) > CERTAIN * error and abs(change) > max(LEAST_CHANGE * scatter, of_frequency)):
             continue
         level[:, mode] = change * (times - times[0]) / np.ptp(times)
-        a_year = f" ({row['per_year']:+.2g} Hz a year)" if timed else ""
+        a_year = f" ({row['per_year']:+.2g}{records.unit} a year)" if timed else ""
         detail = (
-            f"{name!r} changes by {change:+.2g} Hz, standard error {error:.1g}{a_year}; first fifth "
-            f"{row['first']:+.2g} Hz, last fifth {row['last']:+.2g} Hz"
+            f"{name!r} changes by {change:+.2g}{records.unit}, standard error {error:.1g}{a_year}; first fifth "
+            f"{row['first']:+.2g}{records.unit}, last fifth {row['last']:+.2g}{records.unit}"
         )
         found.append(records.finding("trend", name, known, detail))
     return found, level

@@ -159,8 +159,8 @@ class DetectionTask(Bunch):
             - ``optimism``: ``tuned`` less ``fresh``;
             - ``false_alarms``, ``false_alarms_lowest``, ``false_alarms_highest``: share of the healthy fresh records
               beyond the detector's own threshold, and its bounds;
-            - ``keeps_limit``: False where all of these bounds exceed the limit of the task. The detector needs a
-              higher threshold, and ``fresh`` is what it finds with one;
+            - ``keeps_limit``: False where both of these bounds exceed the limit of the task: give the detector a
+              smaller ``contamination``;
             - ``not_judged``: share of the fresh records that are not judged.
 
         Raises
@@ -199,17 +199,17 @@ class DetectionTask(Bunch):
         """Score and false alarms of a fitted detector on all simulated records, with bounds."""
         limit = self.scoring.max_false_alarms
         found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
-        raised, shape = found.raised(limit), (len(self.seeds), -1)
         drawn = [scenario.n_draws > 1 for scenario in self.scenarios]
-        missed = np.where(np.isnan(found.values), 0.0, found.values - raised)  # not judged is not found
+        missed = np.where(np.isnan(found.values), 0.0, found.values - found.raised(limit))  # not judged is not found
         pods = [
-            rate_of(missed[rows].reshape(shape), confidence, drawn[found.scenario[rows[0]]]) for rows in found.damaged()
+            rate_of(found.by_repeat(missed, rows), confidence, drawn[found.scenario[rows[0]]])
+            for rows in found.damaged()
         ]
-        alarms = rate_of(found.values[found.healthy()].reshape(shape), confidence)
+        alarms, worth = found.false_alarms(confidence), found.worth(limit)
         return {
-            "fresh": found.found(limit),
-            "fresh_lowest": float(np.mean([pod.lowest for pod in pods])),
-            "fresh_highest": float(np.mean([pod.highest for pod in pods])),
+            "fresh": found.score(limit),
+            "fresh_lowest": worth * float(np.mean([pod.lowest for pod in pods])),
+            "fresh_highest": worth * float(np.mean([pod.highest for pod in pods])),
             "false_alarms": alarms.rate,
             "false_alarms_lowest": alarms.lowest,
             "false_alarms_highest": alarms.highest,
@@ -291,7 +291,8 @@ def detection_task(
     The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
     until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
-    scenarios, which count alike. A damaged record that is not judged is not found.
+    scenarios, which count alike. A damaged record that is not judged is not found. Where false alarms by the own
+    threshold exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound.
 
     All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
     settings are compared more certainly than each is known.
@@ -302,8 +303,9 @@ def detection_task(
     so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
     single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
 
-    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a regression
-    of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured records.
+    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
+    regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
+    records.
 
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` judges it in weather and with
     noise that took no part.

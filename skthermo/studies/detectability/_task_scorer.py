@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +14,17 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array
 from skthermo._warnings import warnings_once
+from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._view import has_targets
+
+FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
 
 
 @dataclass(frozen=True, eq=False)
 class Decisions:
-    """A detector's decisions on simulated records, with the label and the number of the scenario of each.
+    """A detector's decisions on simulated records in order of time, with the label of each and the numbers of its
+    scenario and its repeat.
 
     Negative decisions are alarms, NaN where a record is not judged; labels are +1 (healthy) and -1 (damaged).
     """
@@ -27,19 +32,33 @@ class Decisions:
     values: Array
     labels: NDArray[np.intp]
     scenario: NDArray[np.intp]
+    repeat: NDArray[np.intp]
 
-    def found(self, max_false_alarms: float) -> float:
+    def score(self, limit: float) -> float:
+        """Share of the damaged records found within the limit, times what the detector is worth."""
+        return self.found(limit) * self.worth(limit)
+
+    def worth(self, limit: float) -> float:
+        """1, or the limit over the lower bound of the false alarms where this is more: the detector will work with its
+        own threshold, not with a raised one."""
+        return limit / max(self.false_alarms().lowest, limit)
+
+    def found(self, limit: float) -> float:
         """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
-        limit = self.raised(max_false_alarms)
-        return float(np.mean([np.mean(self.values[rows] < limit) for rows in self.damaged()]))
+        raised = self.raised(limit)
+        return float(np.mean([np.mean(self.values[rows] < raised) for rows in self.damaged()]))
 
-    def raised(self, max_false_alarms: float) -> float:
+    def raised(self, limit: float) -> float:
         """Decision below which there is an alarm: 0, or less where more healthy records than the limit lie below."""
         healthy = self.values[self.healthy()]
         judged = np.sort(healthy[~np.isnan(healthy)])
         if not judged.size:
             raise ValueError(f"none of {len(healthy)} healthy records is judged; expected a detector that judges some")
-        return float(min(judged[int(max_false_alarms * len(judged) + 1e-9)], 0.0))
+        return float(min(judged[int(limit * len(judged) + 1e-9)], 0.0))
+
+    def false_alarms(self, confidence: float = 0.95) -> Rate:
+        """Share of the judged healthy records beyond the detector's own threshold, with bounds."""
+        return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
 
     def healthy(self) -> NDArray[np.intp]:
         """Healthy records of the scenario that has most; those of others are the same records with the same noise."""
@@ -50,6 +69,11 @@ class Decisions:
         """Damaged records of each scenario that has some."""
         damaged = np.unique(self.scenario[self.labels == -1])
         return [np.flatnonzero((self.labels == -1) & (self.scenario == one)) for one in damaged]
+
+    def by_repeat(self, values: Array, rows: NDArray[np.intp]) -> Array:
+        """Values of some records, (n_repeats, n_records); in one row where repeats differ in number."""
+        counts = np.unique(self.repeat[rows], return_counts=True)[1]
+        return values[rows].reshape(len(counts) if np.ptp(counts) == 0 else 1, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +92,7 @@ class TaskScorer:
 
     def __call__(self, estimator: Any, X: pd.DataFrame, y: ArrayLike | None = None) -> float:
         """Share of the damaged records that are found within the limit of false alarms."""
-        return self.decisions(estimator, X, y).found(self.max_false_alarms)
+        return self.decisions(estimator, X, y).score(self.max_false_alarms)
 
     def decisions(self, estimator: Any, X: pd.DataFrame, y: ArrayLike | None = None) -> Decisions:
         """Decisions on rows of the task; lags and windows of a state see no record of another."""
@@ -79,11 +103,14 @@ class TaskScorer:
         missing = [name for name, label in (("healthy", 1), ("damaged", -1)) if not (labels == label).any()]
         if missing:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
-        state, order, values = self.state[rows], np.argsort(rows, kind="stable"), np.full(len(rows), np.nan)
+        order = np.argsort(rows, kind="stable")
+        state, values = self.state[rows[order]], []
         with warnings_once("in other states of the task"):
-            for one in np.split(order, np.flatnonzero(np.diff(state[order])) + 1):
-                values[one] = estimator.decision_function(X.iloc[one])
-        return Decisions(values, labels, state % self.n_scenarios)
+            warnings.filterwarnings("ignore", FIRST_ROWS)
+            for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+                values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
+        repeat, scenario = np.divmod(state, self.n_scenarios)
+        return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
     def _rows(self, X: Any) -> NDArray[np.intp]:
         """Positions of the rows among the simulated ones."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.signal import lfilter
@@ -160,7 +161,15 @@ def _expected(memories: Array, less_similar: Callable[[Array], Array], n_rows: i
     shocks = np.random.RandomState(0).standard_normal((start + n_rows, n_drawn))
     noise = [np.sqrt(1 - m**2) * lfilter([1.0], [1.0, -m], shocks, axis=0)[start:] for m in memories]
     rest = np.split(less_similar(np.hstack(noise)), len(memories), axis=1)
-    return np.array([[(r[lag:] * r[: n_rows - lag]).mean() for lag in range(n_lags)] for r in rest])
+    n_pairs = n_drawn * (n_rows - np.arange(n_lags))
+    return np.array([_lagged_products(one, n_lags).sum(axis=1) / n_pairs for one in rest])
+
+
+def _lagged_products(columns: Array, n_lags: int) -> Array:
+    """Sums of the products of values 0, 1, ... rows apart, (n_lags, n_columns)."""
+    length = scipy.fft.next_fast_len(len(columns) + n_lags, real=True)
+    spectra = scipy.fft.rfft(columns, length, axis=0)
+    return np.asarray(scipy.fft.irfft(spectra.real**2 + spectra.imag**2, length, axis=0)[:n_lags])
 
 
 def _correlations(matrix: Array, variances: Array) -> Array:
