@@ -217,8 +217,38 @@ def test_in_sentences(study, table):
         said[0] == f"'lines' finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
     )
     assert said[1].startswith("Clearly worse: 'raw' (")
-    assert said[2].startswith("More false alarms than 2.0%: 'loud' (")
-    assert said[3] == "Stopped by an error: 'broken' (OSError: no dice)."
+    assert said[2].startswith("This holds the noise alone")
+    assert said[3].startswith("More false alarms than 2.0%: 'loud' (")
+    assert said[4] == "Stopped by an error: 'broken' (OSError: no dice)."
+
+
+def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
+    """Such as a one-class SVM, whose index saturates far from its records."""
+
+    class Deaf(MahalanobisDetector):
+        def decision_function(self, X):
+            return np.ones(len(X))
+
+    some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0)
+    study.run(WEATHER)
+    table = study.ranking()
+    assert table.loc["deaf", ["clearly_behind", "pod"]].tolist() == [True, 0.0]
+    assert table.loc["deaf", "behind_lowest"] > 0
+    assert "Clearly worse: 'deaf'" in study.summary()
+
+
+def test_records_that_are_not_judged_are_said(fem):
+    class HalfBlind(MahalanobisDetector):
+        def decision_function(self, X):
+            return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
+
+    some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0)
+    study.run(WEATHER)
+    share = study.ranking().loc["half", "not_judged"]
+    assert share == pytest.approx(0.5, abs=0.01)
+    assert f"neither healthy nor damaged: 'half' {share:.1%}." in study.summary()
 
 
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
