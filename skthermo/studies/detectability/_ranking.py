@@ -13,9 +13,6 @@ from skthermo.studies.detectability._families import families_of
 from skthermo.studies.detectability._judged import JudgedRecords
 
 LEVEL = 0.9  # probability of detection that counts as reliable
-NOISE_ALONE = (
-    "This holds the noise alone: other weather, another baseline or an error of the model may change the order."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +176,10 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
         for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):
             shares = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
             lines += [f"{text}: {', '.join(shares)}."] if shares else []
-        lines += [NOISE_ALONE] if len(behind) else []
+        if len(behind):
+            lines.append(
+                "This holds the noise alone: other weather, another baseline or an error of the model may change the order."
+            )
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
