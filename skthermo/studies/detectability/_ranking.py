@@ -99,8 +99,9 @@ def rank(
         orient="index",
     )
     table = table.infer_objects().rename_axis("detector")
-    keys = ["keeps_limit", by, "auc", "false_alarms", "detector"]
-    table = table.sort_values(keys, ascending=[False, False, False, True, True])
+    table["beyond"] = table["false_alarms"].where(~table["keeps_limit"], 0.0)
+    keys = ["keeps_limit", "beyond", by, "auc", "false_alarms", "detector"]
+    table = table.sort_values(keys, ascending=[False, True, False, False, True, True]).drop(columns="beyond")
     pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
     table["behind"] = table[by].iloc[0] - table[by]
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
@@ -167,7 +168,7 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
         f"{best.name!r} finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
     ]
     if not len(quiet):
-        lines.append(f"No detector keeps the limit of {limit:.1%} false alarms.")
+        lines = [f"No detector keeps the limit of {limit:.1%} false alarms. With the fewest, {lines[0]}"]
     behind = quiet.drop(index=best.name, errors="ignore")
     if len(behind) and behind["behind_lowest"].isna().all():
         lines.append("Records of one repeat do not tell which detectors are clearly worse.")
@@ -178,7 +179,8 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
             lines += [f"{text}: {', '.join(shares)}."] if shares else []
         if len(behind):
             lines.append(
-                "This holds the noise alone: other weather, another baseline or an error of the model may change the order."
+                "This holds the noise alone: other weather, another baseline or an error of the model may change the "
+                "order."
             )
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]

@@ -379,7 +379,8 @@ class DetectabilityStudy(BaseEstimator):
     ) -> pd.DataFrame:
         """Detectors in the order of what they find, with what is not significant.
 
-        First stand those that keep the limit of false alarms, in the order of their probability of detection (POD).
+        First stand those that keep the limit of false alarms, in the order of their probability of detection (POD),
+        then the others, those with the fewest false alarms first.
 
         Parameters
         ----------
