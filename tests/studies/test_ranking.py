@@ -165,11 +165,20 @@ def test_by_moved_thresholds_a_detector_that_is_loud_by_its_threshold_alone_is_n
     assert table.loc["loud", "pod_equal"] == pytest.approx(table.loc["raw", "pod_equal"], abs=0.01)
     assert table.loc["lines", "behind"] == 0
     assert table.loc["raw", "behind_lowest"] < table.loc["raw", "behind"] < table.loc["raw", "behind_highest"]
-    # The bounds hold the error of the moved thresholds, too.
-    widths = [
-        ranked.loc["raw", "behind_highest"] - ranked.loc["raw", "behind_lowest"] for ranked in (table, study.ranking())
-    ]
-    assert widths[0] > widths[1]
+
+
+def test_bounds_at_equal_false_alarms_hold_the_error_of_the_moved_thresholds(study):
+    def found(name, kept):
+        calibration = np.sort(study.calibration_[name, SIMULATED][kept].ravel())
+        threshold = calibration[int(0.02 * calibration.size)]
+        return np.mean([(decisions[kept] < threshold).mean() for decisions in damaged(study, name)])
+
+    table, repeats = study.ranking(by="pod_equal"), np.arange(8)
+    for name in ("raw", "dice"):
+        without = np.array([found("lines", repeats != r) - found(name, repeats != r) for r in repeats])
+        pseudo = 8 * table.loc[name, "behind"] - 7 * without
+        lowest, highest = ttest_1samp(pseudo, 0).confidence_interval(1 - 0.05 / 4)
+        assert table.loc[name, "behind_highest"] - table.loc[name, "behind_lowest"] == pytest.approx(highest - lowest)
 
 
 def test_area_under_the_curve(study, table):
@@ -212,8 +221,38 @@ def test_in_sentences(study, table):
         said[0] == f"'lines' finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
     )
     assert said[1].startswith("Clearly worse: 'raw' (")
-    assert said[2].startswith("More false alarms than 2.0%: 'loud' (")
-    assert said[3] == "Stopped by an error: 'broken' (OSError: no dice)."
+    assert said[2].startswith("This holds the noise alone")
+    assert said[3].startswith("More false alarms than 2.0%: 'loud' (")
+    assert said[4] == "Stopped by an error: 'broken' (OSError: no dice)."
+
+
+def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
+    """Such as a one-class SVM, whose index saturates far from its records."""
+
+    class Deaf(MahalanobisDetector):
+        def decision_function(self, X):
+            return np.ones(len(X))
+
+    some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0)
+    study.run(WEATHER)
+    table = study.ranking()
+    assert table.loc["deaf", ["clearly_behind", "pod"]].tolist() == [True, 0.0]
+    assert table.loc["deaf", "behind_lowest"] > 0
+    assert "Clearly worse: 'deaf'" in study.summary()
+
+
+def test_records_that_are_not_judged_are_said(fem):
+    class HalfBlind(MahalanobisDetector):
+        def decision_function(self, X):
+            return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
+
+    some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0)
+    study.run(WEATHER)
+    share = study.ranking().loc["half", "not_judged"]
+    assert share == pytest.approx(0.5, abs=0.01)
+    assert f"neither healthy nor damaged: 'half' {share:.1%}." in study.summary()
 
 
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
@@ -280,7 +319,7 @@ def judged(random, names, pods, n_repeats=10, n_records=50, share=0.02):
 
 def test_the_best_is_seldom_called_clearly_behind():
     random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
-    n = 300
+    n = 100
     for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
         records, rows = judged(random, names, [0.5] * 6)
         table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")

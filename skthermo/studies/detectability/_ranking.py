@@ -37,12 +37,16 @@ class Contender:
     def jackknife(self, limit: float | None = None) -> Array:
         """Pseudo-values of that probability, whose mean has its error and that of the moved threshold.
 
-        Empty where repeats differ in number, or have no noise in which they could differ.
+        Empty where there is one repeat, or repeats differ in number.
         """
         n = len(self.damaged[0])
-        if n < 2 or any(len(one) != n or np.array_equal(one, one[[0] * n], equal_nan=True) for one in self.damaged):
+        if n < 2 or any(len(one) != n for one in self.damaged):
             return np.empty(0)
         return n * self.pod(limit) - (n - 1) * np.array([self.pod(limit, number) for number in range(n)])
+
+    def has_noise(self) -> bool:
+        """Whether any decision differs from repeat to repeat."""
+        return any(not np.array_equal(one, one[[0] * len(one)], equal_nan=True) for one in self.damaged)
 
     def auc(self) -> float:
         """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
@@ -101,6 +105,8 @@ def rank(
     pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
     table["behind"] = table[by].iloc[0] - table[by]
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
+    if not any(one.has_noise() for one in contenders.values()):
+        margin = [np.nan] * len(names)
     table["behind_lowest"], table["behind_highest"] = table["behind"] - margin, table["behind"] + margin
     table["clearly_behind"] = table["behind_lowest"] > 0
     first = ["false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit"]
@@ -171,8 +177,16 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
         for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):
             shares = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
             lines += [f"{text}: {', '.join(shares)}."] if shares else []
+        if len(behind):
+            lines.append(
+                "This holds the noise alone: other weather, another baseline or an error of the model may change the "
+                "order."
+            )
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
+    unseen = ranked.loc[ranked["not_judged"] > 0, "not_judged"]
+    shares = [f"{name!r} {share:.1%}" for name, share in unseen.items()]
+    lines += [f"Records that are not judged, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
     lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
     return "\n".join(lines)

@@ -454,6 +454,7 @@ class DetectabilityStudy(BaseEstimator):
         >>> print(study.summary())
         'Mahalanobis' finds 22.9% of the damaged records at 1.6% false alarms.
         Clearly worse: 'forest' (17.8% at 1.3%).
+        This holds the noise alone: other weather, another baseline or an error of the model may change the order.
         """
         rows = self._results()
         limit = check_probability(max_false_alarms, "max_false_alarms")
