@@ -154,7 +154,7 @@ class BlockedKFold(BaseCrossValidator):
         ValueError
             If ``block`` is not as described.
         """
-        if isinstance(self.block, Integral) and not isinstance(self.block, bool):
+        if isinstance(self.block, Integral) and not isinstance(self.block, (bool, np.timedelta64)):
             if self.block < 1:
                 raise ValueError(f"block is {self.block!r}; expected a number of rows of 1 or more, or a duration")
             return int(self.block)

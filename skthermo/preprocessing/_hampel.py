@@ -192,7 +192,7 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
             return np.abs(distances) > self.n_deviations * np.fmax(local, self.deviations_[self.targets_])
 
     def _rows_or_duration(self, X: Any) -> int | pd.Timedelta:
-        if isinstance(self.window, Integral):
+        if isinstance(self.window, Integral) and not isinstance(self.window, np.timedelta64):
             return int(self.window)
         if not has_stamps(X):
             raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")

@@ -78,7 +78,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
     folds_ : ndarray of int
         The fold of each row of the baseline, -1 where no fold tests it.
-    block_ : Timedelta, int or None
+    block_ : timedelta64, int or None
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
@@ -369,7 +369,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
-        self.block_ = None if folds.blocks is None else folds.blocks.length(filled)
+        length = None if folds.blocks is None else folds.blocks.length(filled)
+        self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
         predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
         warn_of_unpredicted(predicted[self.folds_ >= 0], as_floats(filled)[self.folds_ >= 0])
         residuals = measured - predicted
