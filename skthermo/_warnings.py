@@ -113,9 +113,11 @@ def explain_rows(table: Records, rows: NDArray[np.bool_] | np.bool_) -> Records:
 
 
 def explained_rows(table: Any) -> NDArray[np.bool_] | np.bool_:
-    """Which rows of a table have no value for a cause that a warning has given; False where it has none of them."""
+    """Which rows lack values for a cause that a warning has given; False where there are none, or rows were dropped."""
     known = _explained.get(id(table))
-    return np.False_ if known is None else known[1]
+    if known is None or len(table) != len(known[1]):
+        return np.False_
+    return known[1] & np.isnan(np.asarray(table, dtype=float)).reshape(len(table), -1).any(axis=1)
 
 
 @contextmanager

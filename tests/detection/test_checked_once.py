@@ -171,6 +171,19 @@ class TestRows:
         assert len(texts) == 1
         assert "73 without any temperature" in texts[0]
 
+    def test_residuals_that_are_changed_in_place_are_judged_as_they_are(self):
+        compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
+        detector = MahalanobisDetector().fit(compensator.fit_transform(X))
+        gaps = LATER.copy()
+        gaps.iloc[:3, : T.shape[1]] = np.nan
+        with pytest.warns(UserWarning, match="3 of .* rows cannot be predicted"):
+            residuals = compensator.transform(gaps)
+        residuals.iloc[5] = np.nan
+        with pytest.warns(UserWarning, match="^1 of .* rows are not judged"):
+            detector.predict(residuals)
+        residuals.dropna(inplace=True)
+        assert len(detector.predict(residuals)) == len(LATER) - 4
+
     def test_lags_that_find_nothing_are_told_once(self):
         lags = make_pipeline(LagFeatures([0, 1], freq="2D", tolerance="0h", padding="nan"), LinearRegression())
         fitted, _ = said(detector(lags).fit, X)
