@@ -4,6 +4,7 @@ import warnings
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 from joblib import parallel_config
 from sklearn.linear_model import LinearRegression, Ridge
@@ -181,8 +182,9 @@ class TestRows:
         residuals.iloc[5] = np.nan
         with pytest.warns(UserWarning, match="^1 of .* rows are not judged"):
             detector.predict(residuals)
-        residuals.dropna(inplace=True)
-        assert len(detector.predict(residuals)) == len(LATER) - 4
+        residuals.loc[residuals.index.max() + pd.Timedelta("1D")] = 0.0
+        with pytest.warns(UserWarning, match="^4 of .* rows are not judged"):
+            assert len(detector.predict(residuals)) == len(LATER) + 1
 
     def test_lags_that_find_nothing_are_told_once(self):
         lags = make_pipeline(LagFeatures([0, 1], freq="2D", tolerance="0h", padding="nan"), LinearRegression())
