@@ -27,6 +27,7 @@ MAY_IMPORT = {
     "plotting": {"fem", "surrogate", "updating", "detection", "metrics", "datasets"},
     "studies": {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "plotting"},
 }
+MAY_IMPORT["monitoring"] = {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "studies"}
 MAY_IMPORT["reporting"] = set(MAY_IMPORT)  # on top of all
 WITHIN = {  # what a package within a package may import, beside what its parent may
     "fem.elements": set(),
@@ -44,6 +45,8 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
     "plotting.comparison": set(),
     "plotting.structures": set(),
+    "monitoring.drift": set(),
+    "monitoring.sensors": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
     "studies.extension": {"studies.detectability", "studies.scenarios"},

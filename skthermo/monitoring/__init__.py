@@ -1,0 +1,3 @@
+"""Detectors in service: records that come in batches, sensors that fail, structures that age."""
+
+__all__: list[str] = []
