@@ -94,7 +94,8 @@ class Explanations:
 
     ``evidence`` is the logarithm of how many times likelier the trends are with each than without any drift, and
     ``walk`` the standard deviation of each set's random walk in a year. ``p_value`` is the probability that trends
-    without drift give one group as much evidence.
+    without drift give one group as much evidence. ``lookalikes`` are the groups of which a drift would give as good an
+    account of a notable drift of a group.
     """
 
     sets: list[tuple[int, ...]]
@@ -102,14 +103,14 @@ class Explanations:
     walk: Array
     p_value: float
     widening: float
-    confused: list[tuple[int, ...]]
-    unseen: NDArray[np.intp]
+    lookalikes: dict[int, list[int]]
+    unseen: NDArray[np.bool_]
 
     @classmethod
     def of(cls, trends: ModeTrends, freedom: float, random: np.random.RandomState) -> Explanations:
         """Weigh all sets of one or two groups; draws give the probability by chance."""
         unseen = _structure(trends)[1]
-        seen = [group for group in range(trends.n_groups) if group not in unseen] or list(range(trends.n_groups))
+        seen = np.flatnonzero(~unseen).tolist() or list(range(trends.n_groups))
         singles = [(group,) for group in seen]
         first = max(singles, key=lambda one: max(_evidences(trends, one)))
         widening = trends.widening(first)
@@ -126,9 +127,9 @@ class Explanations:
         order = np.argsort(-(evidence + prior), kind="stable")
         observed = table[: len(singles)].max()
         p_value = _chance(trends, singles, observed, freedom, random)
-        confused, unseen = _structure(trends)
+        lookalikes, unseen = _structure(trends)
         found = evidence + prior
-        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, confused, unseen)
+        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, lookalikes, unseen)
 
     @property
     def probabilities(self) -> Array:
@@ -184,21 +185,12 @@ def _chance(
     return float((1 + (largest >= observed).sum()) / (1 + DRAWS))
 
 
-def _structure(trends: ModeTrends) -> tuple[list[tuple[int, ...]], NDArray[np.intp]]:
-    """Sets of groups of which a notable drift in one looks like drift of another, and groups that are not seen."""
+def _structure(trends: ModeTrends) -> tuple[dict[int, list[int]], NDArray[np.bool_]]:
+    """Groups of which a notable drift looks like drift of others, with these, and groups that are not seen."""
     information = trends.information()
     own = np.diag(information)
     seen = own * NOTABLE**2 >= 4.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = NOTABLE**2 * (own[:, np.newaxis] - information**2 / own) < 4.0
-    alike = (apart | apart.T) & seen & seen[:, np.newaxis]
-    left, sets = set(np.flatnonzero(seen).tolist()), []
-    while left:
-        found, new = set(), {min(left)}
-        while new:
-            found |= new
-            new = set(np.flatnonzero(alike[sorted(new)].any(axis=0)).tolist()) - found
-        left -= found
-        if len(found) > 1:
-            sets.append(tuple(sorted(found)))
-    return sets, np.flatnonzero(~seen)
+        left = NOTABLE**2 * (own[:, np.newaxis] - information**2 / own)
+    alike = (left < 4.0) & seen & seen[:, np.newaxis] & ~np.eye(len(own), dtype=bool)
+    return {int(one): np.flatnonzero(alike[one]).tolist() for one in np.flatnonzero(alike.any(axis=1))}, ~seen

@@ -47,8 +47,8 @@ class ParameterHistory:
     days : DatetimeIndex
         Beginning of each day.
     courses : mapping of str to Course
-        Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0 on
-        the first day.
+        Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0
+        on the first day.
     years : float
         Length of the records in years.
     p_value : float
@@ -59,9 +59,11 @@ class ParameterHistory:
         Sets of one or two groups that may drift, the best first: ``groups``; ``probability``, if any of the sets
         drifts; ``log_evidence`` against no drift.
     sets : list of tuple of str
-        Groups that cannot be told apart.
+        Groups that cannot be told apart: in the drift that was found, or by their effects on the modes.
     rivals : mapping of str to list of str
         Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
+    lookalikes : mapping of str to list of str
+        Groups of which a drift of 5 % would look like a drift of others, with these.
     unseen : list of str
         Groups of which a loss of 5 % over the records would not be seen.
     noticed_from : Series
@@ -101,6 +103,7 @@ class ParameterHistory:
     explanations: pd.DataFrame = field(repr=False)
     sets: list[tuple[str, ...]]
     rivals: Mapping[str, list[str]]
+    lookalikes: Mapping[str, list[str]]
     unseen: list[str]
     noticed_from: pd.Series = field(repr=False)
     modes: pd.DataFrame = field(repr=False)
@@ -297,8 +300,8 @@ class ParameterHistory:
             rate = rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
             yield (
-                f"{group} {verb} {_yearly(rate)} of its stiffness a year: {percent(rate['change'], '+.2g')} from {first} "
-                f"to {last}."
+                f"{group} {verb} {_yearly(rate)} of its stiffness a year: {percent(rate['change'], '+.2g')} from "
+                f"{first} to {last}."
             )
             others = [other for other in others if other != group]
             if others:
@@ -312,18 +315,18 @@ class ParameterHistory:
             yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
         if self.unseen:
             yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
-        for one in self.sets:
-            if not any(set(one) <= set(others) for others in self.rivals.values()):
-                yield f"A drift of {' or '.join(one)} could not be told apart."
+        for group, others in self.lookalikes.items():
+            if group not in self.rivals:
+                yield f"A drift of {group} would look like one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
-                f"The records are {significant(self.years)} years long: season and drift are hardly told apart, and the "
-                "bands are wide."
+                f"The records are {significant(self.years)} years long: season and drift are hardly told apart, and "
+                "the bands are wide."
             )
         if self.misfit_p_value < self.significance:
             yield (
-                "The frequencies also change in a way that no one or two groups explain, such as added mass or a sensor; "
-                f"the errors are {significant(np.sqrt(self.widening))} times as wide for that."
+                "The frequencies also change in a way that no one or two groups explain, as by added mass; the errors "
+                f"are {significant(np.sqrt(self.widening))} times as wide for that."
             )
         missing = self.modes.index[self.modes["measured"].isna()]
         if len(missing):

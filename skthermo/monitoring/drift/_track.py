@@ -87,10 +87,10 @@ def track_parameters(
 
     Each mode's trend is estimated first. Sets of one or two groups then explain these trends, weighed by their
     evidence: most structures age in few places, and changes in all groups at once are hardly ever determined. If no
-    set explains the trends within their errors, all errors are widened by Birge's ratio. The drift's ``p_value`` compares
-    the evidence of the best group with that in draws of trends without drift. The best set is followed by a Kalman
-    smoother; each other group is followed as one that changes beside it, and a group that explains the trends about as
-    well as one of the set is followed in the place of that. Two such groups are named as a set.
+    set explains the trends within their errors, all errors are widened by Birge's ratio. The ``p_value`` of the drift
+    compares the evidence of the best group with that in draws of trends without drift. The best set is followed by a
+    Kalman smoother, with the effects of changes as large as theirs; each other group is followed as one that changes
+    beside it, and a group that explains the trends about as well as one of the set in the place of that. Two such groups are named as a set.
 
     See Also
     --------
@@ -120,6 +120,9 @@ def track_parameters(
     trends = mode_trends(daily, noise, effects.slopes, freq)
     found = Explanations.of(trends, noise.freedom, random)
     followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length_of(freq))
+    changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
+    slopes = effects.of_changes(changes if found.p_value <= significance else {})
+    followed = replace(followed, trends=replace(followed.trends, slopes=slopes))
     return history_of(fem, effects, followed, significance, random)
 
 
@@ -214,7 +217,10 @@ def history_of(
             others = [member for member in best if member not in replaced] if has_drift else []
             courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
     sets = [tuple(others) for others in rivals.values() if len(others) > 1]
-    sets += [one for one in found.confused if not any(set(one) <= set(other) for other in sets)]
+    for group, others in found.lookalikes.items():
+        alike = tuple(sorted([group, *(one for one in others if group in found.lookalikes.get(one, []))]))
+        if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
+            sets.append(alike)
     named = {names[group]: courses[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []
@@ -223,7 +229,7 @@ def history_of(
     information = np.diag(followed.trends.information())
     with np.errstate(divide="ignore"):
         alone = 1 / np.sqrt(information) / followed.trends.years
-    shifts = sum((np.outer(courses[group].mean, effects.slopes[:, group]) for group in best), start=0.0)
+    shifts = sum((np.outer(courses[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
     trends, n_shapes = followed.trends, followed.trends.n_shapes
     at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.days), n_shapes)[-1:])
     misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
@@ -251,7 +257,8 @@ def history_of(
         ),
         sets=[tuple(names[group] for group in one) for one in sets],
         rivals={names[group]: [names[other] for other in others] for group, others in rivals.items()},
-        unseen=[names[group] for group in found.unseen],
+        lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
+        unseen=[names[group] for group in np.flatnonzero(found.unseen)],
         noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
         modes=modes,
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
