@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -61,9 +60,9 @@ def test_links_and_rights_stay(tmp_path):
 
 def test_who_holds_a_file_is_named(tmp_path, holder):
     path = tmp_path / "state"
-    with pytest.raises(TimeoutError, match=rf"state is in use by process {holder.pid} on .* since \d.*; waited 0.1 s"):
-        with alone_with(path, 0.1):
-            pass
+    expected = rf"state is in use by process {holder.pid} on .* since \d.*; waited 0.1 s"
+    with pytest.raises(TimeoutError, match=expected), alone_with(path, 0.1):
+        pass
 
 
 def test_a_killed_process_leaves_nothing_behind(tmp_path, holder):
@@ -78,7 +77,7 @@ def test_a_killed_process_leaves_nothing_behind(tmp_path, holder):
 
 
 def test_a_link_and_its_file_have_one_lock(tmp_path, holder):
-    link = Path(tmp_path / "link")
+    link = tmp_path / "link"
     link.symlink_to(tmp_path / "state")
     with pytest.raises(TimeoutError, match="is in use"), alone_with(link, 0):
         pass
