@@ -118,7 +118,8 @@ def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Tim
     if len(known) < 2:
         raise ValueError(f"{len(known)} baseline records have a damage index; expected at least 2")
     steps = known.index[1:] - known.index[:-1]
-    covered = np.minimum(steps, max(hold, steps.to_series().median())).sum()
+    lengths = steps.to_series()
+    covered = lengths.clip(upper=max(hold, lengths.median())).sum()
     n_years = float(covered / YEAR)
     release = _release(known, hold)
     peaks = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))["peak"].to_numpy()
