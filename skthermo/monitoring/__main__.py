@@ -25,7 +25,6 @@ from skthermo._io import alone_with
 from skthermo._warnings import told_around
 from skthermo.monitoring import load_monitor
 from skthermo.monitoring._record_files import ISO, read_file
-from skthermo.reporting import owner_report
 
 HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "alarm": ALARM, "not judged": NOT_JUDGED}
@@ -127,6 +126,8 @@ def _reported(monitor: Any, options: argparse.Namespace, code: int) -> int:
     """Write the report that was asked for; the exit code."""
     if options.report is None:
         return code
+    from skthermo.reporting import owner_report  # a job without a report needs no drawings
+
     return _also(code, lambda: owner_report(monitor, options.report, title=options.title))
 
 
