@@ -257,7 +257,7 @@ class Monitor(SavesFrames, Estimator):
         rules = {kind: promise.rule for kind, promise in promises.items()}
         self.promise_, rule = promises["damage"], rules["damage"]
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
+        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
         release = min(one.release for one in rules.values())
         self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
@@ -305,7 +305,7 @@ class Monitor(SavesFrames, Estimator):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
         _warn_of_not_judged(answers)
-        self.store_, self.course_, self.counts_ = store, course, counts
+        self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not judged"]:

@@ -100,12 +100,16 @@ class RecordStore(SavesFrames):
         return Intake(fresh, batch[is_too_late], n_given - len(batch), n_late)
 
     def with_records(self, fresh: pd.DataFrame) -> RecordStore:
-        """The store with new records, and without those that are too old."""
+        """The store with new records."""
         if not len(fresh):
             return self
         kept = pd.concat([self.kept, fresh]) if len(self.kept) else fresh
-        kept = kept if kept.index.is_monotonic_increasing else kept.sort_index()
-        return replace(self, kept=kept[kept.index >= kept.index[-1] - self.keep])
+        return replace(self, kept=kept if kept.index.is_monotonic_increasing else kept.sort_index())
+
+    def trimmed(self) -> RecordStore:
+        """The store without records that are too old to be kept."""
+        first = self.kept.index.searchsorted(self.last - self.keep)
+        return replace(self, kept=self.kept.iloc[first:]) if first else self
 
     def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows of a batch stand in a table; an error if some have other values there."""
