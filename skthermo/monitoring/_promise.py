@@ -195,8 +195,9 @@ def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Tim
         others = Tail.of(squares[1:], asked).threshold(asked)
         warn_user(
             f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
-            f"(damage index {np.sqrt(squares[0]):.3g}, next {np.sqrt(squares[1]):.3g}) and raises the threshold from {others:.3g} "
-            f"to {rule.threshold:.3g}: expected a baseline without records of a fault or of another state",
+            f"(damage index {np.sqrt(squares[0]):.3g}, next {np.sqrt(squares[1]):.3g}) and raises the threshold "
+            f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
+            "without records of a fault or of another state",
             "excursion of the baseline",
         )
     return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method)
