@@ -1,0 +1,213 @@
+"""The course of a monitor: what it has judged, what it needs to go on, and how it goes back when records come late."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo._saved_frames import SavesFrames
+from skthermo.monitoring._days import days_of
+from skthermo.monitoring._direction import Direction
+from skthermo.monitoring._events import EventLog
+from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._records import Plausible, RecordStore, stamps_of
+from skthermo.monitoring._stages import Stages, StageState
+
+ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What records go through: plausible values, stages, the detector, the direction. It does not change.
+
+    Without a direction, all changes are damage.
+    """
+
+    plausible: Plausible
+    stages: Stages
+    judge: Judge
+    direction: Direction | None
+    threshold: float
+    release: float
+
+    def series(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
+        """Index of the records from a position on for each kind of event: 0 where they go the other way."""
+        if self.direction is None:
+            return {"damage": index}
+        with np.errstate(invalid="ignore"):
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.release)
+        stiffer = np.zeros(len(index), dtype=bool)
+        if wanted.any():
+            begin = self.judge.memory.start(stamps_of(records), first)
+            signs = self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])
+            stiffer = signs[first - begin :] < 0
+        quiet = np.where(np.isnan(index), np.nan, 0.0)
+        return {"damage": np.where(stiffer, quiet, index), "stiffening": np.where(stiffer, index, quiet)}
+
+
+@dataclass(frozen=True)
+class Checkpoint(SavesFrames):
+    """Where everything stood at the beginning of a day, before its first record."""
+
+    day: pd.Timestamp
+    stages: StageState
+    log: EventLog
+
+
+@dataclass(frozen=True)
+class Course(SavesFrames):
+    """Judgements so far, by record and by day, and the checkpoints of the last days.
+
+    ``corrected`` are the records as the detector sees them, those kept and the memory before the first checkpoint.
+    """
+
+    corrected: pd.DataFrame
+    checkpoints: tuple[Checkpoint, ...]
+    log: EventLog
+    judged: pd.DataFrame
+    days: pd.DataFrame
+
+    @classmethod
+    def of(cls, bench: Bench, baseline: pd.DataFrame, log: EventLog) -> Course:
+        """The course that begins after a baseline, whose last records are the first memory."""
+        times, end = stamps_of(baseline), baseline.index[-1]
+        start = bench.judge.memory.start(times, len(times), int(times[-1]) + 1)
+        nothing = nothing_judged(baseline.index[:0])
+        checkpoint = Checkpoint(end.normalize(), bench.stages.start(), log)
+        return cls(bench.plausible.cleaned(baseline)[0].iloc[start:], (checkpoint,), log, nothing, days_of(nothing))
+
+    @property
+    def stages(self) -> StageState:
+        """States of the stages at the beginning of the newest day."""
+        return self.checkpoints[-1].stages
+
+    def advanced(self, bench: Bench, fresh: pd.DataFrame, store: RecordStore) -> tuple[Course, pd.DataFrame]:
+        """The course after new records, which are in the store already, and what it says of these and of later ones.
+
+        It goes on from the beginning of the day of the first new record, and judges all records from that one on.
+        """
+        first = fresh.index[0]
+        place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
+        begin = self.checkpoints[place]
+        raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
+        cleaned, marks = bench.plausible.cleaned(raw)
+        days, states, corrected = _through_stages(bench.stages, begin, cleaned)
+        memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
+        records, n_memory = pd.concat([memory, corrected]), len(memory)
+        told = self.judged.iloc[slice(*self.judged.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
+        new = n_memory + len(told)
+        index = np.append(told["index"].to_numpy(), bench.judge.index(records, new))
+        series, times = bench.series(records, n_memory, index), stamps_of(raw)
+        is_open = np.any(list(begin.log.follow(series, times)[0].values()), axis=0) & ~np.isnan(index)
+        modes, rows = np.full(len(raw), "", dtype=object), np.flatnonzero(is_open)
+        modes[rows] = bench.judge.drivers(records, rows + n_memory)
+        bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
+        log, numbers, points = begin.log, {kind: np.zeros(len(raw), dtype=np.int64) for kind in series}, []
+        for day, state, (start, stop) in zip(days, states, pairwise(bounds), strict=True):
+            points.append(Checkpoint(day, state, log))
+            own = slice(start, stop)
+            found, log = log.follow({kind: one[own] for kind, one in series.items()}, times[own], modes[own])
+            for kind, number in found.items():
+                numbers[kind][own] = number
+        reasons = bench.judge.reasons(records, new, index[len(told) :], marks[len(told) :])
+        reasons = _with_stiffening(told["reason"].tolist() + reasons, numbers, len(told))
+        answers = _answers(raw.index, index, bench.threshold, modes, reasons, numbers)
+        points = _since([*self.checkpoints[:place], *points], store.last - store.late)
+        needed = bench.judge.memory.start(
+            stamps_of(records), records.index.searchsorted(points[0].day), points[0].day.value
+        )
+        judged = pd.concat([self.judged.iloc[: self.judged.index.searchsorted(begin.day)], answers])
+        course = Course(
+            records.iloc[min(needed, records.index.searchsorted(store.last - store.keep)) :],
+            tuple(points),
+            log,
+            judged.iloc[judged.index.searchsorted(store.last - store.keep) :],
+            self._with_days(bench.stages, days, states, answers),
+        )
+        return course, self._news(answers.iloc[len(told) :], fresh.index)
+
+    def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
+        """The answers to new records, and those to others that have changed."""
+        is_new = answers.index.isin(fresh)
+        changed = np.zeros(len(answers), dtype=bool)
+        if not is_new.all():
+            known = answers[~is_new]
+            before = self.judged.loc[known.index]
+            same = [(known[c] == before[c]) | (known[c].isna() & before[c].isna()) for c in ANSWER]
+            changed[~is_new] = ~np.all(same, axis=0)
+        return answers.assign(revised=changed)[is_new | changed]
+
+    def _with_days(
+        self, stages: Stages, days: Sequence[pd.Timestamp], states: Sequence[StageState], answers: pd.DataFrame
+    ) -> pd.DataFrame:
+        """Daily summaries, those of some days anew."""
+        new = days_of(answers)
+        if stages.drift is not None:
+            by_day = dict(zip(days, states, strict=True))
+            shares = pd.DataFrame({day: stages.drifts(by_day[day])["change"] for day in new.index}).T
+            new = new.join(shares.add_prefix("drift "))
+        before = self.days.iloc[: self.days.index.searchsorted(days[0])]
+        return pd.concat([before, new]) if len(before) else new
+
+
+def _through_stages(
+    stages: Stages, begin: Checkpoint, records: pd.DataFrame
+) -> tuple[list[pd.Timestamp], list[StageState], pd.DataFrame]:
+    """Days from a checkpoint to the last record, the states of the stages before each, and the corrected records."""
+    days = list(pd.date_range(begin.day, records.index[-1].normalize(), freq="D"))
+    bounds = [*records.index.searchsorted(pd.DatetimeIndex(days)), len(records)]
+    parts = [records.iloc[start:stop] for start, stop in pairwise(bounds)]
+    states = [begin.stages]
+    for day in parts[:-1]:
+        states.append(stages.advance(states[-1], day))
+    corrected = [stages.corrected(state, day) for state, day in zip(states, parts, strict=True) if len(day)]
+    return days, states, pd.concat(corrected)
+
+
+def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Checkpoint]:
+    """The checkpoints from the last one before a time on."""
+    return points[max(n for n, one in enumerate(points) if n == 0 or one.day <= horizon) :]
+
+
+def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], n_told: int) -> list[str]:
+    """Reasons that say so of records, from a position on, that are stiffer than the baseline."""
+    stiffer = np.flatnonzero(numbers.get("stiffening", np.zeros(0)) > 0)
+    for row in stiffer[stiffer >= n_told]:
+        reasons[row] = "; ".join(filter(None, [reasons[row], "stiffer than the baseline"]))
+    return reasons
+
+
+def nothing_judged(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
+    """A row for each of some records that are not judged."""
+    modes, number = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=np.int64)
+    return _answers(stamps, np.full(len(stamps), np.nan), threshold, modes, list(reasons), {"damage": number})
+
+
+def _answers(
+    stamps: pd.DatetimeIndex,
+    index: Array,
+    threshold: float,
+    modes: NDArray[Any],
+    reasons: list[str],
+    numbers: dict[str, NDArray[np.int64]],
+) -> pd.DataFrame:
+    """A row for each record."""
+    judged, is_alarm = ~np.isnan(index), numbers["damage"] > 0
+    state = np.where(judged, np.where(is_alarm, "alarm", "healthy"), "not judged")
+    event = np.where(is_alarm, numbers["damage"], numbers.get("stiffening", 0))
+    table = {
+        "state": pd.Series(state.tolist(), stamps, dtype=object),
+        "index": index,
+        "threshold": np.full(len(index), threshold),
+        "modes": pd.Series(np.where(judged & is_alarm, modes, "").tolist(), stamps, dtype=object),
+        "reason": pd.Series(reasons, stamps, dtype=object),
+        "event": np.where(judged, event, 0),
+    }
+    return pd.DataFrame(table, stamps)
