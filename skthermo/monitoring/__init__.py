@@ -2,5 +2,6 @@
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring.drift import ParameterHistory, track_parameters
 
-__all__ = ["Monitor", "load_monitor"]
+__all__ = ["Monitor", "ParameterHistory", "load_monitor", "track_parameters"]

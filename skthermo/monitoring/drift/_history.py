@@ -320,7 +320,7 @@ class ParameterHistory:
                 yield f"A drift of {group} would look like one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
-                f"The records are {significant(self.years)} years long: season and drift are hardly told apart, and "
+                f"The records are {self.years:.1f} years long: season and drift are hardly told apart, and "
                 "the bands are wide."
             )
         if self.misfit_p_value < self.significance:

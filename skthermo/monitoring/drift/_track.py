@@ -89,12 +89,13 @@ def track_parameters(
     evidence: most structures age in few places, and changes in all groups at once are hardly ever determined. If no
     set explains the trends within their errors, all errors are widened by Birge's ratio. The ``p_value`` of the drift
     compares the evidence of the best group with that in draws of trends without drift. The best set is followed by a
-    Kalman smoother, with the effects of changes as large as theirs; each other group is followed as one that changes
-    beside it, and a group that explains the trends about as well as one of the set in the place of that. Two such groups are named as a set.
+    Kalman smoother, with the effects of changes as large as theirs. Each other group is followed as one that changes
+    beside it, and a group that explains the trends about as well as one of the set in the place of that: the two are
+    named as a set.
 
     See Also
     --------
-    ParameterFilter : The same model day by day.
+    Monitor : Follows drift day by day.
     skthermo.studies.identify_damage : Which damage explains a sudden shift.
 
     Examples
