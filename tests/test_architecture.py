@@ -46,6 +46,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "plotting.comparison": set(),
     "plotting.structures": set(),
     "monitoring.drift": set(),
+    "monitoring.retraining": set(),
     "monitoring.sensors": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
