@@ -27,7 +27,16 @@ MAY_IMPORT = {
     "plotting": {"fem", "surrogate", "updating", "detection", "metrics", "datasets"},
     "studies": {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "plotting"},
 }
-MAY_IMPORT["monitoring"] = {"fem", "preprocessing", "surrogate", "updating", "detection", "metrics", "datasets", "studies"}
+MAY_IMPORT["monitoring"] = {
+    "fem",
+    "preprocessing",
+    "surrogate",
+    "updating",
+    "detection",
+    "metrics",
+    "datasets",
+    "studies",
+}
 MAY_IMPORT["reporting"] = set(MAY_IMPORT)  # on top of all
 WITHIN = {  # what a package within a package may import, beside what its parent may
     "fem.elements": set(),

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from skthermo._arguments import check_flag, check_noise
-from skthermo._arrays import Array, as_random_state, is_real, positive_integer
+from skthermo._arrays import Array, as_random_state, positive_integer
+from skthermo.datasets._ageing import stiffness_factors
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors
 from skthermo.datasets._kw51_truth import (
@@ -24,6 +25,7 @@ from skthermo.datasets._kw51_truth import (
 )
 from skthermo.datasets._kw51_weather import N_HOURS, REFERENCE, draw_weather, smooth_noise
 from skthermo.datasets._results import KW51Campaign
+from skthermo.fem import add_noise
 
 NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
 COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
@@ -71,58 +73,11 @@ def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.c
     return noisy / np.linalg.norm(noisy, axis=2, keepdims=True)
 
 
-def stiffness_factors(
-    index: pd.DatetimeIndex,
-    strengthened: Mapping[str, pd.Series],
-    drift: Mapping[str, float] | None,
-    damage: Mapping[str, float] | None,
-    damage_from: Any,
-) -> pd.DataFrame:
-    """Factor of the stiffness of each changed group in every hour."""
-    years = pd.Series(np.arange(len(index)) / YEAR, index)
-    is_damaged = pd.Series(index >= _onset(index, damage_from), index)
-    lost = {
-        "drift": {group: rate * years for group, rate in _by_group(drift, "drift").items()},
-        "damage": {group: severity * is_damaged for group, severity in _by_group(damage, "damage").items()},
-    }
-    factors = {group: 1 + share for group, share in strengthened.items()}
-    for what, groups in lost.items():
-        for group, share in groups.items():
-            if share.max() >= 1:
-                raise ValueError(f"{what} of group {group!r} takes away {share.max():g} of its stiffness; expected < 1")
-            factors[group] = factors.get(group, 1.0) * (1 - share)
-    return pd.DataFrame(factors, index)
-
-
-def _by_group(values: Mapping[str, float] | None, what: str) -> Mapping[str, float]:
-    """The values, checked."""
-    values = {} if values is None else values
-    groups = truth_model().groups
-    if not isinstance(values, Mapping) or not set(values) <= set(groups):
-        raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
-    for group, value in values.items():
-        if not is_real(value) or not np.isfinite(value):
-            raise ValueError(f"{what} of group {group!r} is {value!r}; expected a finite number")
-    return values
-
-
-def _onset(index: pd.DatetimeIndex, damage_from: Any) -> pd.Timestamp:
-    """When the damage begins."""
-    if damage_from is None:
-        return index[0]
-    try:
-        onset = pd.Timestamp(damage_from)
-        if index[0] <= onset <= index[-1]:
-            return onset
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"damage_from is {damage_from!r}; expected a time without time zone ({error})") from error
-    raise ValueError(f"damage_from is {damage_from!r}; expected a time from {index[0]} to {index[-1]}")
-
-
 def make_kw51_campaign(
     *,
     n_hours: int = N_HOURS,
     noise: ArrayLike = NOISE,
+    correlation: float = 0.0,
     gaps: bool = True,
     retrofit: bool = True,
     drift: Mapping[str, float] | None = None,
@@ -143,6 +98,8 @@ def make_kw51_campaign(
         Number of hourly records from 2018-10-01 00:00 on. With gaps, the first 1236 have no temperature.
     noise : float or array-like of shape (6,), default=(0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
         Relative standard deviation of the Gaussian noise on every frequency.
+    correlation : float, default=0.0
+        Correlation of the noise of neighbouring hours, as in `~skthermo.fem.add_noise`.
     gaps : bool, default=True
         Whether temperatures and modes are missing in blocks.
     retrofit : bool, default=True
@@ -197,8 +154,8 @@ def make_kw51_campaign(
     Raises
     ------
     ValueError
-        If the number of hours is not a positive integer, noise is not a relative standard deviation, a group is
-        unknown, drift or damage leave no stiffness, or the damage begins outside the campaign.
+        If the number of hours is not a positive integer, noise or correlation are impossible, a group is unknown, drift
+        or damage leave no stiffness, or the damage begins outside the campaign.
 
     See Also
     --------
@@ -299,10 +256,10 @@ def make_kw51_campaign(
     index, theta = weather.index, thermal_multipliers(weather)
     progress = progress_of(index, retrofit)
     strengthened = {group: share * progress["stiffness"] for group, share in STIFFENED.items()}
-    factors = stiffness_factors(index, strengthened, drift, damage, damage_from)
+    factors = stiffness_factors(index, YEAR, truth_model().groups, drift, damage, damage_from, strengthened)
     clean, clean_shapes = simulate(theta, progress["mass"], factors, list(sensors.values()) if shapes else None)
 
-    frequencies = clean * (1 + deviations * for_noise.standard_normal(clean.shape))
+    frequencies = add_noise(clean, deviations, correlation=correlation, random_state=for_noise)
     damping = draw_damping(weather["steel"].to_numpy(), for_damping)
     temperatures = weather["steel"].to_frame("tBD31A")
     missing = np.zeros(clean.shape, dtype=bool)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import as_random_state, positive_integer, real_array
+from skthermo.datasets._ageing import stiffness_factors
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
 
@@ -120,7 +122,10 @@ def make_truss_campaign(
     samples_per_year: int = 365,
     samples_per_day: int = 1,
     noise: ArrayLike = 0.01,
+    correlation: float = 0.0,
+    drift: Mapping[str, float] | None = None,
     damage: Mapping[str, float] | None = None,
+    damage_from: Any = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> TrussCampaign:
     """Synthetic monitoring of the 28-bar truss: temperatures, and frequencies by its thermo-mechanical law.
@@ -139,10 +144,18 @@ def make_truss_campaign(
         Records in one daily cycle, n_d. Hourly data have 24, and 8760 in a year.
     noise : float or array-like of shape (6,), default=0.01
         Relative standard deviation of the Gaussian noise on every frequency.
+    correlation : float, default=0.0
+        Correlation of the noise of neighbouring records, as in `~skthermo.fem.add_noise`.
+    drift : mapping of str to float, optional
+        Share of its stiffness that a group loses each year (of ``samples_per_year`` records), steadily from the first
+        record on; a negative share is gained.
     damage : mapping of str to float, optional
-        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``.
+        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``. It multiplies what the
+        drift leaves.
+    damage_from : str, Timestamp or datetime, optional
+        When the damage begins. By default it is there from the first record on.
     random_state : int, RandomState or None, default=None
-        Seed. With the same integer, campaigns that differ in ``damage`` or ``noise`` have the
+        Seed. With the same integer, campaigns that differ in ``damage``, ``drift`` or ``noise`` have the
         same temperatures.
 
     Returns
@@ -153,11 +166,11 @@ def make_truss_campaign(
         temperatures : DataFrame of shape (n_records, 3)
             ``T1`` to ``T3`` in degrees Celsius.
         frequencies : DataFrame of shape (n_records, 6)
-            ``f1`` to ``f6`` in Hz, with noise and damage.
+            ``f1`` to ``f6`` in Hz, with noise, drift and damage.
         clean_frequencies : DataFrame of shape (n_records, 6)
             Without noise.
         theta : DataFrame of shape (n_records, 3)
-            Multipliers of Young's modulus in the three zones.
+            Multipliers of Young's modulus in the three zones: what the weather does.
         model : AffineModel
             The undamaged thermo-mechanical model, whose parameters are the zones and whose
             damage groups are those of `make_truss`.
@@ -165,7 +178,8 @@ def make_truss_campaign(
     Raises
     ------
     ValueError
-        If a count is not a positive integer, or damage or noise are wrong.
+        If a count is not a positive integer, damage, drift, noise or correlation are wrong, or the damage begins
+        outside the campaign.
 
     Examples
     --------
@@ -173,6 +187,16 @@ def make_truss_campaign(
     >>> campaign = make_truss_campaign(random_state=0)
     >>> campaign.temperatures.shape, campaign.frequencies.shape
     ((365, 3), (365, 6))
+
+    Four years in which the bottom chord loses 1 % of its stiffness a year, and 12 % more at once:
+
+    >>> ageing = make_truss_campaign(
+    ...     4, drift={"bottom": 0.01}, damage={"bottom": 0.12}, damage_from="2028-01-01", random_state=0
+    ... )
+    >>> steady = make_truss_campaign(4, random_state=0)
+    >>> lost = 1 - (ageing.clean_frequencies / steady.clean_frequencies)["f1"]
+    >>> lost.groupby(lost.index.year).mean().round(3).tolist()
+    [0.001, 0.004, 0.006, 0.038]
     """
     n_years = positive_integer(n_years, "n_years")
     samples_per_year = positive_integer(samples_per_year, "samples_per_year")
@@ -192,8 +216,12 @@ def make_truss_campaign(
     )
     model = truss_structure().assemble(ZONES, groups=PARAMETERS)
     theta = steel_modulus(temperatures)
-    clean = model.damaged({} if damage is None else damage).frequencies(theta)
-    noisy = add_noise(clean, noise, random_state=random)
+    if drift is None and damage_from is None:
+        clean = model.damaged({} if damage is None else damage).frequencies(theta)
+    else:
+        factors = stiffness_factors(index, samples_per_year, PARAMETERS, drift, damage, damage_from)
+        clean = model.with_damage_parameters(list(factors)).frequencies(np.hstack([theta, factors]))
+    noisy = add_noise(clean, noise, correlation=correlation, random_state=random)
     modes = [f"f{i + 1}" for i in range(model.n_modes)]
     return TrussCampaign(
         temperatures=temperatures,

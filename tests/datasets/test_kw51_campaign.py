@@ -139,6 +139,14 @@ def test_noise_is_relative(campaign):
     assert_allclose((campaign.frequencies / campaign.clean_frequencies - 1).std(), stated, rtol=0.05)
 
 
+def test_lasting_noise_is_as_wide_as_brief_noise(unchanged):
+    lasting = make_kw51_campaign(n_hours=3000, retrofit=False, correlation=0.9, random_state=0)
+    assert_frame_equal(lasting.clean_frequencies, unchanged.clean_frequencies[:3000], check_exact=True)
+    noise = lasting.frequencies / lasting.clean_frequencies - 1
+    assert_allclose(noise.std(), [0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015], rtol=0.2)
+    assert_allclose([noise[mode].autocorr() for mode in noise], 0.9, atol=0.05)
+
+
 def test_correlations_before_the_retrofit(campaign):
     before = campaign.state == "before"
     found = campaign.frequencies[before].corrwith(campaign.temperatures["tBD31A"][before])
@@ -234,6 +242,7 @@ def test_weather_stays_within_the_bounds_of_reduction():
         ({"n_hours": 0}, "n_hours is 0; expected a positive integer"),
         ({"noise": [0.1, 0.2]}, "6 modes"),
         ({"noise": -0.1}, "expected a relative standard deviation"),
+        ({"correlation": -1}, "correlation is -1; expected a number between -1 and 1"),
         ({"damage": {"brace": 0.1}}, "damage is .*'brace'.*expected a mapping whose keys are some of .*'braces'"),
         ({"damage": ["braces"]}, "expected a mapping"),
         ({"damage": {"braces": 1.0}}, "damage of group 'braces' takes away 1 of its stiffness"),

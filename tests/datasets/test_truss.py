@@ -59,6 +59,37 @@ def test_one_seed_gives_one_weather_whatever_the_damage():
     assert not np.array_equal(add_noise(healthy.clean_frequencies, 0.01), healthy.frequencies)
 
 
+def test_drift_and_sudden_damage_are_those_of_the_damaged_model():
+    options = {"samples_per_year": 50, "noise": 0, "random_state": 1}
+    steady, ageing = (
+        make_truss_campaign(3, drift=drift, **options) for drift in (None, {"bottom": 0.02, "top": -0.01})
+    )
+    pd.testing.assert_frame_equal(ageing.theta, steady.theta, check_exact=True)
+    np.testing.assert_allclose(ageing.frequencies.iloc[0], steady.frequencies.iloc[0], rtol=1e-12)
+    lost = {"bottom": 0.02 * 149 / 50, "top": -0.01 * 149 / 50}
+    expected = ageing.model.damaged(lost).frequencies(ageing.theta.iloc[[-1]])
+    np.testing.assert_allclose(ageing.frequencies.iloc[[-1]], expected, rtol=1e-12)
+    onset = ageing.theta.index[100]
+    damaged = make_truss_campaign(
+        3, drift={"bottom": 0.02}, damage={"bottom": 0.12}, damage_from=onset, **options
+    ).frequencies
+    drifting = make_truss_campaign(3, drift={"bottom": 0.02}, **options).frequencies
+    np.testing.assert_array_equal(damaged[:100], drifting[:100])
+    expected = ageing.model.damaged({"bottom": 1 - 0.88 * (1 - 0.02 * 2)}).frequencies(ageing.theta.iloc[[100]])
+    np.testing.assert_allclose(damaged.iloc[[100]], expected, rtol=1e-12)
+    late = make_truss_campaign(3, damage={"top": 0.2}, damage_from=onset, **options).frequencies
+    whole = make_truss_campaign(3, damage={"top": 0.2}, **options).frequencies
+    np.testing.assert_allclose(late[100:], whole[100:], rtol=1e-12)
+
+
+def test_lasting_noise_has_its_spread_and_memory():
+    lasting = make_truss_campaign(2, samples_per_year=10_000, correlation=0.9, random_state=0)
+    noise = lasting.frequencies / lasting.clean_frequencies - 1
+    np.testing.assert_allclose(noise.std(), 0.01, rtol=0.1)
+    for lag in (1, 5):
+        np.testing.assert_allclose([noise[mode].autocorr(lag) for mode in noise], 0.9**lag, atol=0.05)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -66,6 +97,10 @@ def test_one_seed_gives_one_weather_whatever_the_damage():
         ({"samples_per_day": 1.5}, "samples_per_day is 1.5"),
         ({"damage": {"deck": 0.2}}, "unknown damage group 'deck'"),
         ({"noise": -1}, "noise is -1"),
+        ({"correlation": 1.0}, "correlation is 1.0; expected a number between -1 and 1"),
+        ({"drift": {"deck": 0.01}}, "drift is .*'deck'.*expected a mapping whose keys are some of .*'bottom'"),
+        ({"drift": {"top": 0.6}, "n_years": 2}, "drift of group 'top' takes away"),
+        ({"damage": {"top": 0.1}, "damage_from": "2024-12-31"}, "damage_from is '2024-12-31'; expected a time from"),
     ],
 )
 def test_bad_input_is_named(arguments, message):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._bounded_fit import (
     fit_severities,
@@ -14,8 +15,6 @@ from skthermo.studies.identification._bounded_fit import (
     widening_of,
 )
 from skthermo.studies.identification._comparison import Comparison, Part
-from skthermo.studies.identification._frequency_effects import FrequencyEffects
-from skthermo.studies.identification._identify import read_groups
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone, merge_confused
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from skthermo.studies.identification._shift import measured_shift

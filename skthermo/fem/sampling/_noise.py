@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import lfilter
 
-from skthermo._arguments import check_noise
+from skthermo._arguments import check_noise, check_size
 from skthermo._arrays import RandomState, as_random_state, real_array
 
 
@@ -13,6 +14,7 @@ def add_noise(
     frequencies: ArrayLike,
     noise: ArrayLike,
     *,
+    correlation: float = 0.0,
     random_state: RandomState = None,
 ) -> NDArray[np.float64]:
     """Frequencies times (1 + noise * standard Gaussian).
@@ -23,6 +25,9 @@ def add_noise(
         In Hz.
     noise : float or array-like of shape (n_modes,)
         Relative standard deviation; 0 leaves the frequencies as they are.
+    correlation : float, default=0.0
+        Correlation of the noise of neighbouring rows, above -1 and below 1. Noise k rows apart is correlated by its
+        k-th power: a stationary autoregressive process of first order.
     random_state : int, RandomState or None, default=None
         Seed.
 
@@ -34,7 +39,8 @@ def add_noise(
     Raises
     ------
     ValueError
-        If the noise is negative, 1 or more, or of another length, or a number is not real.
+        If the noise is negative, 1 or more, or of another length, the correlation is not between -1 and 1, or a number
+        is not real.
 
     Examples
     --------
@@ -43,6 +49,10 @@ def add_noise(
     >>> noisy = add_noise(np.full((10_000, 2), 4.0), [0.0, 0.01], random_state=0)
     >>> noisy.std(axis=0).round(2)
     array([0.  , 0.04])
+    >>> lasting = add_noise(np.full((10_000, 1), 4.0), 0.01, correlation=0.9, random_state=0)[:, 0]
+    >>> np.corrcoef(lasting[1:], lasting[:-1]).round(1)
+    array([[1. , 0.9],
+           [0.9, 1. ]])
     """
     clean, names = real_array(frequencies, "frequencies"), getattr(frequencies, "columns", None)
     if np.isinf(clean).any():
@@ -50,4 +60,9 @@ def add_noise(
     if clean.ndim != 2:
         raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
     deviation = check_noise(noise, clean.shape[1], names)
-    return clean * (1 + deviation * as_random_state(random_state).standard_normal(clean.shape))
+    memory = check_size(correlation, "correlation", -1, 1, "a number between -1 and 1, such as 0.9")
+    relative = as_random_state(random_state).standard_normal(clean.shape)
+    if memory:
+        relative[1:] *= np.sqrt(1 - memory**2)
+        relative = lfilter([1.0], [1.0, -memory], relative, axis=0)
+    return clean * (1 + deviation * relative)

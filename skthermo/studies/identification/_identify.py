@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag, check_names
+from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_floats, as_random_state, is_real
 from skthermo._frames import check_same_rows
+from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo._validation import check_array
 from skthermo._warnings import warn_each, warn_user, warnings_once
 from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
 from skthermo.studies.identification._findings import findings
-from skthermo.studies.identification._frequency_effects import FrequencyEffects
 from skthermo.studies.identification._identified import IdentifiedDamage
 from skthermo.studies.identification._separability import VISIBLE, errors_alone, merge_confused
 from skthermo.studies.identification._shape_effects import ShapeEffects
@@ -192,37 +192,6 @@ def _of_shapes(
     effects = ShapeEffects.of(fem, theta, groups, dofs)
     change, deviations = effects.measured(shapes, noise)
     return Part(remembered(effects), change, np.diag(deviations**2))
-
-
-def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
-    """Groups of the model by name; several of them where they are joined."""
-    if not hasattr(model, "damaged") or not hasattr(model, "groups"):
-        raise ValueError(f"{model!r} has no damage groups; expected a model that can be damaged, such as AffineModel")
-    known = model.groups
-    if groups is None:
-        members = {name: [name] for name in _not_made_of_others(known)}
-    elif isinstance(groups, Mapping):
-        members = {str(name): [joined] if isinstance(joined, str) else list(joined) for name, joined in groups.items()}
-    else:
-        members = {name: [name] for name in check_names([groups] if isinstance(groups, str) else groups, "groups")}
-    asked = [name for joined in members.values() for name in joined]
-    unknown = [name for name in asked if name not in known]
-    if unknown:
-        raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(known)}")
-    if not asked or not all(members.values()):
-        raise ValueError(f"groups is {groups!r}; expected one or more of {sorted(known)}")
-    return members
-
-
-def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
-    """Groups without those whose terms are all in smaller groups."""
-    terms = {name: set(positions) for name, positions in known.items()}
-    kept = []
-    for name, own in terms.items():
-        smaller = [other for other in terms.values() if other < own]
-        if not smaller or set().union(*smaller) != own:
-            kept.append(name)
-    return kept
 
 
 def _named_as_in_fit(fem: Any, T: Any) -> Any:

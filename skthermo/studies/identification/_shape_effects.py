@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
-from skthermo.studies.identification._frequency_effects import central_differences
+from skthermo._frequency_effects import central_differences
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from scipy import stats
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
+from skthermo._frequency_effects import healthy_frequencies
 from skthermo._times import has_stamps, row_times
-from skthermo.studies.identification._frequency_effects import healthy_frequencies
 
 WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
 

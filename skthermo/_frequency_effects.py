@@ -1,11 +1,12 @@
-"""Effects of damage on the frequencies, averaged over the weather of some records."""
+"""Effects of damage groups on the frequencies, averaged over the weather of some records."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from skthermo._arguments import check_names
 from skthermo._arrays import Array, as_floats, spread_evenly
 
 MOST_ROWS, MOST_SLOW_ROWS = 100, 24
@@ -101,3 +102,34 @@ def central_differences(function: Callable[[Array], Array], severities: Array) -
     """Derivatives of a function by each severity, along a new last axis."""
     steps = STEP * np.eye(len(severities))
     return np.stack([(function(severities + h) - function(severities - h)) / (2 * STEP) for h in steps], axis=-1)
+
+
+def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
+    """Groups of the model by name; several of them where they are joined."""
+    if not hasattr(model, "damaged") or not hasattr(model, "groups"):
+        raise ValueError(f"{model!r} has no damage groups; expected a model that can be damaged, such as AffineModel")
+    known = model.groups
+    if groups is None:
+        members = {name: [name] for name in _not_made_of_others(known)}
+    elif isinstance(groups, Mapping):
+        members = {str(name): [joined] if isinstance(joined, str) else list(joined) for name, joined in groups.items()}
+    else:
+        members = {name: [name] for name in check_names([groups] if isinstance(groups, str) else groups, "groups")}
+    asked = [name for joined in members.values() for name in joined]
+    unknown = [name for name in asked if name not in known]
+    if unknown:
+        raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(known)}")
+    if not asked or not all(members.values()):
+        raise ValueError(f"groups is {groups!r}; expected one or more of {sorted(known)}")
+    return members
+
+
+def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
+    """Groups without those whose terms are all in smaller groups."""
+    terms = {name: set(positions) for name, positions in known.items()}
+    kept = []
+    for name, own in terms.items():
+        smaller = [other for other in terms.values() if other < own]
+        if not smaller or set().union(*smaller) != own:
+            kept.append(name)
+    return kept

@@ -1,0 +1,125 @@
+"""Means of days: what the chain does not explain, and the weather behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, as_floats
+from skthermo._weather import weather_coordinates
+
+MOST_COORDINATES = 3  # of the weather
+LOW, HIGH = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
+
+
+@dataclass(frozen=True)
+class WeatherBasis:
+    """What a chain may have mislearned depends on the weather as a sum of these functions.
+
+    A constant, principal coordinates of the standardised temperatures and their squares, two hinges of the first one,
+    and its mean of the day before.
+    """
+
+    mean: Array
+    directions: Array
+    ends: Array
+
+    @classmethod
+    def of(cls, temperatures: Array) -> WeatherBasis:
+        """The basis for records, (n_records, n_sensors), without gaps in those that count."""
+        known = temperatures[~np.isnan(temperatures).any(axis=1)]
+        scaler, components = (step for _, step in weather_coordinates(known).steps)
+        directions = components.components_[:MOST_COORDINATES] / scaler.scale_
+        centre = scaler.mean_ + components.mean_ * scaler.scale_
+        places = (known - centre) @ directions.T
+        spread = places.std(axis=0)
+        directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
+        first = (known - centre) @ directions[0]
+        return cls(centre, directions, np.quantile(first, [LOW, HIGH]))
+
+    @property
+    def size(self) -> int:
+        """Number of functions."""
+        return 2 * len(self.directions) + 4
+
+    def values(self, temperatures: Array) -> Array:
+        """All functions but the last, which is that of the day before, (n_records, size - 1)."""
+        places = (temperatures - self.mean) @ self.directions.T
+        first, (low, high) = places[:, :1], self.ends
+        hinges = [np.maximum(low - first, 0.0), np.maximum(first - high, 0.0)]
+        return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
+
+
+@dataclass(frozen=True)
+class DailyMeans:
+    """Daily means of the logarithm of measured over predicted frequencies.
+
+    ``values`` and ``counts``, (n_days, n_modes), are means and numbers of records; ``basis``, (n_days, n_modes, size),
+    is the mean of the `WeatherBasis` over the records of each mode. ``days`` begin every ``freq``.
+    """
+
+    days: pd.DatetimeIndex
+    values: Array
+    counts: Array
+    basis: Array
+
+    @classmethod
+    def of(
+        cls,
+        ratios: Array,
+        temperatures: Array,
+        times: pd.DatetimeIndex,
+        basis: WeatherBasis,
+        days: pd.DatetimeIndex,
+        before: float = np.nan,
+    ) -> DailyMeans:
+        """Means of records: ln(measured / predicted), (n_records, n_modes), and the temperatures.
+
+        ``before`` is the first coordinate of the weather on the day before the first, if it is known.
+        """
+        of_day = days.searchsorted(times, side="right") - 1
+        n_days, n_modes = len(days), ratios.shape[1]
+        functions = basis.values(temperatures)
+        known = ~np.isnan(functions).any(axis=1)
+        usual = _means(functions[known, 1], of_day[known], n_days)
+        earlier = np.append(before, usual[:-1])
+        earlier = np.where(np.isnan(earlier), np.where(np.isnan(usual), 0.0, usual), earlier)
+        values, counts = np.full((n_days, n_modes), np.nan), np.zeros((n_days, n_modes))
+        means = np.zeros((n_days, n_modes, basis.size))
+        for mode in range(n_modes):
+            rows = known & ~np.isnan(ratios[:, mode])
+            counts[:, mode] = np.bincount(of_day[rows], minlength=n_days)
+            values[:, mode] = _means(ratios[rows, mode], of_day[rows], n_days)
+            for column in range(basis.size - 1):
+                means[:, mode, column] = _means(functions[rows, column], of_day[rows], n_days)
+            means[:, mode, -1] = earlier
+        return cls(days, values, counts, np.nan_to_num(means))
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which modes were measured on which days."""
+        return ~np.isnan(self.values)
+
+
+def _means(values: Array, of_day: NDArray[np.intp], n_days: int) -> Array:
+    """Mean of the values of each day, NaN where there is none."""
+    number = np.bincount(of_day, minlength=n_days)
+    sums = np.bincount(of_day, weights=values, minlength=n_days)
+    return np.divide(sums, number, out=np.full(n_days, np.nan), where=number > 0)
+
+
+def calendar(times: pd.DatetimeIndex, freq: Any) -> pd.DatetimeIndex:
+    """Beginnings of the days from the first record to the last."""
+    first = times.min().floor("D") if pd.Timedelta(freq) >= pd.Timedelta("1D") else times.min().floor(freq)
+    return pd.date_range(first, times.max(), freq=freq, name=times.name)
+
+
+def log_ratios(fem: Any, F: Any, predicted: Any) -> Array:
+    """The logarithm of measured over predicted frequencies; NaN where either is missing."""
+    measured = as_floats(F)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(np.where(measured > 0, measured, np.nan) / as_floats(predicted))

@@ -1,0 +1,188 @@
+"""Which groups' drift explains the trends of the modes, and what could as well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+
+N_SHAPES = 5  # a line, and the leading components of a random walk beside it
+WALKS = np.array([0.0, 0.002, 0.004, 0.008, 0.016, 0.032])
+"""Standard deviations of what a random walk adds to ln stiffness in a year that are tried."""
+
+RATE = 0.03  # standard deviation of a yearly change of ln stiffness of a group that drifts
+PRIOR = {1: 0.8, 2: 0.2}
+"""Prior probability that as many groups drift, if any does."""
+
+AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not told apart: a factor of 20
+NOTABLE = 0.05  # change of a group over the records that should be seen, and told from that of others
+DRAWS = 999
+
+
+@dataclass(frozen=True)
+class ModeTrends:
+    """How ln frequency of each mode went over the records, apart from the weather, and its covariance.
+
+    Coefficients of `shapes_of_time`, mode by mode; ``slopes``, (n_modes, n_groups), are the effects of the groups.
+    """
+
+    mean: Array
+    covariance: Array
+    slopes: Array
+    years: float
+
+    @property
+    def n_groups(self) -> int:
+        """Number of groups."""
+        return self.slopes.shape[1]
+
+    def explained_by(self, groups: Sequence[int], walk: float) -> Array:
+        """Covariance of the coefficients that drift of some groups gives, beside that of their errors."""
+        number = len(self.mean) // len(self.slopes)
+        waves = (np.arange(1, number) - 0.5) * np.pi
+        variances = np.append((RATE * self.years) ** 2, walk**2 * self.years / waves**2)
+        effects = self.slopes[:, list(groups)]
+        return np.kron(effects @ effects.T, np.diag(variances))
+
+    def widening(self, groups: Sequence[int]) -> float:
+        """How many times larger a covariance would make the misfit of some groups' drift likely; at least 1."""
+        number = len(self.mean) // len(self.slopes)
+        design = np.kron(self.slopes[:, list(groups)], np.eye(number))
+        root = np.linalg.cholesky(self.covariance)
+        columns, target = np.linalg.solve(root, design), np.linalg.solve(root, self.mean)
+        rank = int(np.linalg.matrix_rank(columns))
+        rest = len(target) - rank
+        misfit = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+        return max(float(misfit @ misfit) / rest, 1.0) if rest > 0 else 1.0
+
+    def widened(self, factor: float) -> ModeTrends:
+        """The same trends with a larger covariance."""
+        return ModeTrends(self.mean, factor * self.covariance, self.slopes, self.years)
+
+    def information(self) -> Array:
+        """Information of the linear trend of each group and pair of them, (n_groups, n_groups)."""
+        number = len(self.mean) // len(self.slopes)
+        design = np.kron(self.slopes, np.eye(number)[:, :1])
+        return design.T @ np.linalg.solve(self.covariance, design)
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """Sets of one or two groups whose drift may explain the trends, the best first.
+
+    ``evidence`` is the logarithm of how many times likelier the trends are with each than without any drift, and
+    ``walk`` the standard deviation of each set's random walk in a year. ``p_value`` is the probability that trends
+    without drift give one group as much evidence.
+    """
+
+    sets: list[tuple[int, ...]]
+    evidence: Array
+    walk: Array
+    p_value: float
+    widening: float
+    confused: list[tuple[int, ...]]
+    unseen: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, trends: ModeTrends, freedom: float, random: np.random.RandomState) -> Explanations:
+        """Weigh all sets of one or two groups; draws give the probability by chance."""
+        unseen = _structure(trends)[1]
+        seen = [group for group in range(trends.n_groups) if group not in unseen] or list(range(trends.n_groups))
+        singles = [(group,) for group in seen]
+        first = max(singles, key=lambda one: max(_evidences(trends, one)))
+        widening = trends.widening(first)
+        if len(seen) > 1:
+            pairs = [(*first, group) for group in seen if group != first[0]]
+            widening = min(widening, min(trends.widening(pair) for pair in pairs))
+        trends = trends.widened(widening)
+        sets = [*singles, *combinations(seen, 2)]
+        table = np.array([_evidences(trends, one) for one in sets])
+        sizes = np.array([len(one) for one in sets])
+        prior = np.array([np.log(PRIOR[size] / (sizes == size).sum()) for size in sizes])
+        evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(WALKS))
+        weights = np.exp(table - table.max(axis=1, keepdims=True))
+        walk = np.sqrt((weights * WALKS**2).sum(axis=1) / weights.sum(axis=1))
+        order = np.argsort(-(evidence + prior), kind="stable")
+        observed = table[: len(singles)].max()
+        p_value = _chance(trends, singles, observed, freedom, random)
+        confused, unseen = _structure(trends)
+        found = evidence + prior
+        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, confused, unseen)
+
+    @property
+    def probabilities(self) -> Array:
+        """Probability of each set, if any drifts."""
+        weights = np.exp(self.evidence - self.evidence.max())
+        return weights / weights.sum()
+
+    def instead(self, group: int) -> list[int]:
+        """Groups that explain the trends about as well in the place of one of the best set."""
+        best = self.sets[0]
+        others = set(best) - {group}
+        rivals = [
+            next(iter(set(one) - others))
+            for one, evidence in zip(self.sets, self.evidence, strict=True)
+            if len(one) == len(best) and others < set(one) and self.evidence[0] - evidence <= AS_LIKELY
+        ]
+        return sorted({group, *rivals} - others)
+
+
+def _evidences(trends: ModeTrends, groups: Sequence[int]) -> list[float]:
+    """Logarithm of how many times likelier the trends are with drift of some groups than without, for each walk."""
+    found = []
+    for walk in WALKS:
+        quadratic, logarithm = _form(trends, groups, walk)
+        found.append(float(trends.mean @ quadratic @ trends.mean - logarithm) / 2)
+    return found
+
+
+def _form(trends: ModeTrends, groups: Sequence[int], walk: float) -> tuple[Array, float]:
+    """Matrix of the quadratic form, and the logarithm of the determinants' ratio, of the evidence."""
+    total = trends.covariance + trends.explained_by(groups, walk)
+    precisions = np.linalg.inv(trends.covariance), np.linalg.inv(total)
+    logarithm = np.linalg.slogdet(total)[1] - np.linalg.slogdet(trends.covariance)[1]
+    return precisions[0] - precisions[1], logarithm
+
+
+def _chance(
+    trends: ModeTrends,
+    singles: Sequence[Sequence[int]],
+    observed: float,
+    freedom: float,
+    random: np.random.RandomState,
+) -> float:
+    """Probability that errors alone give as much evidence, from draws."""
+    root = np.linalg.cholesky(trends.covariance)
+    draws = random.standard_normal((DRAWS, len(root))) @ root.T
+    draws *= np.sqrt(freedom / random.chisquare(freedom, size=(DRAWS, 1)))
+    largest = np.full(DRAWS, -np.inf)
+    for groups in singles:
+        for walk in WALKS:
+            quadratic, logarithm = _form(trends, groups, walk)
+            largest = np.maximum(largest, (((draws @ quadratic) * draws).sum(axis=1) - logarithm) / 2)
+    return float((1 + (largest >= observed).sum()) / (1 + DRAWS))
+
+
+def _structure(trends: ModeTrends) -> tuple[list[tuple[int, ...]], NDArray[np.intp]]:
+    """Sets of groups of which a notable drift in one looks like drift of another, and groups that are not seen."""
+    information = trends.information()
+    own = np.diag(information)
+    seen = own * NOTABLE**2 >= 4.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = NOTABLE**2 * (own[:, np.newaxis] - information**2 / own) < 4.0
+    alike = (apart | apart.T) & seen & seen[:, np.newaxis]
+    left, sets = set(np.flatnonzero(seen).tolist()), []
+    while left:
+        found, new = set(), {min(left)}
+        while new:
+            found |= new
+            new = set(np.flatnonzero(alike[sorted(new)].any(axis=0)).tolist()) - found
+        left -= found
+        if len(found) > 1:
+            sets.append(tuple(sorted(found)))
+    return sets, np.flatnonzero(~seen)

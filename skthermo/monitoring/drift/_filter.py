@@ -1,0 +1,264 @@
+"""Stiffness of groups, followed day by day."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import check_same_rows
+from skthermo._frequency_effects import FrequencyEffects, read_groups
+from skthermo._times import has_stamps
+from skthermo._validation import check_is_fitted
+from skthermo._warnings import warnings_once
+from skthermo.monitoring.drift._daily import DailyMeans, WeatherBasis, calendar, log_ratios
+from skthermo.monitoring.drift._kalman import DailySteps, Observation, State, absorb
+from skthermo.monitoring.drift._noise import DailyNoise
+
+YEAR = pd.Timedelta(days=365.25)
+RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
+WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
+MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has mislearned, for each function of weather
+
+
+@dataclass(frozen=True)
+class ParameterState:
+    """What a `ParameterFilter` knows at the end of a day.
+
+    Parameters
+    ----------
+    day : Timestamp
+        Beginning of the last day.
+    mean, covariance : ndarray
+        Of all states given the days so far.
+    weather : float
+        First coordinate of that day's mean weather; NaN if it is not known.
+    distance : float
+        Squared Mahalanobis distance of the day's frequencies from what was foretold; NaN without any.
+    n_modes : int
+        Number of modes in that distance.
+    """
+
+    day: pd.Timestamp
+    mean: Array
+    covariance: Array
+    weather: float = float("nan")
+    distance: float = float("nan")
+    n_modes: int = 0
+
+
+@dataclass(frozen=True)
+class DailyRecords:
+    """How daily means are made of records, for a chain: its predictions, weather and groups."""
+
+    fem: Any
+    basis: WeatherBasis
+    freq: str
+
+    @classmethod
+    def of(cls, fem: Any, T: Any, freq: str) -> DailyRecords:
+        return cls(fem, WeatherBasis.of(filled(fem, T)), freq)
+
+    def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
+        """Daily means of records; T may begin with earlier rows than F, which lags need."""
+        with warnings_once():
+            predicted = as_floats(self.fem.predict(T))[-len(F) :]
+        ratios = log_ratios(self.fem, F, predicted)
+        return DailyMeans.of(ratios, filled(self.fem, T)[-len(F) :], F.index, self.basis, days, before)
+
+
+def filled(fem: Any, T: Any) -> Array:
+    """Temperatures with gaps filled from the other sensors."""
+    return fem.sensors_.fill(T)[0]
+
+
+@dataclass(frozen=True)
+class GroupEffects:
+    """Relative change of each mode's frequency per relative change of the stiffness of each group.
+
+    ``slopes`` are (n_modes, n_groups), averaged over the weather of some records; ``members`` are the model's groups
+    behind each.
+    """
+
+    slopes: Array
+    members: Mapping[str, Sequence[str]]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the groups."""
+        return list(self.members)
+
+    @classmethod
+    def of(cls, fem: Any, T: Any, F: Any, groups: Any) -> GroupEffects:
+        """Effects at the parameters that the chain gives for records."""
+        members = read_groups(fem.model, groups)
+        of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
+        with warnings_once():
+            theta = as_floats(fem.predict_parameters(T))
+        _, slopes = FrequencyEffects.of(fem, theta, as_floats(F), of_model)(np.zeros(len(of_model)))
+        incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])
+        return cls(-slopes @ incidence, members)
+
+
+@dataclass(frozen=True)
+class ParameterFilter:
+    """Follows the stiffness of groups day by day, apart from weather and noise.
+
+    It is made by `of` from records of a healthy baseline. The stiffness is relative to the baseline's mean.
+
+    Parameters
+    ----------
+    records : DailyRecords
+        How daily means are made of records.
+    effects : GroupEffects
+        What the groups do to the frequencies.
+    noise : DailyNoise
+        How daily means scatter.
+    start_ : ParameterState
+        What is known at the end of the baseline.
+    """
+
+    records: DailyRecords
+    effects: GroupEffects
+    noise: DailyNoise
+    start_: ParameterState = field(repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        fem: Any,
+        T: pd.DataFrame,
+        F: pd.DataFrame,
+        groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+        *,
+        freq: str = "1D",
+    ) -> ParameterFilter:
+        """Learn from a baseline how daily means depend on the weather and scatter."""
+        check_records(fem, T, F)
+        records = DailyRecords.of(fem, T, freq)
+        daily = records.means(T, F, calendar(F.index, freq))
+        effects = GroupEffects.of(fem, T, F, groups)
+        noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
+        n_groups, n_modes = len(effects.names), len(noise.memory)
+        span = len(daily.days) * length_of(freq)
+        sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
+        covariance = np.diag(np.repeat([0.0, RATE**2, MISLEARNED**2, 0.0], sizes))
+        levels, slopes = np.arange(n_groups), n_groups + np.arange(n_groups)
+        covariance[levels, levels] = (RATE * span / 2) ** 2
+        covariance[levels, slopes] = covariance[slopes, levels] = -(RATE**2) * span / 2
+        covariance[-n_modes:, -n_modes:] = noise.stationary
+        before = daily.days[0] - pd.tseries.frequencies.to_offset(freq)
+        found = cls(records, effects, noise, ParameterState(before, np.zeros(len(covariance)), covariance))
+        return replace(found, start_=found.advanced(found.start_, daily))
+
+    def start(self) -> ParameterState:
+        """What is known at the end of the baseline."""
+        return self.start_
+
+    def advance(self, state: ParameterState, T: Any, F: Any, *, absorb: bool = True) -> ParameterState:
+        """The state at the end of the day of some records; of the next day if there are none."""
+        step = pd.tseries.frequencies.to_offset(self.records.freq)
+        if not len(F):
+            return self._step(replace(state, day=state.day + step, weather=np.nan), None, absorb)
+        days = pd.date_range(state.day, F.index.max(), freq=self.records.freq)[1:]
+        if not len(days) or F.index.min() < days[0]:
+            raise ValueError(f"records begin at {F.index.min()}; expected times after the day of {state.day:%Y-%m-%d}")
+        return self.advanced(state, self.records.means(T, F, days, state.weather), absorb)
+
+    def advanced(self, state: ParameterState, daily: DailyMeans, absorb: bool = True) -> ParameterState:
+        """The state at the end of the last of some days."""
+        for number, day in enumerate(daily.days):
+            known = daily.basis[number, :, 1][daily.known[number]]
+            weather = float(known[0]) if len(known) else np.nan
+            observed = observation(daily, number, self.noise, self.effects.slopes)
+            state = self._step(replace(state, day=day, weather=weather), observed, absorb)
+        return state
+
+    def estimate(self, state: ParameterState) -> pd.DataFrame:
+        """Change of each group's stiffness since the baseline, and yearly, with standard errors.
+
+        Returns
+        -------
+        DataFrame
+            One row a group: ``change``, ``standard_error``, ``per_year`` and ``per_year_error``, as natural logarithms
+            of the relative stiffness.
+        """
+        n = len(self.effects.names)
+        errors = np.sqrt(np.diag(state.covariance)[: 2 * n])
+        columns = {
+            "change": state.mean[:n],
+            "standard_error": errors[:n],
+            "per_year": state.mean[n : 2 * n],
+            "per_year_error": errors[n:],
+        }
+        return pd.DataFrame(columns, index=pd.Index(self.effects.names, name="group"))
+
+    def frequency_drift(self, state: ParameterState) -> Array:
+        """Shift of ln frequency of each mode that the followed drift causes, (n_modes,)."""
+        return self.effects.slopes @ state.mean[: len(self.effects.names)]
+
+    def frequency_covariance(self, state: ParameterState) -> Array:
+        """Covariance of `frequency_drift`, (n_modes, n_modes)."""
+        n = len(self.effects.names)
+        return self.effects.slopes @ state.covariance[:n, :n] @ self.effects.slopes.T
+
+    def _step(self, state: ParameterState, day: Observation | None, learns: bool) -> ParameterState:
+        """One day further; what is not learned from has no effect but on the distance."""
+        n = len(self.effects.names)
+        length = length_of(self.records.freq)
+        steps = DailySteps(length, WALK**2 * length * np.eye(n), self.noise.memory, self.noise.renewal)
+        predicted = steps.predict(State(state.mean, state.covariance))
+        if day is None or not len(day.values):
+            return replace(state, mean=predicted.mean, covariance=predicted.covariance, distance=np.nan, n_modes=0)
+        known, update = absorb(predicted, day)
+        mean, covariance = known if learns else predicted
+        return replace(state, mean=mean, covariance=covariance, distance=update.distance, n_modes=len(day.values))
+
+
+def check_records(fem: Any, T: Any, F: Any) -> None:
+    """Raise an error for what is no fitted chain, or no records of it with times."""
+    if isinstance(fem, type) or not hasattr(fem, "simulator_"):
+        raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
+    check_is_fitted(fem)
+    for what, table in (("temperatures", T), ("frequencies", F)):
+        if not has_stamps(table):
+            raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
+    check_same_rows(T, F, ("temperatures", "frequencies"))
+    if list(F.columns) != fem.mode_names_:
+        raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
+
+
+def length_of(freq: str) -> float:
+    """Years between two daily means."""
+    return pd.Timedelta(freq) / YEAR
+
+
+def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array) -> Observation:
+    """The daily mean of a day as the states show in it: levels and slopes of groups, constants, disturbances."""
+    present = np.flatnonzero(daily.known[number])
+    n_modes, n_groups = slopes.shape
+    size = daily.basis.shape[2]
+    design = np.zeros((len(present), 2 * n_groups + n_modes * size + n_modes))
+    design[:, :n_groups] = slopes[present]
+    for row, mode in enumerate(present):
+        first = 2 * n_groups + mode * size
+        design[row, first : first + size] = daily.basis[number, mode]
+        design[row, mode - n_modes] = 1.0
+    return Observation(daily.values[number, present], design, noise.of_day(daily.counts[number], present))
+
+
+def with_time(daily: DailyMeans, n_shapes: int) -> Array:
+    """The basis of daily means with shapes of time beside it, (n_days, n_modes, size + n_shapes)."""
+    shapes = np.broadcast_to(shapes_of_time(len(daily.days), n_shapes)[:, np.newaxis], (*daily.values.shape, n_shapes))
+    return np.concatenate([daily.basis, shapes], axis=2)
+
+
+def shapes_of_time(n_days: int, number: int) -> Array:
+    """A line from 0 to 1, and the leading components of a random walk of the same length, (n_days, number)."""
+    share = np.arange(n_days) / max(n_days - 1, 1)
+    waves = [np.sqrt(2) * np.sin((k - 0.5) * np.pi * share) for k in range(1, number)]
+    return np.column_stack([share, *waves])
