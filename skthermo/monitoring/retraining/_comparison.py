@@ -34,7 +34,8 @@ class Judged:
     def ratio(self, records: pd.DataFrame) -> Array:
         """Damage index over threshold."""
         with without_warnings():
-            return -np.asarray(self.detector.score_samples(records[list(self.detector.feature_names_in_)])) / self.threshold
+            scores = self.detector.score_samples(records[list(self.detector.feature_names_in_)])
+        return -np.asarray(scores) / self.threshold
 
     def own_ratio(self, times: pd.DatetimeIndex) -> Array:
         """The same of records of its baseline, each judged by the others."""
@@ -45,8 +46,8 @@ class Judged:
 class Comparison:
     """The old detector and the one that may follow it, on the records that the old one has not learned from.
 
-    ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes found),
-    its ``standard_error`` from blocks of time, and ``worse``: whether the new one is clearly worse in it.
+    ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its
+    ``standard_error`` from blocks of time, and ``worse``: whether the new one is clearly worse in it.
     """
 
     table: pd.DataFrame
@@ -116,9 +117,9 @@ def _weeks(records: pd.DataFrame) -> pd.DataFrame:
 
 
 def smallest_changes(judged: Judged, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
-    """By how much each mode has to be lowered until half of the records are above the threshold, (n_modes, n_weeks + 1).
+    """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 
-    Relative, for each week and, last, for all records; at most some number of whole weeks are taken.
+    For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
     """
     records = _weeks(records)
     blocks = blocks_of(records.index)

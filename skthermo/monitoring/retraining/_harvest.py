@@ -17,8 +17,8 @@ MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a ch
 class Harvest:
     """Records that may train, and a table of what was left out and why.
 
-    ``excluded`` has a row for each reason: ``start``, ``end`` (NaT: until the last record), ``columns`` (all, or the one
-    whose values alone are left out), ``n_records`` and ``reason``.
+    ``excluded`` has a row for each reason: ``start``, ``end`` (NaT: until the last record), ``columns`` (all, or the
+    one whose values alone are left out), ``n_records`` and ``reason``.
     """
 
     records: pd.DataFrame

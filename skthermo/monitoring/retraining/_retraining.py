@@ -41,11 +41,12 @@ class Retraining:
         What the engineer should know besides.
     table : DataFrame
         For a refit, the old and the new detector on the records that the old one has not learned from, with columns
-        ``old``, ``new``, ``difference``, ``standard_error`` (of the difference, from weeks) and ``worse``: records above
-        the threshold (share), median index over threshold, smallest change found (relative frequency change of one mode
+        ``old``, ``new``, ``difference``, ``standard_error`` (of the difference, from weeks) and ``worse``: records
+        above the threshold (share), median index over threshold, smallest change found (relative frequency change of one mode
         by which half of the records come above the threshold; differences are of logarithms), records in unknown
         weather (share), and peaks of past events over the threshold. For a new baseline, by mode: ``change`` of the
-        level (relative), its ``standard_error``, ``n_records`` since, and the smallest change found, ``old`` and ``new``.
+        level (relative), its ``standard_error``, ``n_records`` since, and the smallest change found, ``old`` and
+        ``new``.
     excluded : DataFrame
         What did not train: ``start``, ``end`` (NaT: up to the last record), ``columns``, ``n_records`` and ``reason``.
     baseline : DataFrame or None
@@ -134,9 +135,8 @@ def retrained(
         }
     )
     accepted = force or not reasons
-    return Retraining(
-        "refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, baseline, prior, new.detector, shift
-    )
+    learned = {"baseline": baseline, "prior": prior, "detector": new.detector, "shift": shift}
+    return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) -> Retraining:
@@ -166,9 +166,8 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
     ]
     ratio = float(np.exp(np.nanmean(np.log(found[1] / found[0])))) if np.isfinite(found).any() else np.nan
     notes.append(f"the smallest change found is {ratio:.2f} times that of the baseline before")
-    return Retraining(
-        "new baseline", True, (), tuple(notes), table, harvest.excluded, baseline, prior if len(moved) else None, new.detector
-    )
+    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "detector": new.detector}
+    return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
 
 
 def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
@@ -205,7 +204,7 @@ def _too_few(records: pd.DataFrame) -> str:
         return "there are no records since the baseline that may train"
     n_weeks = blocks_of(records.index).max() + 1
     if n_weeks < FEWEST_WEEKS:
-        return f"{counted(len(records), 'new record')} in {n_weeks} weeks; expected {FEWEST_WEEKS} weeks or more to compare"
+        return f"{counted(len(records), 'new record')} in {counted(n_weeks, 'week')}; expected {FEWEST_WEEKS} or more"
     return ""
 
 

@@ -121,8 +121,8 @@ class Shift:
         """The change in words."""
         worst = self.worst
         return (
-            f"{worst} by {100 * self.change[worst]:+.2g} +- {100 * self.standard_error[worst]:.1g} %, all modes together "
-            f"{self.size:.2g} standard deviations of a record (probability by chance {self.p_value:.1g})"
+            f"{worst} by {100 * self.change[worst]:+.2g} +- {100 * self.standard_error[worst]:.1g} %, all modes "
+            f"together {self.size:.2g} standard deviations of a record (probability by chance {self.p_value:.1g})"
         )
 
 
