@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,11 @@ from skthermo.monitoring.retraining._blocks import blocks_of
 from skthermo.monitoring.retraining._comparison import Comparison, Judged, smallest_changes
 from skthermo.monitoring.retraining._harvest import Harvest, margin_of
 from skthermo.monitoring.retraining._new_level import NewLevel
-from skthermo.monitoring.retraining._shift import Shift, WeatherFree, years_of
+from skthermo.monitoring.retraining._shift import Changes, WeatherFree
 
 FEWEST_WEEKS = 3  # of new records, from which standard errors of a comparison can be told
+
+YEAR = pd.Timedelta("365.25D")
 
 Limit = Callable[[pd.Series], float]
 """The threshold of a monitor, from out-of-fold indices of a baseline."""
@@ -42,8 +44,8 @@ class Retraining:
     table : DataFrame
         For a refit, the old and the new detector on the records that the old one has not learned from, with columns
         ``old``, ``new``, ``difference``, ``standard_error`` (of the difference, from weeks) and ``worse``: records
-        above the threshold (share), median index over threshold, smallest change found (relative frequency change of one mode
-        by which half of the records come above the threshold; differences are of logarithms), records in unknown
+        above the threshold (share), median index over threshold, smallest change found (relative change of one mode by
+        which half of the records come above the threshold; differences are of logarithms), records in unknown
         weather (share), and peaks of past events over the threshold. For a new baseline, by mode: ``change`` of the
         level (relative), its ``standard_error``, ``n_records`` since, and the smallest change found, ``old`` and
         ``new``.
@@ -109,29 +111,31 @@ def retrained(
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
     new = _candidate(monitor, baseline, limit)
     free = WeatherFree.of(monitor.detector, baseline, targets)
-    step, drift = _changes(free, baseline, monitor, harvest.records.index[0])
+    changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * baseline[targets].mean()
     found = Comparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
-    reasons = [f"clearly worse: {name}" for name in found.worse()]
-    if step.matters:
-        reasons.insert(
-            0,
-            "the new records are not those of the baseline's structure: weather apart they differ in "
-            f"{step.sentence()}; a detector that learned them would no longer see that change",
+    reasons, notes = [f"clearly worse: {name}" for name in found.worse()], []
+    clearest = changes.clearest
+    if clearest.matters:
+        what = "the new records are not those of the baseline's structure"
+        reasons.insert(0, f"{what}: {clearest.sentence()}; a detector that learned them would not see that change")
+    elif clearest.is_real:
+        notes.append(f"there is a small change: {clearest.sentence()}")
+    if np.isnan(clearest.p_value):
+        notes.append("there are too few weeks to tell whether the new records differ from the baseline, weather apart")
+    elif changes.step.is_hidden:
+        error = 100 * changes.step.standard_error.median()
+        notes.append(
+            "the new records have hardly any weather in common with the baseline: a change between the two of up to "
+            f"{2 * error:.2g} % of a frequency could not be told from weather"
         )
-    notes = []
-    if np.isnan(step.p_value):
-        notes.append("too few weeks to tell whether the new records differ from the baseline, weather apart")
-    elif step.is_real and not step.matters:
-        notes.append(f"the new records differ a little from the baseline, weather apart: {step.sentence()}")
-    if drift.is_real:
-        notes.append(f"over all records the frequencies drift a year, weather apart: {drift.sentence()}")
+    years = (baseline.index[-1] - baseline.index[0]) / YEAR
     shift = pd.DataFrame(
         {
-            "change": step.change,
-            "standard_error": step.standard_error,
-            "per_year": drift.change,
-            "per_year_error": drift.standard_error,
+            "change": changes.step.change,
+            "standard_error": changes.step.standard_error,
+            "per_year": changes.trend.change / years,
+            "per_year_error": changes.trend.standard_error / years,
         }
     )
     accepted = force or not reasons
@@ -225,17 +229,13 @@ def _candidate(monitor: Any, baseline: pd.DataFrame, limit: Limit) -> Judged:
     return Judged(detector, limit(index), baseline, index)
 
 
-def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> tuple[Shift, Shift]:
-    """The step from the baseline to new records, and the drift over all, without events acknowledged as harmless."""
+def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> Changes:
+    """What weather does not explain of the records, events left out that were acknowledged as harmless."""
     events, known = monitor.events_, np.zeros(len(baseline), dtype=bool)
     for event in events[events["harmless"]].itertuples():
         known |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
-    rows = baseline[~known]
-    weather = rows.drop(columns=list(monitor.targets_))
-    some = WeatherFree(free.residuals[~known], free.level, free.compensator, free.block)
-    courses = (rows.index >= since).astype(float), years_of(rows.index)
-    step, drift = (Shift.along(course, some, weather) for course in courses)
-    return step, drift
+    rest = replace(free, residuals=free.residuals[~known])
+    return Changes.of(rest, baseline[~known].drop(columns=list(monitor.targets_)), since)
 
 
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,17 @@ from scipy.stats import f as f_law
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._arrays import Array
+from skthermo._formatting import probability_text
 from skthermo._gaussian import Gaussian
 from skthermo._warnings import without_warnings
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
 from skthermo.surrogate import TemperatureMapper
 
-YEAR = pd.Timedelta("365.25D")
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
 MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
+HIDDEN = 0.5  # the same of a standard error, from which a change may hide behind weather that is new
+N_STEPS = 8  # days of the new period at which a change may have begun
 
 
 @dataclass(frozen=True)
@@ -66,14 +68,16 @@ def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
 
 @dataclass(frozen=True)
 class Shift:
-    """A change of frequencies that weather does not explain.
+    """A change of frequencies along a course in time, from 0 to 1, that weather does not explain.
 
     ``change`` and ``standard_error`` are relative, by mode; ``size`` is the length of the change in standard deviations
     of single records, ``p_value`` the probability of one as large if nothing has changed (NaN with too few weeks).
     """
 
+    what: str
     change: pd.Series
     standard_error: pd.Series
+    scatter: pd.Series
     size: float
     p_value: float
 
@@ -88,42 +92,85 @@ class Shift:
         return self.is_real and self.size > MATTERS
 
     @property
-    def worst(self) -> Any:
-        """The mode that it is clearest in."""
-        return (self.change / self.standard_error).abs().idxmax()
+    def is_hidden(self) -> bool:
+        """Whether the weather of the new records is so new that a change could hardly be told from it."""
+        return bool((self.standard_error / self.scatter).median() > HIDDEN)
 
     @classmethod
-    def along(cls, course: Array, free: WeatherFree, weather: pd.DataFrame) -> Shift:
-        """The change per unit of a course in time (a step, or years), beside what the weather explains of both.
+    def along(cls, courses: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[Shift]:
+        """The change along each course, beside what the weather explains of it and of the frequencies.
 
         Residuals are regressed on what weather does not tell of the course, so that a season that only one period has
         is not taken for a change. Standard errors are those of blocks of time, which may depend within.
         """
-        left, values = _beside(weather, course), free.residuals.to_numpy()
+        left = _beside(weather, courses)
+        return [cls._of(what, one, free) for what, one in zip(courses, left.T, strict=True)]
+
+    @classmethod
+    def _of(cls, what: str, left: Array, free: WeatherFree) -> Shift:
+        values = free.residuals.to_numpy()
         known = ~np.isnan(values) & ~np.isnan(left)[:, np.newaxis]
-        x, y = np.where(known, left[:, np.newaxis], 0.0), np.where(known, values, 0.0)
-        y = np.where(known, y - y.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
-        x = np.where(known, x - x.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
+        counts = np.maximum(known.sum(axis=0), 1)
+        x, y = (np.where(known, part, 0.0) for part in (left[:, np.newaxis], values))
+        x, y = (np.where(known, part - part.sum(axis=0) / counts, 0.0) for part in (x, y))
         weight = np.maximum((x**2).sum(axis=0), 1e-300)
         change = (x * y).sum(axis=0) / weight
         blocks = blocks_of(free.residuals.index, free.block)
-        scores = np.zeros((blocks.max() + 1, values.shape[1]))
+        n_blocks = blocks.max() + 1
+        scores = np.zeros((n_blocks, len(change)))
         np.add.at(scores, blocks, x * (y - x * change) / weight)
-        n_blocks = len(scores)
         covariance = scores.T @ scores * n_blocks / max(n_blocks - 1, 1)
-        scatter = Gaussian.of(np.where(known, y - x * change, np.nan))
-        size = float(Gaussian(np.zeros(len(change)), scatter.covariance).distances(change[np.newaxis])[0])
-        names = free.residuals.columns
-        error = np.sqrt(np.diag(covariance))
-        return cls(pd.Series(change, names), pd.Series(error, names), size, _p_value(change, covariance, n_blocks))
+        scatter = Gaussian.of(np.where(known, y - x * change, np.nan)).covariance
+        size = float(Gaussian(np.zeros(len(change)), scatter).distances(change[np.newaxis])[0])
+        of_mode = (
+            pd.Series(one, free.residuals.columns)
+            for one in (change, np.sqrt(np.diag(covariance)), np.sqrt(np.diag(scatter)))
+        )
+        return cls(what, *of_mode, size, _p_value(change, covariance, n_blocks))
 
     def sentence(self) -> str:
         """The change in words."""
-        worst = self.worst
+        worst = (self.change / self.standard_error).abs().idxmax()
         return (
-            f"{worst} by {100 * self.change[worst]:+.2g} +- {100 * self.standard_error[worst]:.1g} %, all modes "
-            f"together {self.size:.2g} standard deviations of a record (probability by chance {self.p_value:.1g})"
+            f"{self.what}, weather apart, {worst} changes by {100 * self.change[worst]:+.2g} +- "
+            f"{100 * self.standard_error[worst]:.1g} %, all modes together by {self.size:.2g} standard deviations of a "
+            f"record (probability by chance {probability_text(self.p_value)})"
         )
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What weather does not explain: between the baseline and new records, from some day on, or steadily."""
+
+    tried: tuple[Shift, ...]
+
+    @classmethod
+    def of(cls, free: WeatherFree, weather: pd.DataFrame, since: pd.Timestamp) -> Changes:
+        """Steps at some days of the new period, which begins at ``since``, and steady changes in it and over all."""
+        times = weather.index
+        new = times[times >= since]
+        days = new[np.unique(np.linspace(0, 0.85 * (len(new) - 1), N_STEPS).astype(int))]
+        courses = {f"from {day:%Y-%m-%d} on": (times >= day).astype(float) for day in days}
+        for what, first in (("steadily over the new records", since), ("steadily over all records", times[0])):
+            course = np.asarray((times - first) / (times[-1] - first), dtype=float)
+            courses[what] = np.maximum(course, 0.0)
+        return cls(tuple(Shift.along(courses, free, weather)))
+
+    @property
+    def step(self) -> Shift:
+        """The change from the baseline to all new records."""
+        return self.tried[0]
+
+    @property
+    def trend(self) -> Shift:
+        """The steady change over all records."""
+        return self.tried[-1]
+
+    @property
+    def clearest(self) -> Shift:
+        """The least likely of all, by its probability among so many."""
+        best = min(self.tried, key=lambda one: np.nan_to_num(one.p_value, nan=1.0))
+        return replace(best, p_value=min(best.p_value * len(self.tried), 1.0))
 
 
 def _p_value(change: Array, covariance: Array, n_blocks: int) -> float:
@@ -136,17 +183,10 @@ def _p_value(change: Array, covariance: Array, n_blocks: int) -> float:
     return float(f_law.sf(squared * freedom / (n_modes * (n_blocks - 1)), n_modes, freedom))
 
 
-def _beside(weather: pd.DataFrame, course: Array) -> Array:
-    """What weather does not tell of a course in time, each record predicted by others."""
-    if not len(weather.columns) or np.ptp(course) == 0:
-        return course - course.mean()
-    span = (course - course.min()) / np.ptp(course)
-    lines = _broken_lines(["course"])
+def _beside(weather: pd.DataFrame, courses: dict[str, Array]) -> Array:
+    """What weather does not tell of courses in time, each record predicted by others, (n_records, n_courses)."""
+    together = pd.DataFrame(courses, weather.index)
+    if not len(weather.columns):
+        return (together - together.mean()).to_numpy()
     with without_warnings():
-        left = np.asarray(lines.fit_transform(weather.assign(course=1 + span)))[:, 0]
-    return left * np.ptp(course)
-
-
-def years_of(times: pd.DatetimeIndex) -> Array:
-    """Time of each record since the first in years."""
-    return np.asarray((times - times[0]) / YEAR, dtype=float)
+        return np.asarray(_broken_lines(list(courses)).fit_transform(weather.join(1 + together)))
