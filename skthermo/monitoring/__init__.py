@@ -1,5 +1,6 @@
 """Detectors in service: records that come in batches, sensors that fail, structures that age."""
 
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring.retraining import Retraining
 
-__all__ = ["Monitor"]
+__all__ = ["Monitor", "Retraining"]

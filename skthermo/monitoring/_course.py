@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +15,7 @@ from skthermo._arrays import Array
 from skthermo._saved_frames import SavesFrames
 from skthermo.monitoring._events import EventLog
 from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._promise import EventRule
 from skthermo.monitoring._records import Plausible, RecordStore, stamps_of
 from skthermo.monitoring._stages import Stages, StageState
 
@@ -121,6 +122,18 @@ class Course(SavesFrames):
             self._with_days(days, stages, bench, answers),
         )
         return course, self._news(answers[n_told:], fresh)
+
+    def handed_over(self, bench: Bench, store: RecordStore, rule: EventRule, end: int | None = None) -> Course:
+        """The course with another detector, which judges the records of the newest day anew.
+
+        With an ``end``, events that are open have ended then.
+        """
+        points = tuple(replace(point, log=point.log.under(rule, end)) for point in self.checkpoints)
+        day = points[-1].day
+        before = self.judged[self.judged.index < day]
+        course = replace(self, checkpoints=points, log=self.log.under(rule, end), judged=before)
+        today = store.kept[store.kept.index >= day]
+        return course.advanced(bench, today, store)[0] if len(today) else course
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DataFrame) -> pd.DataFrame:
         """The answers to new records, and those to others that have changed."""

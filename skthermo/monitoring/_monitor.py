@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any, Literal
@@ -34,6 +35,7 @@ from skthermo.monitoring._memory import Memory, longest_window
 from skthermo.monitoring._promise import promised_rule
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
+from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
@@ -105,6 +107,10 @@ class Monitor(SavesFrames, Estimator):
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
+    trained_ : DataFrame
+        What the detector in charge was fitted on: the baseline, or what `refit` or `begin_again` made of it.
+    prior_, since_ : DataFrame and Timestamp, or None
+        After `begin_again`: records from before the intervention, and when it was complete.
     bench_, store_, course_, said_ : object
         What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
         what the owner has said of events.
@@ -250,6 +256,7 @@ class Monitor(SavesFrames, Estimator):
         self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
+        self.trained_, self.prior_, self.since_ = cleaned, None, None
         return self
 
     def update(self, new: pd.DataFrame) -> pd.DataFrame:
@@ -333,6 +340,102 @@ class Monitor(SavesFrames, Estimator):
             events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
         )
         self.said_ = (*self.said_, said)
+
+    def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
+        """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
+
+        Parameters
+        ----------
+        records : DataFrame, optional
+            Records since the baseline in the columns of `fit`; by default those that are kept, as the detector saw
+            them: without the values of faulty sensors, and without drift that was reported.
+        until : str or Timestamp, optional
+            The last moment whose records may train; by default all may.
+        force : bool, default=False
+            Whether the new detector takes over whatever speaks against it.
+
+        Returns
+        -------
+        Retraining
+            Whether it took over, why not, how both compare, and what was left out. If refused, nothing has changed.
+
+        Raises
+        ------
+        ValueError
+            If records lack columns.
+
+        Notes
+        -----
+        Records never train of events that were not acknowledged as harmless, from a week before their start (or the
+        detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
+        Values of faulty sensors do not train, nor do records that came too late.
+
+        The new detector is refused if the new records differ from the baseline, weather apart, from some day on or
+        steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
+        record's standard deviation: a detector that learned them would not see that change any more. It is refused if
+        more of the new records are above its threshold, each judged by the others, than above the old one; if it finds
+        only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
+        """
+        check_is_fitted(self)
+        retraining = retrained(self, records, until=until, force=check_flag(force, "force"), limit=self._limit)
+        if retraining.accepted:
+            self._take_over(retraining)
+        return retraining
+
+    def begin_again(self, since: Any, *, until: Any = None) -> Retraining:
+        """Begin a new baseline after an intervention that has changed the structure, such as a repair.
+
+        Parameters
+        ----------
+        since : str or Timestamp
+            When the intervention was complete. Records from then on are those of the structure as it is now.
+        until : str or Timestamp, optional
+            The last moment whose records may train; by default all may.
+
+        Returns
+        -------
+        Retraining
+            The change of each mode's level, and how large a change the new detector finds beside the old one.
+
+        Raises
+        ------
+        ValueError
+            If no record of the baseline is from before ``since``.
+
+        Notes
+        -----
+        The call says that the records since are healthy. Open events end.
+
+        The records of the baseline stand in for the weather that has not come since: each mode is moved to its new
+        level, which is the mean of what the old regression on the weather leaves of the new records. As few days tell
+        a level only roughly, each week of old records is moved besides by what another stretch of the old baseline, as
+        long as the new one, misses its level by: the threshold allows for that. Old weeks drop out when new records
+        cover their time of the year. Call again as days come; `refit` goes on in the same way.
+        """
+        check_is_fitted(self)
+        retraining = begun_again(self, since, until=until, limit=self._limit)
+        if retraining.accepted:
+            self._take_over(retraining)
+        return retraining
+
+    def _limit(self, index: pd.Series) -> float:
+        """The promised threshold for a baseline's indices."""
+        return promised_rule(index, self.false_alarms_per_year, hold=self.promise_.rule.hold).rule.threshold
+
+    def _take_over(self, retraining: Retraining) -> None:
+        """Put a retrained detector in charge, from the newest day on."""
+        detector, trained = retraining.detector, retraining.baseline
+        memory = self.memory_ if self.memory is not None else Memory.of(detector)
+        judge = Judge.of(detector, memory, self.bench_.judge.columns, self.targets_, trained)
+        index = pd.Series(last_step(detector).baseline_index_, trained.index)
+        promise = promised_rule(index, self.false_alarms_per_year, hold=self.promise_.rule.hold)
+        bench = replace(self.bench_, judge=judge, threshold=promise.rule.threshold)
+        since = retraining.since if retraining.kind == "new baseline" else None
+        end = None if since is None else since.as_unit("ns").value
+        course = self.course_.handed_over(bench, self.store_, promise.rule, end)
+        self.detector_, self.memory_, self.promise_, self.bench_ = detector, memory, promise, bench
+        self.threshold_, self.release_ = promise.rule.threshold, promise.rule.release
+        self.trained_, self.prior_, self.since_, self.course_ = trained, retraining.prior, retraining.since, course
 
     def summary(self) -> str:
         """What the owner should know, in a few lines.

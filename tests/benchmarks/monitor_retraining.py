@@ -4,10 +4,11 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/monitor_retraining.py --only refit --seeds 5
 
 ``refit``: the truss, daily records. A detector of half a year's baseline is refitted half a year later, with a healthy
-structure, one that is damaged in between without an alarm, and one that loses stiffness slowly. ``truss``, ``kw51`` and
-``real``: after an intervention, a new baseline from few days on, beside a detector fitted to these days only and the old
-detector with shifted frequencies; on the truss, on KW51's synthetic campaign (daily means), and on KW51's measured
-daily medians of one mode, where ``SKTHERMO_DATA`` names their folder. The exit code is 1 if a target is missed.
+structure, one that is damaged in between without an alarm, and one that loses stiffness slowly. ``truss``, ``kw51``
+and ``real``: after an intervention, a new baseline from few days on, beside a detector fitted to these days only and
+the old detector with shifted frequencies; on the truss, on KW51's synthetic campaign (daily means), and on KW51's
+measured daily medians of one mode, where ``SKTHERMO_DATA`` names their folder. The exit code is 1 if a target is
+missed.
 """
 
 import argparse
@@ -52,7 +53,8 @@ def in_service(detector, baseline, kept, targets):
     return SimpleNamespace(
         detector=detector,
         detector_=fitted,
-        baseline_=baseline,
+        trained_=baseline,
+        since_=None,
         prior_=None,
         corrected_=kept,
         events_=no_events(),
@@ -109,9 +111,9 @@ def refit(seeds):
             rows.append(row)
     found = pd.DataFrame(rows).groupby("kind", sort=False).mean()
     print(
-        f"The truss, half a year's baseline, refitted after a year; {seeds} seeds, {100 * ASKED:g} % asked. Refits refused,\n"
-        "and records above the threshold in year 2 by the old and the new detector (also where it was refused), in percent: of the\n"
-        "healthy structure, of one with 10 % damage of the bottom chord, and of the structure itself.\n"
+        f"The truss, half a year's baseline, refitted after a year; {seeds} seeds, {100 * ASKED:g} % asked. Refits\n"
+        "refused, and records above the threshold in year 2 by the old and the new detector (also where it was refused),\n"
+        "in percent: of the healthy structure, of one with 10 % damage of the bottom chord, and of the structure itself\n"
     )
     print(found.round(1).to_string(), "\n")
     missed = found.loc["healthy", "refused"] > 100 * MOST_REFUSED

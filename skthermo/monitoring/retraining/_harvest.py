@@ -31,19 +31,25 @@ class Harvest:
         events: pd.DataFrame,
         faults: pd.DataFrame | None,
         margin: pd.Timedelta = MARGIN,
+        are_put_back: bool = False,
     ) -> Harvest:
-        """Leave out events that were not acknowledged as harmless, and values of faulty sensors."""
+        """Leave out events that were not acknowledged as harmless, and values of faulty sensors.
+
+        Modes that were swapped for a time stand in their place already with ``are_put_back``.
+        """
         kept, rows = np.ones(len(records), dtype=bool), []
         for start, end, reason in _spans(events, margin):
             inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
             kept &= ~inside
             rows.append((start, end, "all", int(inside.sum()), reason))
         masked = records.copy()
-        for fault in (faults if faults is not None else pd.DataFrame()).itertuples():
+        told = faults if faults is not None else pd.DataFrame()
+        for fault in told.itertuples():
+            if fault.kind == "disagree" or (are_put_back and fault.kind == "swapped"):  # nothing is left out
+                continue
             inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
-            present = inside & kept & records[fault.column].notna().to_numpy()
             masked.loc[inside, fault.column] = np.nan
-            rows.append((fault.since, fault.until, fault.column, int(present.sum()), f"sensor: {fault.kind}"))
+            rows.append((fault.since, fault.until, fault.column, int((inside & kept).sum()), f"sensor: {fault.kind}"))
         empty = kept & masked.isna().all(axis=1).to_numpy()
         if empty.any():
             rows.append((masked.index[empty][0], masked.index[empty][-1], "all", int(empty.sum()), "without a value"))

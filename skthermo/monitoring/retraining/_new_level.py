@@ -9,7 +9,7 @@ import pandas as pd
 from sklearn.utils import check_random_state
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
+from skthermo._times import correlation_time
 from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
 from skthermo.monitoring.retraining._shift import WeatherFree
 

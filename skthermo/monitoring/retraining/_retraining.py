@@ -55,6 +55,8 @@ class Retraining:
         What the new detector learned from; None where there was nothing to learn from.
     prior : DataFrame or None
         Records before an intervention, as measured, from which a part of the baseline comes.
+    since : Timestamp or None
+        When the intervention was complete.
     detector : estimator or None
         The new detector, fitted.
     shift : DataFrame or None
@@ -70,6 +72,7 @@ class Retraining:
     excluded: pd.DataFrame
     baseline: pd.DataFrame | None = field(default=None, repr=False)
     prior: pd.DataFrame | None = field(default=None, repr=False)
+    since: pd.Timestamp | None = None
     detector: BaseEstimator | None = field(default=None, repr=False)
     shift: pd.DataFrame | None = field(default=None, repr=False)
 
@@ -102,15 +105,15 @@ def retrained(
     if refused:
         return _none("refit", refused, harvest.excluded)
     old, targets = _in_charge(monitor), list(monitor.targets_)
-    prior = monitor.prior_
+    prior, since = monitor.prior_, monitor.since_
     baseline = pd.concat([old.baseline, harvest.records])
     if prior is not None:
-        own = baseline[baseline.index > prior.index[-1]]
-        level = NewLevel.of(WeatherFree.of(monitor.detector, prior, targets), own)
-        moved = level.prior(prior, own, _seed(monitor))
+        own = baseline[baseline.index >= since]
+        level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
+        moved = level.prior(prior, own, monitor.random_state)
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
     new = _candidate(monitor, baseline, limit)
-    free = WeatherFree.of(monitor.detector, baseline, targets)
+    free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * baseline[targets].mean()
     found = Comparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
@@ -139,26 +142,28 @@ def retrained(
         }
     )
     accepted = force or not reasons
-    learned = {"baseline": baseline, "prior": prior, "detector": new.detector, "shift": shift}
+    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector, "shift": shift}
     return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
-    since = _stamp(since, monitor.baseline_.index)
+    since = _stamp(since, monitor.trained_.index)
     old, targets, prior = _in_charge(monitor), list(monitor.targets_), monitor.prior_
-    if prior is None or (old.baseline.index[old.baseline.index < since] > prior.index[-1]).any():
+    if prior is None or since > monitor.since_:  # another intervention: what is now the baseline is that before it
         prior = old.baseline[old.baseline.index < since]
+    if not len(prior):
+        raise ValueError(f"since is {since}, but the baseline begins at {old.baseline.index[0]}; expected a later time")
     events = monitor.events_
     damage = events[events["acknowledged"] & ~events["harmless"]]
-    known = pd.concat([old.baseline[old.baseline.index >= since], _kept(monitor, None)])
-    harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_)
+    known = pd.concat([old.baseline, _kept(monitor, None)])
+    harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
     own = harvest.records
     missing = [str(name) for name in targets if not len(own) or own[name].notna().sum() < 2]
     if missing:
         return _none("new baseline", f"fewer than two records of {', '.join(missing)} since {since}", harvest.excluded)
-    level = NewLevel.of(WeatherFree.of(monitor.detector, prior, targets), own)
-    moved = level.prior(prior, own, _seed(monitor))
+    level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
+    moved = level.prior(prior, own, monitor.random_state)
     baseline = pd.concat([moved, own])
     new = _candidate(monitor, baseline, limit)
     spread = level.old.residuals.std() * prior[targets].mean()
@@ -170,26 +175,28 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
     ]
     ratio = float(np.exp(np.nanmean(np.log(found[1] / found[0])))) if np.isfinite(found).any() else np.nan
     notes.append(f"the smallest change found is {ratio:.2f} times that of the baseline before")
-    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "detector": new.detector}
+    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector}
     return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
 
 
 def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
     """Records since the baseline that may train."""
     kept = _until(_kept(monitor, records), until)
-    return Harvest.of(kept, monitor.events_, monitor.faults_, margin_of(monitor.detector_, monitor.baseline_))
+    margin = margin_of(monitor.detector_, monitor.trained_)
+    return Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
 
 
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
         records = monitor.corrected_
-    columns = list(monitor.baseline_.columns)
+    columns = list(monitor.trained_.columns)
     missing = [str(name) for name in columns if name not in records.columns]
     if missing:
         raise ValueError(f"records lack the columns {missing}; expected those of fit, {[str(one) for one in columns]}")
     records = records[columns].sort_index()
-    return records[~records.index.isin(monitor.baseline_.index)]
+    known = records.index.isin(monitor.trained_.index)
+    return records[~known if monitor.since_ is None else ~known & (records.index >= monitor.since_)]
 
 
 def _until(records: pd.DataFrame, until: Any) -> pd.DataFrame:
@@ -217,14 +224,14 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
 
 
 def _in_charge(monitor: Any) -> Judged:
-    index = pd.Series(last_step(monitor.detector_).baseline_index_, monitor.baseline_.index)
-    return Judged(monitor.detector_, monitor.threshold_, monitor.baseline_, index)
+    index = pd.Series(last_step(monitor.detector_).baseline_index_, monitor.trained_.index)
+    return Judged(monitor.detector_, monitor.threshold_, monitor.trained_, index)
 
 
 def _candidate(monitor: Any, baseline: pd.DataFrame, limit: Limit) -> Judged:
     """A clone of the detector, fitted, with its monitor's threshold."""
     with without_warnings():
-        detector = clone(monitor.detector).fit(baseline[list(monitor.detector_.feature_names_in_)])
+        detector = clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)])
     index = pd.Series(last_step(detector).baseline_index_, baseline.index)
     return Judged(detector, limit(index), baseline, index)
 
@@ -241,13 +248,9 @@ def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
     """Kept records of each event that was not acknowledged as harmless."""
     records, events, found = monitor.corrected_, monitor.events_, {}
-    margin = margin_of(monitor.detector_, monitor.baseline_)  # which windows reach back into
+    margin = margin_of(monitor.detector_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
         inside = records[(records.index >= event.start - margin) & (pd.isna(event.end) | (records.index <= event.end))]
         if not event.harmless and len(inside):
             found[number] = inside
     return found
-
-
-def _seed(monitor: Any) -> int | None:
-    return monitor.random_state
