@@ -112,8 +112,8 @@ def refit(seeds):
     found = pd.DataFrame(rows).groupby("kind", sort=False).mean()
     print(
         f"The truss, half a year's baseline, refitted after a year; {seeds} seeds, {100 * ASKED:g} % asked. Refits\n"
-        "refused, and records above the threshold in year 2 by the old and the new detector (also where it was refused),\n"
-        "in percent: of the healthy structure, of one with 10 % damage of the bottom chord, and of the structure itself\n"
+        "refused, and records above the threshold in year 2 by the old and the new detector (also if it was refused),\n"
+        "in percent: of the healthy structure, with 10 % damage of the bottom chord, and of the structure itself\n"
     )
     print(found.round(1).to_string(), "\n")
     missed = found.loc["healthy", "refused"] > 100 * MOST_REFUSED

@@ -16,7 +16,7 @@ from skthermo._weather import BEYOND, TrainingRange
 from skthermo.monitoring.retraining._blocks import block_mean, blocks_of
 
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
-STEPS = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)  # standard deviations by which they are lowered
+STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
 CLEAR = 2.0  # standard errors from which a difference is one
 WORSE = np.log(1.1)  # of the smallest change found, from which it counts
 FALSE, SMALLEST = "records above the threshold", "smallest change found"  # rows that decide
@@ -150,17 +150,20 @@ def _rows_of_changes(old: Array, new: Array, targets: list[Any]) -> Iterator[tup
 
 
 def _crossing(steps: Array, curve: Array) -> float:
-    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any."""
+    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any.
+
+    Squared indices grow with squared steps, nearly on straight lines.
+    """
     curve = curve[:, ~np.isnan(curve).any(axis=0)]
     if not curve.size:
         return np.nan
-    medians = np.median(curve, axis=1)
-    above = np.flatnonzero(medians > 1)
+    squares = np.median(curve, axis=1) ** 2
+    above = np.flatnonzero(squares > 1)
     if len(above) and above[0] == 0:
         return np.nan
     after = above[0] if len(above) else len(steps) - 1
-    slope = (medians[after] - medians[after - 1]) / (steps[after] - steps[after - 1])
-    return float(steps[after - 1] + (1 - medians[after - 1]) / slope) if slope > 0 else np.nan
+    slope = (squares[after] - squares[after - 1]) / (steps[after] ** 2 - steps[after - 1] ** 2)
+    return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
 
 
 def _unknown(old: Judged, new: Judged, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:

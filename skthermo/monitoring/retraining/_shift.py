@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.stats import f as f_law
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._arrays import Array
 from skthermo._formatting import probability_text
 from skthermo._gaussian import Gaussian
+from skthermo._times import correlation_time
 from skthermo._warnings import without_warnings
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
@@ -21,6 +23,7 @@ from skthermo.surrogate import TemperatureMapper
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
 MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
 HIDDEN = 0.5  # the same of a standard error, from which a change may hide behind weather that is new
+FEWEST_MORE = 3  # independent blocks than modes, from which there is a test
 N_STEPS = 8  # days of the new period at which a change may have begun
 
 
@@ -115,18 +118,16 @@ class Shift:
         x, y = (np.where(known, part - part.sum(axis=0) / counts, 0.0) for part in (x, y))
         weight = np.maximum((x**2).sum(axis=0), 1e-300)
         change = (x * y).sum(axis=0) / weight
+        rest = np.where(known, y - x * change, np.nan)
         blocks = blocks_of(free.residuals.index, free.block)
-        n_blocks = blocks.max() + 1
-        scores = np.zeros((n_blocks, len(change)))
-        np.add.at(scores, blocks, x * (y - x * change) / weight)
-        covariance = scores.T @ scores * n_blocks / max(n_blocks - 1, 1)
-        scatter = Gaussian.of(np.where(known, y - x * change, np.nan)).covariance
+        covariance, n_independent = _of_means(rest, x / weight, blocks)
+        scatter = Gaussian.of(rest).covariance
         size = float(Gaussian(np.zeros(len(change)), scatter).distances(change[np.newaxis])[0])
         of_mode = (
             pd.Series(one, free.residuals.columns)
             for one in (change, np.sqrt(np.diag(covariance)), np.sqrt(np.diag(scatter)))
         )
-        return cls(what, *of_mode, size, _p_value(change, covariance, n_blocks))
+        return cls(what, *of_mode, size, _p_value(change, covariance, n_independent))
 
     def sentence(self) -> str:
         """The change in words."""
@@ -173,14 +174,32 @@ class Changes:
         return replace(best, p_value=min(best.p_value * len(self.tried), 1.0))
 
 
-def _p_value(change: Array, covariance: Array, n_blocks: int) -> float:
+def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Array, float]:
+    """Covariance of weighted sums of residuals, and as how many independent blocks of time they count.
+
+    All blocks tell how much their mean residuals scatter, and for how long they stay alike: a change of late is told by
+    few blocks, whose own scatter would say little.
+    """
+    n_blocks, n_modes = int(blocks.max()) + 1, rest.shape[1]
+    counts, sums, weight = (np.zeros((n_blocks, n_modes)) for _ in range(3))
+    for total, values in ((counts, ~np.isnan(rest)), (sums, np.nan_to_num(rest)), (weight, weights)):
+        np.add.at(total, blocks, values)
+    means = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+    if n_blocks < n_modes + 3 or np.isnan(means).all(axis=0).any():
+        return np.full((n_modes, n_modes), np.nan), 0.0
+    lasting = max(float(np.mean([correlation_time(column) for column in means.T])), 1.0)
+    together = Gaussian.of(means).covariance * n_blocks / (n_blocks - 1)
+    return together * np.sqrt(np.outer(*2 * [(weight**2).sum(axis=0)])) * lasting, n_blocks / lasting
+
+
+def _p_value(change: Array, covariance: Array, n_independent: float) -> float:
     """Of a change in all modes, by Hotelling's law."""
     n_modes = len(change)
-    if n_blocks < n_modes + 3:
+    freedom = n_independent - n_modes
+    if freedom < FEWEST_MORE:
         return np.nan
     squared = float(Gaussian(np.zeros(n_modes), covariance).distances(change[np.newaxis])[0]) ** 2
-    freedom = n_blocks - n_modes
-    return float(f_law.sf(squared * freedom / (n_modes * (n_blocks - 1)), n_modes, freedom))
+    return float(f_law.sf(squared * freedom / (n_modes * (n_independent - 1)), n_modes, freedom))
 
 
 def _beside(weather: pd.DataFrame, courses: dict[str, Array]) -> Array:
