@@ -31,18 +31,19 @@ class Event:
 class EventLog:
     """All events in order of their start, and for each kind whether one is open."""
 
-    rule: EventRule
+    rules: dict[str, EventRule]
     states: dict[str, EventState] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
 
     def follow(
-        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str]
-    ) -> tuple[dict[str, NDArray[np.intp]], EventLog]:
+        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str] | None = None
+    ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
+        modes = [""] * len(times) if modes is None else modes
         is_open, states = {}, dict(self.states)
         for kind, index in by_kind.items():
-            is_open[kind], states[kind] = self.rule.follow(states.get(kind, EventState()), index, times)
-        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.intp) for kind in by_kind}
+            is_open[kind], states[kind] = self.rules[kind].follow(states.get(kind, EventState()), index, times)
+        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
         for kind, index in by_kind.items():
@@ -56,12 +57,12 @@ class EventLog:
                 events[n] = _grown(events[n], index, times, modes, inside, end_time)
         return numbers, replace(self, states=states, events=tuple(events))
 
-    def under(self, rule: EventRule, end: int | None = None) -> EventLog:
-        """The log under another rule; with an ``end``, open events ended then, or at their start if that is later."""
+    def under(self, rules: dict[str, EventRule], end: int | None = None) -> EventLog:
+        """The log under other rules; with an ``end``, open events ended then, or at their start if that is later."""
         if end is None:
-            return replace(self, rule=rule)
+            return replace(self, rules=rules)
         events = tuple(e if e.end is not None else replace(e, end=max(e.start, end)) for e in self.events)
-        return EventLog(rule, {}, events)
+        return EventLog(rules, {}, events)
 
     def _openings(self, is_open: dict[str, NDArray[np.bool_]]) -> list[tuple[int, str]]:
         """Record and kind of each event that opens, in order of time."""

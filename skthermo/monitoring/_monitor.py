@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,10 +29,12 @@ from skthermo._validation import (
 from skthermo._warnings import warn_user
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._course import Bench, Course, nothing_judged
+from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
+from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory, longest_window
-from skthermo.monitoring._promise import promised_rule
+from skthermo.monitoring._promise import EventRule, Promise, promised_rule
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
@@ -41,6 +43,16 @@ ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
 MOST_EVENTS = 5  # in a summary
 MOST_CAUSES = 3  # in a warning
+
+
+class Charge(NamedTuple):
+    """A fitted detector and all by which it judges."""
+
+    detector: Any
+    memory: Memory
+    promise: Promise
+    rules: dict[str, EventRule]
+    bench: Bench
 
 
 class Monitor(SavesFrames, Estimator):
@@ -111,6 +123,8 @@ class Monitor(SavesFrames, Estimator):
         What the detector in charge was fitted on: the baseline, or what `refit` or `begin_again` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
         After `begin_again`: records from before the intervention, and when it was complete.
+    versions_ : dict
+        Versions of skthermo and scikit-learn by which it was fitted.
     bench_, store_, course_, said_ : object
         What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
         what the owner has said of events.
@@ -232,31 +246,23 @@ class Monitor(SavesFrames, Estimator):
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
         self.targets_ = self._frequency_columns(baseline, compensators)
         columns = list(baseline.columns) if compensators else self.targets_
-        cleaned, _, n_implausible = Plausible.of_anything(baseline).cleaned(baseline)
-        if n_implausible:
+        anything = Plausible.of_anything(baseline)
+        n_markers, cleaned = int(anything.implausible(baseline).sum()), anything.cleaned(baseline)[0]
+        if n_markers:
             warn_user(
-                f"{n_implausible} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
+                f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
                 "markers",
             )
-        self.detector_ = detector.fit(cleaned[columns])
-        self.memory_ = (
-            Memory.of(self.detector_) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
-        )
-        judge = Judge.of(self.detector_, self.memory_, columns, self.targets_, cleaned)
-        judge.check_memory(cleaned)
-        index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
-        hold = max(ONE_DAY, longest_window(self.detector_, baseline.index))
-        self.promise_ = promised_rule(index, self.false_alarms_per_year, hold=hold)
-        rule = self.promise_.rule
-        self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
-        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, rule.threshold)
+        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
+        charge.bench.judge.check_memory(cleaned)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
+        self._put_in_charge(charge, cleaned, Course.of(charge.bench, baseline, EventLog(charge.rules)))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
-        self.trained_, self.prior_, self.since_ = cleaned, None, None
+        self.prior_, self.since_ = None, None
+        self.versions_ = versions()
         return self
 
     def update(self, new: pd.DataFrame) -> pd.DataFrame:
@@ -297,7 +303,7 @@ class Monitor(SavesFrames, Estimator):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
         _warn_of_not_judged(answers)
-        self.store_, self.course_, self.counts_ = store, course, counts
+        self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not judged"]:
@@ -418,24 +424,70 @@ class Monitor(SavesFrames, Estimator):
             self._take_over(retraining)
         return retraining
 
-    def _limit(self, index: pd.Series) -> float:
-        """The promised threshold for a baseline's indices."""
-        return promised_rule(index, self.false_alarms_per_year, hold=self.promise_.rule.hold).rule.threshold
+    def _charge_of(self, detector: Any, trained: pd.DataFrame, columns: list[Any], stages: Stages) -> Charge:
+        """All by which a detector judges that was fitted on some records."""
+        memory = Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
+        index = pd.Series(last_step(detector).baseline_index_, trained.index)
+        hold = max(ONE_DAY, longest_window(detector, trained.index))
+        direction, by_kind = None, {"damage": index}
+        if self.direction == "softening":
+            direction = Direction.of(detector, trained[columns], self.targets_)
+            stiffer = direction.of_rows(trained[columns]) < 0
+            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
+            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
+        promises = {kind: promised_rule(one, self.false_alarms_per_year, hold=hold) for kind, one in by_kind.items()}
+        rules = {kind: promise.rule for kind, promise in promises.items()}
+        judge = Judge.of(detector, memory, columns, self.targets_, trained)
+        release = min(one.release for one in rules.values())
+        threshold = rules["damage"].threshold
+        bench = Bench(Plausible.of(trained, self.targets_), stages, judge, direction, threshold, release)
+        return Charge(detector, memory, promises["damage"], rules, bench)
+
+    def _put_in_charge(self, charge: Charge, trained: pd.DataFrame, course: Course) -> None:
+        self.detector_, self.memory_, self.promise_, self.bench_ = (
+            charge.detector,
+            charge.memory,
+            charge.promise,
+            charge.bench,
+        )
+        self.threshold_, self.release_ = charge.promise.rule.threshold, charge.promise.rule.release
+        self.trained_, self.course_ = trained, course
+
+    def _limit(self, detector: Any, trained: pd.DataFrame) -> float:
+        """The promised threshold of a detector that was fitted on some records."""
+        return self._charge_of(detector, trained, self.bench_.judge.columns, self.bench_.stages).promise.rule.threshold
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        detector, trained = retraining.detector, retraining.baseline
-        memory = self.memory_ if self.memory is not None else Memory.of(detector)
-        judge = Judge.of(detector, memory, self.bench_.judge.columns, self.targets_, trained)
-        index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        promise = promised_rule(index, self.false_alarms_per_year, hold=self.promise_.rule.hold)
-        bench = replace(self.bench_, judge=judge, threshold=promise.rule.threshold)
-        since = retraining.since if retraining.kind == "new baseline" else None
-        end = None if since is None else since.as_unit("ns").value
-        course = self.course_.handed_over(bench, self.store_, promise.rule, end)
-        self.detector_, self.memory_, self.promise_, self.bench_ = detector, memory, promise, bench
-        self.threshold_, self.release_ = promise.rule.threshold, promise.rule.release
-        self.trained_, self.prior_, self.since_, self.course_ = trained, retraining.prior, retraining.since, course
+        trained, end, stages = retraining.baseline, None, self.bench_.stages
+        if retraining.kind == "new baseline":
+            end = retraining.since.as_unit("ns").value
+            stages = Stages.of(trained, self.targets_, sensors=self.sensors)
+        charge = self._charge_of(retraining.detector, trained, self.bench_.judge.columns, stages)
+        course = self.course_.handed_over(charge.bench, self.store_, charge.rules, end)
+        self._put_in_charge(charge, trained, course)
+        self.prior_, self.since_ = retraining.prior, retraining.since
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, which ends with ``.skops`` (skops, runs no code when it is read) or ``.joblib``. An older one is
+            replaced when the new one is complete and on the disk, so that a crash leaves one of the two.
+
+        Raises
+        ------
+        NotFittedError
+            If the monitor is not fitted.
+        ValueError
+            If the path has another ending, the folder does not exist, or skops cannot save a part of the monitor, such
+            as a class of another package.
+        ImportError
+            If the file ends with ``.skops``, and skops is not installed.
+        """
+        write_monitor(self, path)
 
     def summary(self) -> str:
         """What the owner should know, in a few lines.
@@ -556,7 +608,7 @@ class Monitor(SavesFrames, Estimator):
             "n_late": counts["n_late"] + intake.n_late,
             "n_too_late": n_too_late,
             "n_not_judged": int(n_records - n_judged) + n_too_late,
-            "n_implausible": counts["n_implausible"] + self.bench_.plausible.cleaned(intake.fresh)[2],
+            "n_implausible": counts["n_implausible"] + int(self.bench_.plausible.implausible(intake.fresh).sum()),
         }
 
 

@@ -36,9 +36,9 @@ DAMAGE = {"bottom": 0.10}
 MOST_REFUSED, LEAST_REFUSED = 0.05, 0.95  # shares of healthy and of changed structures whose refit is refused
 
 
-def limit(index):
+def limit(detector, baseline=None):
     """The threshold that the share asked for of a baseline's records exceeds."""
-    return float(np.nanquantile(index, 1 - ASKED))
+    return float(np.nanquantile(detector[-1].baseline_index_, 1 - ASKED))
 
 
 def no_events():
@@ -49,7 +49,7 @@ def no_events():
 def in_service(detector, baseline, kept, targets):
     """What a retraining reads of a monitor; thresholds by records, so that few years tell rates."""
     fitted = clone(detector).fit(baseline)
-    threshold = limit(fitted[-1].baseline_index_)
+    threshold = limit(fitted)
     return SimpleNamespace(
         detector=detector,
         detector_=fitted,
@@ -99,7 +99,7 @@ def refit(seeds):
         for kind, records in kinds.items():
             monitor = in_service(lines(targets), records[:182], records[182:365], targets)
             found = retrained(monitor, limit=limit)
-            threshold = limit(found.detector[-1].baseline_index_)
+            threshold = limit(found.detector)
             row = {"kind": kind, "refused": 100 * (not found.accepted)}
             for name, detector, level in (
                 ("old", monitor.detector_, monitor.threshold_),
@@ -141,7 +141,7 @@ def after_intervention(detector, before, after, damaged, targets, days=DAYS):
         own, healthy, bad = after[after.index < end], after[after.index >= end], damaged[damaged.index >= end]
         monitor = in_service(detector, before, own, targets)
         found = begun_again(monitor, own.index[0], limit=limit)
-        threshold = limit(found.detector[-1].baseline_index_) if found.detector is not None else np.nan
+        threshold = limit(found.detector) if found.detector is not None else np.nan
         row = {"days": n_days}
         if found.accepted:
             row["false: prior"] = above(found.detector, threshold, healthy)
@@ -150,7 +150,7 @@ def after_intervention(detector, before, after, damaged, targets, days=DAYS):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 alone = clone(detector).fit(own)
-            level = limit(alone[-1].baseline_index_)
+            level = limit(alone)
             row["false: alone"], row["found: alone"] = above(alone, level, healthy), above(alone, level, bad)
         except ValueError:
             row["false: alone"], row["found: alone"] = np.nan, np.nan

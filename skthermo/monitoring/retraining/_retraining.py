@@ -23,8 +23,8 @@ FEWEST_WEEKS = 3  # of new records, from which standard errors of a comparison c
 
 YEAR = pd.Timedelta("365.25D")
 
-Limit = Callable[[pd.Series], float]
-"""The threshold of a monitor, from out-of-fold indices of a baseline."""
+Limit = Callable[[BaseEstimator, pd.DataFrame], float]
+"""The threshold that a monitor promises for a detector that was fitted on some records."""
 
 
 @dataclass(frozen=True)
@@ -232,8 +232,9 @@ def _candidate(monitor: Any, baseline: pd.DataFrame, limit: Limit) -> Judged:
     """A clone of the detector, fitted, with its monitor's threshold."""
     with without_warnings():
         detector = clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)])
+        threshold = limit(detector, baseline)
     index = pd.Series(last_step(detector).baseline_index_, baseline.index)
-    return Judged(detector, limit(index), baseline, index)
+    return Judged(detector, threshold, baseline, index)
 
 
 def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> Changes:
