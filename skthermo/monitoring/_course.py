@@ -47,9 +47,8 @@ class Bench:
         stiffer = np.zeros(len(index), dtype=bool)
         if wanted.any():
             begin = self.judge.memory.start(stamps_of(records), first)
-            stiffer = (
-                self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])[first - begin :] < 0
-            )
+            signs = self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])
+            stiffer = signs[first - begin :] < 0
         quiet = np.where(np.isnan(index), np.nan, 0.0)
         return {"damage": np.where(stiffer, quiet, index), "stiffening": np.where(stiffer, index, quiet)}
 
