@@ -17,7 +17,6 @@ SHORT = 40
 SHORT_FILES = {  # private files of fewer lines, and why they stand alone
     "_io/_locks.py": "readers of files and the memory of an inverse share it",
     "_optional.py": "packages import it wherever something optional is needed",
-    "_dependence.py": "detectors, surrogates and studies share it",
     "fem/sampling/_samples.py": "it imports scikit-learn, which importing fem must not",
 }
 

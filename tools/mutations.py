@@ -160,7 +160,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
-    ("_dependence.py", "surrogate/test_uncertainty.py"): [
+    ("_times.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
     ],
     ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [

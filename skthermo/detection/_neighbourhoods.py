@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
 from skthermo._gaussian import Gaussian
+from skthermo._times import correlation_time
 from skthermo.preprocessing import BlockedKFold
 
 Rows = NDArray[np.intp]

@@ -1,3 +1,5 @@
 """Detectors in service: records that come in batches, sensors that fail, structures that age."""
 
-__all__: list[str] = []
+from skthermo.monitoring._monitor import Monitor
+
+__all__ = ["Monitor"]

@@ -24,7 +24,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.preprocessing._stamps import as_duration
-from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
+from skthermo._weather_regression import NORMAL, WeatherRegression, robust_deviation
 
 LEAST_WINDOW = 3  # rows
 

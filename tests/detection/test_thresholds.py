@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
-from skthermo._dependence import correlation_time
+from skthermo._times import correlation_time
 from skthermo.detection import MahalanobisDetector
 from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold

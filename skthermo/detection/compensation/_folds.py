@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold, check_cv
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
-from skthermo._times import row_times
+from skthermo._times import correlation_time, row_times
 from skthermo.preprocessing import BlockedKFold
 
 Rows = NDArray[np.intp]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
 from skthermo._gaussian import check_not_empty
+from skthermo._times import correlation_time
 from skthermo._validation import Interval, StrOptions
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._neighbourhoods import Neighbourhoods

@@ -16,7 +16,7 @@ from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
-from skthermo.preprocessing._weather_regression import WeatherBasis, median, out_of_fold, robust_deviation
+from skthermo._weather_regression import WeatherBasis, median, out_of_fold, robust_deviation
 from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
 from skthermo.preprocessing.checks._stuck import stuck_runs
 from skthermo.preprocessing.checks._swaps import swapped_modes

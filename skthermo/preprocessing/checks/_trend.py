@@ -10,9 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns
-from skthermo._dependence import correlation_time
 from skthermo._frames import column_names
-from skthermo._times import has_stamps, row_times
+from skthermo._times import correlation_time, has_stamps, row_times
 
 YEAR = 365.25 * 86400e9  # nanoseconds
 PARTS = 5  # into which the records are divided, to compare the first with the last

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta, t
 
 from skthermo._arrays import Array
-from skthermo._dependence import correlation_time
+from skthermo._times import correlation_time
 
 BLOCK = 10  # length of a block, in correlation times
 LEAST_FREEDOM = 10  # fewest degrees of freedom of the variance; blocks are shortened to reach them

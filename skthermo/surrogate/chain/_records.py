@@ -14,10 +14,9 @@ from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats, patterns
-from skthermo._dependence import correlation_time
 from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
-from skthermo._times import row_times
+from skthermo._times import correlation_time, row_times
 from skthermo._validation import last_step
 from skthermo._weather import (
     TrainingRange,

@@ -1,0 +1,129 @@
+"""Events as they open and close, record by record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo.monitoring._promise import EventRule, EventState
+
+
+@dataclass(frozen=True)
+class Event:
+    """A time in which the structure was unlike its baseline; stamps in nanoseconds, no end while it is open."""
+
+    kind: str
+    start: int
+    end: int | None
+    peak: float
+    peak_time: int
+    modes: str
+    n_alarms: int
+
+
+@dataclass(frozen=True)
+class EventLog:
+    """All events in order of their start, and for each kind whether one is open."""
+
+    rule: EventRule
+    states: dict[str, EventState] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+
+    def follow(
+        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str]
+    ) -> tuple[dict[str, NDArray[np.intp]], EventLog]:
+        """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
+        is_open, states = {}, dict(self.states)
+        for kind, index in by_kind.items():
+            is_open[kind], states[kind] = self.rule.follow(states.get(kind, EventState()), index, times)
+        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.intp) for kind in by_kind}
+        for row, kind in self._openings(is_open):
+            events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
+        for kind, index in by_kind.items():
+            own = [n for n, event in enumerate(events) if event.kind == kind and event.end is None]
+            begins = np.searchsorted(times, [events[n].start for n in own])
+            for n, begin, end in zip(own, begins, [*begins, len(times)][1:], strict=True):
+                inside = np.flatnonzero(is_open[kind][begin:end]) + begin
+                numbers[kind][inside] = n + 1
+                closing = np.flatnonzero(~is_open[kind][begin:end])
+                end_time = int(times[begin + closing[0]]) if len(closing) else None
+                events[n] = _grown(events[n], index, times, modes, inside, end_time)
+        return numbers, replace(self, states=states, events=tuple(events))
+
+    def _openings(self, is_open: dict[str, NDArray[np.bool_]]) -> list[tuple[int, str]]:
+        """Record and kind of each event that opens, in order of time."""
+        found = []
+        for kind, after in is_open.items():
+            before = kind in self.states and self.states[kind].is_open
+            found += [(int(row), kind) for row in np.flatnonzero(np.diff(after.astype(int), prepend=int(before)) == 1)]
+        return sorted(found)
+
+    def is_open(self, kind: str) -> bool:
+        """Whether an event of a kind is open."""
+        return kind in self.states and self.states[kind].is_open
+
+
+def _grown(
+    event: Event,
+    index: Array,
+    times: NDArray[np.int64],
+    modes: Sequence[str],
+    inside: NDArray[np.intp],
+    end: int | None,
+) -> Event:
+    """The event with the records in which it was open."""
+    judged = inside[~np.isnan(index[inside])]
+    if len(judged):
+        peak = judged[np.argmax(index[judged])]
+        if index[peak] > event.peak:
+            found = {"peak": float(index[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
+            event = replace(event, **found)
+    return replace(event, end=end, n_alarms=event.n_alarms + len(judged))
+
+
+@dataclass(frozen=True)
+class Acknowledgement:
+    """What the owner says of an event, known by the time of its peak: late records may move its start and number."""
+
+    kind: str
+    peak_time: int
+    harmless: bool
+    note: str
+
+
+def event_table(events: Sequence[Event], said: Sequence[Acknowledgement], zone: Any) -> pd.DataFrame:
+    """Events as a frame, with what the owner says of them."""
+    by_event: list[Acknowledgement | None] = [
+        next((a for a in reversed(said) if a.kind == e.kind and e.start <= a.peak_time and _before(a, e)), None)
+        for e in events
+    ]
+
+    def stamps(values: Sequence[int | None]) -> pd.DatetimeIndex:
+        missing = np.datetime64("NaT", "ns").astype(np.int64)
+        numbers = np.array([missing if value is None else value for value in values], dtype=np.int64)
+        return pd.DatetimeIndex(numbers.view("M8[ns]"), tz="UTC").tz_convert(zone)
+
+    return pd.DataFrame(
+        {
+            "kind": pd.Series([e.kind for e in events], dtype=object),
+            "start": stamps([e.start for e in events]),
+            "end": stamps([e.end for e in events]),
+            "peak": np.array([e.peak for e in events], dtype=float),
+            "peak_time": stamps([e.peak_time for e in events]),
+            "modes": pd.Series([e.modes for e in events], dtype=object),
+            "n_alarms": np.array([e.n_alarms for e in events], dtype=np.int64),
+            "acknowledged": np.array([a is not None for a in by_event], dtype=bool),
+            "harmless": np.array([a is not None and a.harmless for a in by_event], dtype=bool),
+            "note": pd.Series(["" if a is None else a.note for a in by_event], dtype=object),
+        }
+    ).set_axis(pd.RangeIndex(1, len(events) + 1, name="event"))
+
+
+def _before(said: Acknowledgement, event: Event) -> bool:
+    return event.end is None or said.peak_time < event.end

@@ -1,0 +1,214 @@
+"""What a fitted detector says of records: damage indices, the modes that drive them, and why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.pipeline import Pipeline
+
+from skthermo._arrays import Array, as_floats
+from skthermo._validation import BaseSearchCV, last_step
+from skthermo._warnings import without_warnings
+from skthermo._weather import FAR_OUTSIDE, TrainingRange
+from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._records import stamps_of
+
+DECIMALS = 6  # of a damage index
+CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
+MATTERS = 2.0  # standard deviations from which a mode drives an alarm
+MOST_MODES = 3  # that are named
+N_CHECKED = 5  # baseline records that are judged alone and among others
+N_BEFORE = 100  # records before their memory
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Steps up to a compensator, that compensator, and the detector behind; without one, the detector alone."""
+
+    before: list[Any]
+    compensator: TemperatureCompensator | None
+    last: Any
+
+    @classmethod
+    def all_of(cls, detector: Any) -> Iterator[Branch]:
+        """The one of a fitted detector, or those of each that a fused detector holds."""
+        last = last_step(detector)
+        if isinstance(last, FusedDetector):
+            for inner in last.detectors_:
+                yield from cls.all_of(inner)
+            return
+        steps = list(_steps(detector))
+        places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
+        compensator = steps[places[0]] if places else None
+        yield cls(steps[: places[0]] if places else [], compensator, last)
+
+    def standard(self, records: pd.DataFrame, usual: tuple[Array, Array], targets: list[Any]) -> Array:
+        """Residuals of records in standard deviations, or frequencies where there is no compensator."""
+        if self.compensator is None:
+            mean, deviation = usual
+            return (as_floats(records[targets]) - mean) / deviation
+        table: Any = records
+        for step in self.before:
+            table = step.transform(table)
+        residuals = as_floats(self.compensator.transform(table))
+        if self.compensator.scale is not None:
+            return residuals
+        overall = self.compensator.spread_.overall
+        deviation = np.sqrt(np.diag(overall.covariance))
+        return (residuals - overall.mean) / np.where(deviation > 0, deviation, 1.0)
+
+
+def _steps(detector: Any) -> Iterator[Any]:
+    """The fitted steps of a detector, one after the other."""
+    if isinstance(detector, BaseSearchCV):
+        yield from _steps(detector.best_estimator_)
+    elif isinstance(detector, Pipeline):
+        for _, step in detector.steps:
+            yield from _steps(step)
+    elif detector is not None and detector != "passthrough":
+        yield detector
+
+
+@dataclass(frozen=True)
+class Judge:
+    """A fitted detector with the memory that it needs.
+
+    ``columns`` are those that the detector sees, ``usual`` means and standard deviations of the baseline's frequencies.
+    """
+
+    detector: Any
+    memory: Memory
+    columns: list[Any]
+    temperatures: list[Any]
+    targets: list[Any]
+    usual: tuple[Array, Array]
+    weather: TrainingRange
+
+    @classmethod
+    def of(cls, detector: Any, memory: Memory, columns: list[Any], targets: list[Any], baseline: pd.DataFrame) -> Judge:
+        """Learned from a baseline that the detector was fitted on."""
+        temperatures = [name for name in baseline.columns if name not in targets]
+        frequencies = as_floats(baseline[targets])
+        deviation = np.nanstd(frequencies, axis=0)
+        usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
+        trained = ~np.isnan(frequencies).all(axis=1)
+        weather = TrainingRange.of(baseline[temperatures], trained)
+        return cls(detector, memory, columns, temperatures, targets, usual, weather)
+
+    def index(self, records: pd.DataFrame, first: int) -> Array:
+        """Damage index of the records from a position on, in order of time, rounded; those before are their memory.
+
+        The number of records in a call moves the last bits of an index. Where they decide how it is rounded, the one
+        of the record alone with its memory counts.
+        """
+        times = stamps_of(records)
+        start = self.memory.start(times, first)
+        exact = self._exact(records.iloc[start:])[first - start :]
+        scaled = exact * 10.0**DECIMALS
+        from_edge = np.abs(np.abs(scaled - np.floor(scaled)) - 0.5)
+        close = np.flatnonzero(from_edge <= CLOSE * np.maximum(np.abs(exact), 1.0) * 10.0**DECIMALS)
+        for row in close:
+            exact[row] = self.alone(records, times, first + row)
+        return np.round(exact, DECIMALS)
+
+    def alone(self, records: pd.DataFrame, times: NDArray[np.int64], row: int) -> float:
+        """Damage index of one record by a call with just its memory."""
+        return self._exact(records.iloc[self.memory.start(times, row) : row + 1])[-1]
+
+    def check_memory(self, baseline: pd.DataFrame) -> None:
+        """Refuse a detector that looks at later records, or farther back than its memory: it would judge batches
+        differently from all records at once."""
+        times = stamps_of(baseline)
+        rows = np.unique(np.linspace(len(times) // 2, max(len(times) - N_CHECKED, 0), N_CHECKED).astype(np.intp))
+        start = max(self.memory.start(times, int(rows[0])) - N_BEFORE, 0)
+        whole = self._exact(baseline.iloc[start:])[rows - start]
+        alone = np.array([self.alone(baseline, times, int(row)) for row in rows])
+        same = np.isclose(whole, alone, rtol=1e-6, atol=1e-9, equal_nan=True)
+        if not same.all():
+            row = int(np.argmin(same))
+            raise ValueError(
+                f"the damage index of {baseline.index[rows[row]]} is {whole[row]:.6g} among all records and "
+                f"{alone[row]:.6g} with the records of {self.memory} before it: the detector looks at later records, "
+                "or farther back; expected steps that look back only, and memory='48h' where that is how far"
+            )
+
+    def _exact(self, records: pd.DataFrame) -> Array:
+        with without_warnings():
+            return -np.asarray(self.detector.score_samples(records[self.columns]), dtype=float)
+
+    def drivers(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
+        """Names of the modes that drive the damage index of some records, the worst first."""
+        if not len(rows):
+            return []
+        times = stamps_of(records)
+        start = self.memory.start(times, rows[0])
+        part = records.iloc[start : rows[-1] + 1]
+        places = rows - start
+        sizes = []
+        for branch in Branch.all_of(self.detector):
+            with without_warnings():
+                standard = branch.standard(part[self.columns], self.usual, self.targets)
+            if isinstance(branch.last, WindowedAlarm):
+                standard = _window_means(standard, branch.last, times[start : rows[-1] + 1], places)
+            else:
+                standard = standard[places]
+            sizes.append(np.nan_to_num(np.abs(standard)))
+        size = np.round(np.mean(sizes, axis=0), 2)
+        names = []
+        for row in size:
+            worst = np.argsort(-row, kind="stable")[:MOST_MODES]
+            names.append(", ".join(str(self.targets[k]) for n, k in enumerate(worst) if n == 0 or row[k] > MATTERS))
+        return names
+
+    def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
+        """Why some records have no damage index."""
+        if not len(rows):
+            return []
+        branches = list(Branch.all_of(self.detector))
+        start = self.memory.start(stamps_of(records), rows[0])
+        part, places = records.iloc[start : rows[-1] + 1], rows - start
+        with without_warnings():
+            standards = [branch.standard(part[self.columns], self.usual, self.targets)[places] for branch in branches]
+        F, T = (as_floats(part[names])[places] for names in (self.targets, self.temperatures))
+        compensates = any(branch.compensator is not None for branch in branches)
+        unknown = np.isnan(np.concatenate(standards, axis=1)).all(axis=1)
+        causes = []
+        for n in range(len(rows)):
+            missing = [str(name) for name, value in zip(self.targets, F[n], strict=True) if np.isnan(value)]
+            if len(missing) == len(self.targets):
+                causes.append("no mode has a value")
+            elif compensates and np.isnan(T[n]).all():
+                causes.append("no temperature has a value")
+            elif unknown[n]:
+                causes.append("lags find no record, or a value before it is missing")
+            elif missing and all(isinstance(branch.last, OutlierDetector) for branch in branches):
+                causes.append(f"{', '.join(missing)} missing, and the detector needs every mode")
+            elif any(isinstance(branch.last, WindowedAlarm) for branch in branches):
+                fewest = min(branch.last.fewest_ for branch in branches if isinstance(branch.last, WindowedAlarm))
+                causes.append(f"its window holds fewer than {fewest} records with a value")
+            else:
+                causes.append("the detector gives no damage index")
+        return causes
+
+    def far_outside(self, records: pd.DataFrame) -> NDArray[np.bool_]:
+        """Which records have a temperature far outside those of the baseline."""
+        if not self.temperatures:
+            return np.zeros(len(records), dtype=bool)
+        excess = self.weather.excess(records[self.temperatures])
+        return (np.nan_to_num(excess) > FAR_OUTSIDE).any(axis=1)
+
+
+def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:
+    """Means over the windows that end with some records; in their own standard deviations under the rule "mean"."""
+    memory, correlation = Memory.of(alarm), getattr(alarm.law_, "correlation", 1.0)
+    windows = [standard[memory.start(times, row) : row + 1] for row in rows]
+    with without_warnings():  # a mode that has no value in a window
+        means = np.array([np.nanmean(window, axis=0) for window in windows])
+    counts = np.array([np.maximum((~np.isnan(window)).sum(axis=0), 1) for window in windows])
+    return means / np.sqrt((1 - correlation) / counts + correlation)

@@ -1,0 +1,115 @@
+"""How far back a fitted detector looks: lags, windows, and both one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.pipeline import Pipeline
+
+from skthermo._arguments import is_model
+from skthermo.detection import WindowedAlarm
+from skthermo.preprocessing import HampelFilter, LagFeatures
+
+Path = tuple[tuple[int, int], ...]
+"""Reaches of the steps on one way through a detector, the last step first: (rows, nanoseconds), one of them zero."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Which earlier records the judgement of a record needs, on all ways from its records to its damage index."""
+
+    paths: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, detector: Any) -> Memory:
+        """That of a fitted detector: lags and windows in a row add up, beside each other the longest counts."""
+        return cls(tuple(sorted(_paths(detector, set()))))
+
+    @classmethod
+    def of_time(cls, duration: pd.Timedelta) -> Memory:
+        """The records of some time."""
+        return cls((((0, duration.value),),))
+
+    def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
+        """Position of the earliest record that is needed for the one at a position, or at a time before it."""
+        return min(_back(path, times, place, time) for path in self.paths)
+
+    def __str__(self) -> str:
+        """The reaches in words, such as "30 h" or "24 records and 30 h"."""
+        rows, time = (max(sum(reach[part] for reach in path) for path in self.paths) for part in (0, 1))
+        words = [f"{rows} records"] if rows else []
+        words += [f"{time / 3.6e12:.3g} h"] if time else []
+        return " and ".join(words) or "nothing"
+
+
+def _back(path: Path, times: NDArray[np.int64], place: int, time: int | None) -> int:
+    for rows, duration in path:
+        if rows:
+            place, time = max(place - rows, 0), None
+        else:
+            moment = (times[place] if time is None else time) - duration
+            place, time = int(np.searchsorted(times[:place], moment)), None
+    return place
+
+
+def _paths(part: Any, seen: set[int]) -> set[Path]:
+    """Ways through a fitted part, each with the reaches on it."""
+    if id(part) in seen:
+        return {()}
+    if isinstance(part, Pipeline):
+        ways: set[Path] = {()}
+        for _, step in reversed(part.steps):
+            ways = {way + more for way in ways for more in _paths(step, seen)}
+        return ways
+    seen = seen | {id(part)}
+    if isinstance(part, HampelFilter):
+        raise ValueError(
+            f"the detector holds {part!r:.100}, which compares records with later ones; expected steps that look back "
+            "only: filter the baseline before fit"
+        )
+    if isinstance(part, LagFeatures) and hasattr(part, "lags_"):
+        lags = max(part.lags_)
+        if part.freq_ is None:
+            return {((lags, 0),)} if lags else {()}
+        nanoseconds = lags * part.freq_ + part.tolerance_
+        return {((0, int(nanoseconds.astype("timedelta64[ns]").astype(np.int64))),)} if lags else {()}
+    if isinstance(part, WindowedAlarm) and hasattr(part, "law_"):
+        if isinstance(part.window, str):
+            return {((0, pd.Timedelta(part.window).as_unit("ns").value),)}
+        return {((part.window - 1, 0),)} if part.window > 1 else {()}
+    found = set().union(*(_paths(inner, seen) for inner in _inner(part)))
+    return found or {()}
+
+
+def _inner(part: Any) -> Iterator[Any]:
+    """Estimators and objects of which a part is made."""
+    for value in list(getattr(part, "__dict__", {}).values()):
+        values = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else [value]
+        for one in values:
+            for inner in one if isinstance(one, tuple) else (one,):
+                made = isinstance(inner, BaseEstimator) or (is_dataclass(inner) and not isinstance(inner, type))
+                if made and not is_model(inner):
+                    yield inner
+
+
+def longest_window(detector: Any, stamps: pd.DatetimeIndex) -> pd.Timedelta:
+    """Time of the longest window in a fitted detector, at the usual distance of records."""
+    step = pd.Series(stamps).diff().median()
+    windows = [part.window for part in _walk(detector, set()) if isinstance(part, WindowedAlarm)]
+    times = [pd.Timedelta(window) if isinstance(window, str) else window * step for window in windows]
+    return max(times, default=pd.Timedelta(0))
+
+
+def _walk(part: Any, seen: set[int]) -> Iterator[Any]:
+    """A part and all within it, each once."""
+    if id(part) not in seen:
+        seen.add(id(part))
+        yield part
+        for inner in _inner(part):
+            yield from _walk(inner, seen)

@@ -1,0 +1,491 @@
+"""A damage detector in service."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from datetime import timedelta
+from numbers import Integral, Real
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from sklearn.base import clone
+
+from skthermo._arguments import check_flag
+from skthermo._frames import positions_of
+from skthermo._saved_frames import SavesFrames
+from skthermo._validation import (
+    Estimator,
+    HasMethods,
+    Interval,
+    StrOptions,
+    _fit_context,
+    check_is_fitted,
+    last_step,
+    seed_parts,
+    seeded,
+)
+from skthermo._warnings import warn_user
+from skthermo.detection import TemperatureCompensator
+from skthermo.monitoring._course import Bench, Course, nothing_judged
+from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
+from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._memory import Memory, longest_window
+from skthermo.monitoring._promise import promised_rule
+from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
+from skthermo.monitoring._stages import Stages
+
+ONE_DAY = pd.Timedelta("1D")
+COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
+MOST_EVENTS = 5  # in a summary
+MOST_CAUSES = 3  # in a warning
+
+
+class Monitor(SavesFrames, Estimator):
+    """A damage detector in service: it judges records as they come, day by day, for years.
+
+    Parameters
+    ----------
+    detector : detector or Pipeline
+        Any detector of `skthermo.detection`, or a pipeline that ends with one, such as
+        ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
+        frequencies only.
+    targets : sequence of str, optional
+        Names of the frequency columns. By default those of the compensator, else those that ``fem`` was fitted on.
+    fem : DataInformedFEM, optional
+        A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
+    false_alarms_per_year : float, default=1.0
+        Damage events that a healthy structure has in a year, on average.
+    direction : {"both", "softening"}, default="both"
+        Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
+    late : str or timedelta, default="7D"
+        How late records may come and still be judged as if they had come in time.
+    keep : str or timedelta, default="400D"
+        How long raw records are kept, for a new fit and to tell repeated records.
+    sensors : bool, default=True
+        Whether sensors are watched, and those that fail left out.
+    memory : str or timedelta, optional
+        How long before a record the detector looks. By default the lags and windows of its parts tell.
+    random_state : int, RandomState or None, default=None
+        Seeds parts of the detector that are not seeded.
+
+    Attributes
+    ----------
+    detector_ : detector or Pipeline
+        Fitted clone.
+    targets_ : list of str
+        Names of the frequency columns.
+    promise_ : object
+        How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
+        year.
+    threshold_ : float
+        A damage event opens with an index above it.
+    release_ : float
+        An event closes when the index has stayed at or below it.
+    memory_ : object
+        Which earlier records the judgement of a record needs.
+    events_ : DataFrame
+        A row for each event, counted from 1: ``kind`` ("damage" or "stiffening"), ``start``, ``end`` (first record
+        after it, NaT while it is open), ``peak`` (highest index), ``peak_time``, ``modes``, ``n_alarms`` (records
+        judged while it was open), ``acknowledged``, ``harmless`` and ``note``.
+    days_ : DataFrame
+        A row for each day with records: ``n_records``, ``n_judged``, ``n_alarms``, ``index_median``, ``index_max``
+        and, where drift is followed, a column ``drift GROUP`` for each group.
+    judged_ : DataFrame
+        The latest judgement of each record that is kept, as `update` gives it.
+    faults_ : DataFrame
+        Sensors that have failed: ``column``, ``kind``, ``since``, ``told``, ``until``, ``detail``.
+    drift_ : DataFrame or None
+        Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
+        ``per_year_error``, ``significant``; None without ``fem``.
+    counts_ : dict
+        ``n_records`` that came, without repeated ones; of these ``n_not_judged``, ``n_late`` (judged all the same) and
+        ``n_too_late`` (not judged); ``n_repeated``, and ``n_implausible``: values that were taken as missing.
+    baseline_, records_, corrected_ : DataFrame
+        Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
+    last_ : Timestamp
+        Stamp of the newest record.
+    bench_, store_, course_, said_ : object
+        What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
+        what the owner has said of events.
+
+    See Also
+    --------
+    skthermo.detection.WindowedAlarm : Alarms by several records in a row.
+
+    Notes
+    -----
+    Any division of records into batches gives the same judgements, events and daily summaries, bit for bit, as one
+    batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
+    come late are judged with those around them, and later ones anew: what `update` says last of a stamp counts.
+
+    The damage index is rounded to six decimals. Where the last bits, which depend on how many records are judged at
+    once, would decide how, the index of the record alone with its memory counts.
+
+    A value that no sensor measures is taken as missing: a number that loggers write for a missing one (-999), a
+    frequency of zero or below, a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80
+    degrees Celsius, as in kelvin.
+
+    Examples
+    --------
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+    >>> from skthermo.monitoring import Monitor
+    >>> healthy = make_truss_campaign(3, random_state=0)
+    >>> records = healthy.temperatures.join(healthy.frequencies)
+    >>> compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
+    >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
+    >>> answers = monitor.update(records[730:737])
+    >>> monitor.state()
+    'healthy'
+    """
+
+    _parameter_constraints: dict = {
+        "detector": [HasMethods(["fit", "score_samples"])],
+        "targets": ["array-like", None],
+        "fem": [HasMethods(["fit", "predict"]), None],
+        "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
+        "direction": [StrOptions({"both", "softening"})],
+        "late": [str, timedelta, np.timedelta64],
+        "keep": [str, timedelta, np.timedelta64],
+        "sensors": ["boolean"],
+        "memory": [str, timedelta, np.timedelta64, None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        detector: Any,
+        *,
+        targets: Sequence[Hashable] | None = None,
+        fem: Any = None,
+        false_alarms_per_year: float = 1.0,
+        direction: Literal["both", "softening"] = "both",
+        late: str | timedelta = "7D",
+        keep: str | timedelta = "400D",
+        sensors: bool = True,
+        memory: str | timedelta | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ):
+        self.detector = detector
+        self.targets = targets
+        self.fem = fem
+        self.false_alarms_per_year = false_alarms_per_year
+        self.direction = direction
+        self.late = late
+        self.keep = keep
+        self.sensors = sensors
+        self.memory = memory
+        self.random_state = random_state
+
+    def __sklearn_clone__(self) -> Monitor:
+        return type(self)(**self.get_params(deep=False) | {"detector": clone(self.detector)})  # the chain is shared
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
+        """Fit the detector to a baseline, and set the threshold of events.
+
+        Parameters
+        ----------
+        X : DataFrame of shape (n_samples, n_features)
+            Temperatures in degrees Celsius and frequencies in Hz of the healthy structure, side by side, on a
+            ``DatetimeIndex``.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        Monitor
+            The monitor, ready for the records that come after the baseline.
+
+        Raises
+        ------
+        ValueError
+            If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the frequency columns are not
+            known; if the detector looks at later records, or farther back than its parts tell.
+
+        Warns
+        -----
+        UserWarning
+            As the detector does; if values are no measurements and are taken as missing.
+        """
+        late, keep = (_duration(getattr(self, name), name) for name in ("late", "keep"))
+        if keep < late + 2 * ONE_DAY:
+            raise ValueError(f"keep is {self.keep!r} and late {self.late!r}; expected to keep records two days longer")
+        baseline = read_records(X)
+        if baseline.index.has_duplicates:
+            again = baseline.index[baseline.index.duplicated()]
+            raise ValueError(
+                f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once"
+            )
+        detector = clone(self.detector)
+        seed_parts(detector, seeded(self.random_state))
+        parts = [detector, *detector.get_params(deep=True).values()]
+        compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
+        self.targets_ = self._frequency_columns(baseline, compensators)
+        columns = list(baseline.columns) if compensators else self.targets_
+        cleaned, _, n_implausible = Plausible.of_anything(baseline).cleaned(baseline)
+        if n_implausible:
+            warn_user(
+                f"{n_implausible} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
+                "are taken as missing; expected NaN there",
+                "markers",
+            )
+        self.detector_ = detector.fit(cleaned[columns])
+        self.memory_ = (
+            Memory.of(self.detector_) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
+        )
+        judge = Judge.of(self.detector_, self.memory_, columns, self.targets_, cleaned)
+        judge.check_memory(cleaned)
+        index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
+        hold = max(ONE_DAY, longest_window(self.detector_, baseline.index))
+        self.promise_ = promised_rule(index, self.false_alarms_per_year, hold=hold)
+        rule = self.promise_.rule
+        self.threshold_, self.release_ = rule.threshold, rule.release
+        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
+        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, rule.threshold)
+        self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
+        self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
+        self.counts_ = dict.fromkeys(COUNTS, 0)
+        self.said_: tuple[Acknowledgement, ...] = ()
+        return self
+
+    def update(self, new: pd.DataFrame) -> pd.DataFrame:
+        """Judge records that came since.
+
+        Parameters
+        ----------
+        new : DataFrame of shape (n_samples, n_features)
+            Raw records in the columns of `fit`, in any order: an hour, a day or a month, with gaps, late or repeated.
+
+        Returns
+        -------
+        DataFrame
+            On the stamps of new records, and of known ones that are judged anew because others came late: ``state``
+            ("healthy", "alarm" or "not judged"), ``index`` (damage index), ``threshold``, ``modes`` (names of the
+            modes that drive an alarm, the worst first), ``reason`` (why a record is not judged, or what else is worth
+            saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was judged before).
+
+        Raises
+        ------
+        ValueError
+            If the records are no frame on a ``DatetimeIndex`` with the columns and the time zone of the baseline; if
+            values are infinite; if a known stamp comes with other values. The monitor then stays as it was.
+
+        Warns
+        -----
+        UserWarning
+            If new records are not judged: how many, and why.
+        """
+        check_is_fitted(self)
+        intake = self.store_.sort_in(read_records(new, self.baseline_.columns, self.baseline_.index.tz))
+        store, course = self.store_.with_records(intake.fresh), self.course_
+        answers = nothing_judged(self.baseline_.index[:0]).assign(revised=False)
+        if len(intake.fresh):
+            course, answers = course.advanced(self.bench_, intake.fresh, store)
+        if len(intake.too_late):
+            refused = nothing_judged(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
+            answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
+        counts = self._counted(intake, course)
+        _warn_of_not_judged(answers)
+        self.store_, self.course_, self.counts_ = store, course, counts
+        return answers
+
+    def state(self) -> Literal["healthy", "alarm", "not judged"]:
+        """How the structure is, by the newest record.
+
+        Returns
+        -------
+        str
+            "alarm" while a damage event is open, else "healthy" or "not judged", as the newest record was.
+        """
+        check_is_fitted(self)
+        if self.course_.log.is_open("damage"):
+            return "alarm"
+        return self.judged_["state"].iloc[-1] if len(self.judged_) else "not judged"
+
+    def acknowledge(self, event: int, *, harmless: bool, note: str = "") -> None:
+        """Record what the owner has found out about an event.
+
+        Parameters
+        ----------
+        event : int
+            Its number in ``events_``.
+        harmless : bool
+            Whether the structure is as before: records of a harmless event may train a new detector.
+        note : str, default=""
+            What was found.
+
+        Raises
+        ------
+        ValueError
+            If there is no such event.
+        """
+        check_is_fitted(self)
+        events = self.course_.log.events
+        if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
+            raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
+        if not isinstance(note, str):
+            raise ValueError(f"note is {note!r:.100}; expected text")
+        said = Acknowledgement(
+            events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
+        )
+        self.said_ = (*self.said_, said)
+
+    def summary(self) -> str:
+        """What the owner should know, in a few lines.
+
+        Returns
+        -------
+        str
+            State, records, events, sensors and drift.
+        """
+        check_is_fitted(self)
+        lines = [f"State: {self.state()} ({self.last_})" if len(self.records_) else "No record since the baseline."]
+        counts = self.counts_
+        lines.append(
+            f"Records: {counts['n_records']} since {self.baseline_.index[-1]}, {counts['n_not_judged']} not judged, "
+            f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_repeated']} repeated."
+        )
+        lines.append(
+            f"Damage events open above {self.threshold_:.4g} and close at or below {self.release_:.4g}; a healthy "
+            f"structure has {self.promise_.expected:.3g} a year on average, {self.promise_.lowest} to "
+            f"{self.promise_.highest} in a single one."
+        )
+        events = self.events_
+        if not len(events):
+            lines.append("Events: none.")
+        for number, event in events.iloc[-MOST_EVENTS:].iterrows():
+            lines.append(f"Event {number}: {_event_in_words(event)}.")
+        if len(events) > MOST_EVENTS:
+            lines.append(f"{len(events) - MOST_EVENTS} earlier events are in events_.")
+        for _, fault in self.faults_[self.faults_["until"].isna()].iterrows():
+            lines.append(f"Sensor {fault['column']}: {fault['kind']} since {fault['since']}.")
+        drift = self.drift_
+        if drift is not None:
+            for group, one in drift[drift["significant"]].iterrows():
+                lines.append(f"Drift of {group}: {one['change']:+.1%} so far, {one['per_year']:+.2%} a year.")
+        return "\n".join(lines)
+
+    @property
+    def baseline_(self) -> pd.DataFrame:
+        """Records of the baseline, raw."""
+        return self.store_.baseline
+
+    @property
+    def records_(self) -> pd.DataFrame:
+        """Records kept since the baseline, raw."""
+        return self.store_.kept
+
+    @property
+    def corrected_(self) -> pd.DataFrame:
+        """Records kept since the baseline as the detector sees them."""
+        return self.course_.corrected.loc[self.records_.index]
+
+    @property
+    def last_(self) -> pd.Timestamp:
+        """Stamp of the newest record."""
+        return self.store_.last
+
+    @property
+    def judged_(self) -> pd.DataFrame:
+        """The latest judgement of each record that is kept."""
+        return self.course_.judged
+
+    @property
+    def days_(self) -> pd.DataFrame:
+        """Daily summaries."""
+        return self.course_.days
+
+    @property
+    def events_(self) -> pd.DataFrame:
+        """Events, counted from 1."""
+        return event_table(self.course_.log.events, self.said_, self.baseline_.index.tz)
+
+    @property
+    def faults_(self) -> pd.DataFrame:
+        """Sensors that have failed."""
+        return self.bench_.stages.faults(self.course_.stages)
+
+    @property
+    def drift_(self) -> pd.DataFrame | None:
+        """Drift that was followed, by group."""
+        return self.bench_.stages.drifts(self.course_.stages)
+
+    def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:
+        """Names of the frequency columns: as given, those of the compensators, or those of the chain."""
+        columns = list(baseline.columns)
+        if self.targets is not None:
+            wanted = list(self.targets)
+        elif compensators:
+            places = [positions_of(one.targets, len(columns), np.array(columns, dtype=object)) for one in compensators]
+            return [columns[k] for k in sorted(set(np.concatenate(places).tolist()))]
+        elif self.fem is not None:
+            check_is_fitted(self.fem)
+            wanted = list(self.fem.mode_names_)
+        else:
+            raise ValueError(
+                "the detector has no TemperatureCompensator whose targets tell which columns are frequencies, and "
+                "there is no fem; expected targets=[names of the frequency columns]"
+            )
+        unknown = [name for name in wanted if name not in columns]
+        if unknown or not wanted or len(set(wanted)) < len(wanted):
+            raise ValueError(f"targets are {wanted}; expected different names among the columns {columns}")
+        return wanted
+
+    def _why_too_late(self, records: pd.DataFrame) -> list[str]:
+        end = self.baseline_.index[-1]
+        return [
+            f"before the end of the baseline ({end})" if stamp <= end else f"came too late, more than {self.late} after"
+            for stamp in records.index
+        ]
+
+    def _counted(self, intake: Intake, course: Course) -> dict[str, int]:
+        """The counts after a batch."""
+        counts = self.counts_
+        n_too_late = counts["n_too_late"] + len(intake.too_late)
+        n_records, n_judged = course.days[["n_records", "n_judged"]].sum()
+        return {
+            "n_records": int(n_records) + n_too_late,
+            "n_repeated": counts["n_repeated"] + intake.n_repeated,
+            "n_late": counts["n_late"] + intake.n_late,
+            "n_too_late": n_too_late,
+            "n_not_judged": int(n_records - n_judged) + n_too_late,
+            "n_implausible": counts["n_implausible"] + self.bench_.plausible.cleaned(intake.fresh)[2],
+        }
+
+
+def _warn_of_not_judged(answers: pd.DataFrame) -> None:
+    new = answers[~answers["revised"]]
+    unknown = new[new["state"] == "not judged"]
+    if not len(unknown):
+        return
+    counts = unknown["reason"].value_counts()
+    causes = [f"{n} because {cause}" for cause, n in counts.iloc[:MOST_CAUSES].items()]
+    more = f"; and {counts.iloc[MOST_CAUSES:].sum()} for other reasons" if len(counts) > MOST_CAUSES else ""
+    warn_user(
+        f"{len(unknown)} of {len(new)} new records are not judged, the first {unknown.index[0]}: {'; '.join(causes)}"
+        f"{more}",
+        "records not judged",
+    )
+
+
+def _event_in_words(event: pd.Series) -> str:
+    until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
+    said = f", acknowledged as {'harmless' if event['harmless'] else 'not harmless'}" if event["acknowledged"] else ""
+    note = f" ({event['note']})" if event["note"] else ""
+    peak = f"highest index {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode alone'}"
+    return f"{event['kind']} from {event['start']} {until}, {peak}{said}{note}"
+
+
+def _duration(value: Any, name: str) -> pd.Timedelta:
+    """A duration of zero or more."""
+    try:
+        duration = pd.Timedelta(value).as_unit("ns")
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{name} is {value!r}; expected a duration, such as '7D'") from error
+    if not duration >= pd.Timedelta(0):
+        raise ValueError(f"{name} is {value!r}; expected a duration of zero or more, such as '7D'")
+    return duration

@@ -1,0 +1,190 @@
+"""Events of a damage index, and the threshold by which a healthy structure has so many of them in a year."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import gamma, nbinom
+
+from skthermo._arrays import Array
+from skthermo._warnings import warn_user
+
+YEAR = pd.Timedelta(days=365.25)
+N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
+COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
+NEAR = 15  # days of the year, up to which a record stands for the season around it
+FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
+N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
+
+
+@dataclass(frozen=True)
+class EventState:
+    """Whether an event is open, and since when all judged records have stayed at or below the release level."""
+
+    is_open: bool = False
+    quiet_since: int | None = None  # nanoseconds; None if the last judged record was above, or there was none
+
+
+@dataclass(frozen=True)
+class EventRule:
+    """An event opens with a record above ``threshold`` and closes when those of ``hold`` stayed within ``release``.
+
+    Records that are not judged (NaN) neither open nor close it: the time of silence counts only between judged records.
+    """
+
+    threshold: float
+    release: float
+    hold: pd.Timedelta
+
+    def follow(self, state: EventState, index: Array, times: NDArray[np.int64]) -> tuple[NDArray[np.bool_], EventState]:
+        """Whether an event is open after each record, in order of time (nanoseconds), and the state after the last."""
+        after = np.full(len(index), state.is_open)
+        places = np.flatnonzero(~np.isnan(index))
+        if not len(places):
+            return after, state
+        values, at, order = index[places], times[places], np.arange(len(places))
+        quiet = values <= self.release
+        begins = quiet & ~np.append(state.quiet_since is not None, quiet[:-1])
+        last_begin = np.maximum.accumulate(np.where(begins, order, -1))
+        since = np.where(last_begin >= 0, at[last_begin], 0 if state.quiet_since is None else state.quiet_since)
+        closes = quiet & (at - since >= self.hold.value)
+        opens = values > self.threshold
+        last_change = np.maximum.accumulate(np.where(opens | closes, order, -1))
+        is_open = np.where(last_change >= 0, opens[last_change], state.is_open)
+        last_judged = np.searchsorted(places, np.arange(len(index)), side="right") - 1
+        after = np.where(last_judged >= 0, is_open[last_judged], state.is_open)
+        return after, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None)
+
+
+def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.DataFrame:
+    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` and ``peak_time``."""
+    values = np.asarray(index, dtype=float)
+    is_open = rule.follow(EventState(), values, times.as_unit("ns").asi8)[0]
+    change = np.diff(is_open.astype(np.int8), prepend=0)
+    starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    bounds = np.append(stops, len(values))[: len(starts)]
+    peaks = np.array(
+        [start + np.nanargmax(values[start:stop]) for start, stop in zip(starts, bounds, strict=True)], int
+    )
+    ends = times[stops].append(pd.DatetimeIndex([pd.NaT] * (len(starts) - len(stops))).tz_localize(times.tz))
+    table = {"start": times[starts], "end": ends, "peak": values[peaks], "peak_time": times[peaks]}
+    return pd.DataFrame(table, index=pd.RangeIndex(1, len(starts) + 1, name="event"))
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A rule for events, and how many of them a healthy structure has in a year.
+
+    ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
+    ``highest`` of them with a probability of 90 %, by chance and because one baseline does not tell the rate.
+    ``n_years`` is the time that the baseline's judged records cover, ``n_peaks`` the number of its highest excursions
+    that the threshold comes from, ``unseen`` the seasons that the baseline does not show, for which nothing is promised
+    ("" if there is none), ``method`` what the threshold stands on in words.
+    """
+
+    rule: EventRule
+    expected: float
+    lowest: int
+    highest: int
+    n_years: float
+    n_peaks: int
+    unseen: str
+    method: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.expected:g} false alarms a year on average, {self.lowest} to {self.highest} in a single year "
+            f"(90 %); {self.method}" + (f"; not promised for {self.unseen}" if self.unseen else "")
+        )
+
+
+def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Timedelta = "1D") -> Promise:
+    """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
+
+    An excursion lasts from the first record above the release level until all records of ``hold`` have stayed within
+    it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
+    it. A year without end would have k + 1 peaks above the (k + 1)-th highest of a year's baseline, on average; the
+    excess of squared peaks over that one, S in all, is taken as exponential, so that
+
+        threshold^2 = peak^2 + S ((k + 1) / n)^(1 / k) - S,
+
+    where n is the number of events asked for in the time of the baseline. Averaged over baselines, that is exact for an
+    exponential tail, however few peaks there are.
+    """
+    hold, known = pd.Timedelta(hold), index.dropna()
+    if len(known) < 2:
+        raise ValueError(f"{len(known)} baseline records have a damage index; expected at least 2")
+    steps = known.index[1:] - known.index[:-1]
+    lengths = steps.to_series()
+    covered = lengths.clip(upper=max(hold, lengths.median())).sum()
+    n_years = float(covered / YEAR)
+    release = _release(known, hold)
+    peaks = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))["peak"].to_numpy()
+    squares, asked = np.sort(peaks**2)[::-1], per_year * n_years
+    if len(squares) < 3 or asked > len(squares):
+        raise ValueError(
+            f"false_alarms_per_year is {per_year:g}, but the {n_years:.2g} years of the baseline have only "
+            f"{len(squares)} excursions of {hold} or more; expected at least 3, and as many as alarms are asked for"
+        )
+    k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
+    excess, factor = (squares[:k] - squares[k]).sum(), ((k + 1) / asked) ** (1 / k) - 1
+    threshold = float(np.sqrt(squares[k] + max(factor, 0.0) * excess))
+    lowest, highest = _range(k, max(factor, 0.0), n_years)
+    unseen, method = (
+        _unseen_season(known.index),
+        (f"by the {k + 1} highest of {len(squares)} excursions of the damage index in {n_years:.2g} years of baseline"),
+    )
+    if unseen:
+        warn_user(
+            f"the baseline has no record of {unseen}: the number of false alarms a year is that of the seasons that it "
+            "shows, and nothing is promised for the others; expected a whole year",
+            "seasons without baseline",
+        )
+    if asked < FAR:
+        method += ", extrapolated beyond all of them"
+        warn_user(
+            f"{per_year:g} false alarms a year are {asked:.2g} in the {n_years:.2g} years of the baseline: the "
+            f"threshold {threshold:.3g} is extrapolated beyond its highest excursion ({np.sqrt(squares[0]):.3g}); "
+            f"expected at least {FAR}, by a longer baseline or more alarms",
+            "threshold beyond the baseline",
+        )
+    return Promise(EventRule(threshold, release, hold), per_year, lowest, highest, n_years, k + 1, unseen, method)
+
+
+def _release(known: pd.Series, hold: pd.Timedelta) -> float:
+    """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
+    stamps = known.index.as_unit("ns").asi8
+    whole = stamps - stamps[0] >= hold.value
+    highest = known.rolling(hold, closed="both").max().to_numpy()
+    return float(np.median(highest[whole] if whole.any() else highest))
+
+
+def _range(k: int, factor: float, n_years: float) -> tuple[int, int]:
+    """Between which numbers events in one year lie, given what k excesses tell of the tail and of its rate."""
+    spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k)
+    share = np.exp(-factor * spread) / n_years
+
+    def at_most(number: int) -> float:
+        return float(nbinom.cdf(number, k + 1, 1 / (1 + share)).mean())
+
+    tail, numbers = (1 - COVERAGE) / 2, range(1_000_000)
+    return tuple(next(n for n in numbers if at_most(n) >= level) for level in (tail, 1 - tail))
+
+
+def _unseen_season(stamps: pd.DatetimeIndex) -> str:
+    """Days of the year that no record is near, as their number and the longest stretch of them; "" if there is none."""
+    seen = np.zeros(365, dtype=bool)
+    days = np.unique(np.minimum(stamps.day_of_year, 365) - 1)
+    seen[(days[:, np.newaxis] + np.arange(-NEAR, NEAR + 1)) % 365] = True
+    if seen.all():
+        return ""
+    turned = np.roll(np.arange(365), -int(seen.argmax()))  # begins with a day that is seen
+    run = np.zeros(365, dtype=int)
+    for place in range(1, 365):
+        run[place] = 0 if seen[turned[place]] else run[place - 1] + 1
+    last = int(run.argmax())
+    ends = [pd.Timestamp("2001-01-01") + pd.Timedelta(days=int(turned[i])) for i in (last - run[last] + 1, last)]
+    return f"{(~seen).sum()} days of the year ({' to '.join(f'{day.day} {day.month_name()}' for day in ends)})"

@@ -1,0 +1,66 @@
+"""What happens to records before they are judged: sensors that fail are left out, followed drift is taken out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+
+@dataclass(frozen=True)
+class StageState:
+    """States of the sensor watch and of the drift follower at the beginning of a day."""
+
+    sensors: Any = None
+    drift: Any = None
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The sensor watch and the drift follower, either of which may be None."""
+
+    temperatures: list[Any]
+    modes: list[Any]
+    sensors: Any = None
+    drift: Any = None
+
+    def start(self) -> StageState:
+        """The states after the baseline."""
+        return StageState(
+            None if self.sensors is None else self.sensors.start(), None if self.drift is None else self.drift.start()
+        )
+
+    def advance(self, state: StageState, day: pd.DataFrame) -> StageState:
+        """The states after one more complete day, which may have no records."""
+        if self.sensors is None and self.drift is None:
+            return state
+        T, F = day[self.temperatures], day[self.modes]
+        sensors, drift = state.sensors, state.drift
+        if self.drift is not None:
+            masked = (T, F) if self.sensors is None else self.sensors.masked(sensors, T, F)
+            drift = self.drift.advance(drift, *masked)
+        if self.sensors is not None:
+            sensors = self.sensors.advance(sensors, T, F)
+        return StageState(sensors, drift)
+
+    def corrected(self, state: StageState, records: pd.DataFrame) -> pd.DataFrame:
+        """Records of one day as the detector sees them."""
+        if (self.sensors is None and self.drift is None) or not len(records):
+            return records
+        T, F = records[self.temperatures], records[self.modes]
+        if self.sensors is not None:
+            T, F = self.sensors.masked(state.sensors, T, F)
+        if self.drift is not None:
+            F = self.drift.corrected(state.drift, T, F)
+        return pd.concat([T, F], axis=1)[list(records.columns)]
+
+    def faults(self, state: StageState) -> pd.DataFrame:
+        """Sensors that have failed."""
+        if self.sensors is None:
+            return pd.DataFrame(columns=["column", "kind", "since", "told", "until", "detail"])
+        return self.sensors.faults(state.sensors)
+
+    def drifts(self, state: StageState) -> pd.DataFrame | None:
+        """The drift of each group; None where none is followed."""
+        return None if self.drift is None else self.drift.report(state.drift)
