@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,15 @@ SUDDEN = 1e-3  # probability that the mean of waiting days is as far from what w
 CLEAR = 0.05  # probability that frequencies without drift would seem to drift as much, from which it is taken out
 SIGNIFICANT = 2.58  # standard errors of a group's change: by chance in 1 % of groups that do not drift
 LIMIT = 0.05
+ONE_DAY = pd.DateOffset(days=1)
+
+
+class Waiting(NamedTuple):
+    """Daily means of days that wait, as in `DailyMeans`."""
+
+    values: Array
+    counts: Array
+    basis: Array
 
 
 @dataclass(frozen=True)
@@ -33,8 +42,8 @@ class FollowerState:
     ----------
     known : ParameterState
         Drift by the days that have waited long enough.
-    values, counts, basis : ndarray
-        Daily means of the days that wait, as in `DailyMeans`.
+    waiting : Waiting
+        Daily means of the days since.
     sudden : ndarray of bool
         Which of these days are in a time that departs from what was foretold; drift is not learned from them.
     weather : float
@@ -46,14 +55,17 @@ class FollowerState:
     """
 
     known: ParameterState
-    values: Array
-    counts: Array
-    basis: Array
+    waiting: Waiting
     sudden: NDArray[np.bool_]
     weather: float
     times: NDArray[np.int64]
     temperatures: Array
     n_left_out: int = 0
+
+    @property
+    def day(self) -> pd.Timestamp:
+        """Beginning of the last day."""
+        return self.known.day + len(self.sudden) * ONE_DAY
 
 
 @dataclass(frozen=True)
@@ -72,6 +84,8 @@ class DriftFollower:
         Learned from the baseline.
     limit : float
         Change of a group's stiffness that is worth attention however slowly it came.
+    memory : Memory
+        How far back lags of the chain look.
     start_ : FollowerState
         What is known at the end of the baseline.
     """
@@ -108,14 +122,12 @@ class DriftFollower:
         -------
         DriftFollower
         """
+        T, F = T[list(fem.feature_names_in_)], F[list(fem.mode_names_)]
         followed, memory = ParameterFilter.of(fem, T, F, groups), Memory.of(fem.mapper_)
-        n_modes, size = followed.effects.slopes.shape[0], followed.records.basis.size
-        known = followed.start()
+        n_modes, size = F.shape[1], followed.records.basis.size
         nothing = np.empty((0, n_modes))
-        times, temperatures = _latest(memory, T)
-        start = FollowerState(
-            known, nothing, nothing, np.empty((0, n_modes, size)), np.empty(0, bool), known.weather, times, temperatures
-        )
+        waiting, known = Waiting(nothing, nothing, np.empty((0, n_modes, size))), followed.start()
+        start = FollowerState(known, waiting, np.empty(0, dtype=bool), known.weather, *_latest(memory, T))
         return cls(followed, limit, memory, start)
 
     def start(self) -> FollowerState:
@@ -123,59 +135,32 @@ class DriftFollower:
         return self.start_
 
     def advance(self, state: FollowerState, T: pd.DataFrame, F: pd.DataFrame) -> FollowerState:
-        """The state at the end of the next day.
+        """The state at the end of a day.
 
         Parameters
         ----------
         state : FollowerState
-            At the end of the day before.
+            At the end of an earlier day.
         T, F : DataFrame
-            Temperatures and frequencies of one complete day, in order of time; they may be empty.
+            Temperatures and frequencies of one complete day, in order of time. The state stays as it is without any,
+            or if they are of a day that is known already, such as the last one of the baseline.
 
         Returns
         -------
         FollowerState
         """
-        place = len(state.sudden)
-        days = pd.date_range(state.known.day, periods=place + 2, freq=self.filter.records.freq)[1:]
-        today = days[-1:]
-        n_modes, size = self.filter.effects.slopes.shape[0], self.filter.records.basis.size
-        weather, times, temperatures = float("nan"), state.times, state.temperatures
-        if len(F):
-            history = pd.DataFrame(state.temperatures, _stamps(state.times, T.index), T.columns)
-            beside = pd.concat([history, T])
-            new = self.filter.records.means(beside, F, today, state.weather)
-            there = new.basis[0, :, 1][new.known[0]]
-            weather = float(there[0]) if len(there) else weather
-            times, temperatures = _latest(self.memory, beside)
-        else:
-            new = DailyMeans(today, np.full((1, n_modes), np.nan), np.zeros((1, n_modes)), np.zeros((1, n_modes, size)))
-        waiting = DailyMeans(
-            days,
-            np.vstack([state.values, new.values]),
-            np.vstack([state.counts, new.counts]),
-            np.concatenate([state.basis, new.basis]),
-        )
-        sudden = np.append(state.sudden, False)
-        if self._departs(state.known, waiting):
-            sudden[:] = True
-        known, n_left_out, first = state.known, state.n_left_out, 0
-        if len(days) > DELAY:
-            first = len(days) - DELAY
-            known = self.filter.advanced(known, _part(waiting, slice(first)), absorb=not sudden[0])
-            n_left_out = n_left_out + 1 if sudden[0] else 0
-        rest = slice(first, None)
-        return FollowerState(
-            known,
-            waiting.values[rest],
-            waiting.counts[rest],
-            waiting.basis[rest],
-            sudden[rest],
-            weather,
-            times,
-            temperatures,
-            n_left_out,
-        )
+        if not len(F):
+            return state
+        today = F.index[-1].normalize()
+        days = pd.date_range(state.day, today, freq="D")[1:]
+        if not len(days):
+            return state
+        for _ in days[:-1]:
+            state = self._with_day(state, self._no_records())
+        beside = pd.concat([_history(state, T.index.tz, self.temperatures), T[self.temperatures]])
+        daily = self.filter.records.means(beside, F[self.modes], days[-1:], state.weather)
+        times, temperatures = _latest(self.memory, beside)
+        return replace(self._with_day(state, daily), times=times, temperatures=temperatures)
 
     def corrected(self, state: FollowerState, T: pd.DataFrame, F: pd.DataFrame) -> pd.DataFrame:
         """Measured frequencies without the drift that is taken out.
@@ -192,7 +177,8 @@ class DriftFollower:
         DataFrame
             As ``F``, in Hz.
         """
-        return F * np.exp(-self.share(state) * self.filter.frequency_drift(state.known))
+        shift = dict(zip(self.modes, self.share(state) * self.filter.frequency_drift(state.known), strict=True))
+        return F * np.exp([-shift.get(mode, 0.0) for mode in F])
 
     def share(self, state: FollowerState) -> float:
         """Share of the drift found that is taken out: 0 as long as it may be chance, and nearly 1 when it is clear."""
@@ -235,10 +221,48 @@ class DriftFollower:
             }
         )
 
-    def _departs(self, known: ParameterState, waiting: DailyMeans) -> bool:
+    @property
+    def modes(self) -> list[str]:
+        """Names of the frequencies that are followed."""
+        return list(self.filter.records.fem.mode_names_)
+
+    @property
+    def temperatures(self) -> list[str]:
+        """Names of the temperatures that tell the weather."""
+        return list(self.filter.records.fem.feature_names_in_)
+
+    def _no_records(self) -> DailyMeans:
+        """A day without any."""
+        n_modes, size = len(self.modes), self.filter.records.basis.size
+        none = np.zeros((1, n_modes))
+        return DailyMeans(pd.DatetimeIndex([pd.NaT]), none + np.nan, none, np.zeros((1, n_modes, size)))
+
+    def _with_day(self, state: FollowerState, daily: DailyMeans) -> FollowerState:
+        """The state after one more day; the day that has waited longest is learned from or left out."""
+        there = daily.basis[0, daily.known[0], 1]
+        waiting = Waiting(
+            np.vstack([state.waiting.values, daily.values]),
+            np.vstack([state.waiting.counts, daily.counts]),
+            np.concatenate([state.waiting.basis, daily.basis]),
+        )
+        sudden = np.append(state.sudden, False) | self._departs(state.known, waiting)
+        weather = float(there[0]) if len(there) else float("nan")
+        state = replace(state, waiting=waiting, sudden=sudden, weather=weather)
+        if len(sudden) <= DELAY:
+            return state
+        day = pd.DatetimeIndex([state.known.day + ONE_DAY])
+        oldest = DailyMeans(day, waiting.values[:1], waiting.counts[:1], waiting.basis[:1])
+        return replace(
+            state,
+            known=self.filter.advanced(state.known, oldest, absorb=not sudden[0]),
+            waiting=Waiting(waiting.values[1:], waiting.counts[1:], waiting.basis[1:]),
+            sudden=sudden[1:],
+            n_left_out=state.n_left_out + 1 if sudden[0] else 0,
+        )
+
+    def _departs(self, known: ParameterState, waiting: Waiting) -> bool:
         """Whether the mean of the days that wait is too far from what was foretold."""
-        present = waiting.known
-        number = present.sum(axis=0)
+        number = (~np.isnan(waiting.values)).sum(axis=0)
         modes = np.flatnonzero(number)
         if not len(modes):
             return False
@@ -247,10 +271,11 @@ class DriftFollower:
         distance = float(difference @ np.linalg.solve(spread, difference))
         return distance > len(modes) * stats.f.isf(SUDDEN, len(modes), max(self.filter.noise.freedom, 4.0))
 
-    def _foretold(self, known: ParameterState, waiting: DailyMeans) -> tuple[Array, Array]:
+    def _foretold(self, known: ParameterState, waiting: Waiting) -> tuple[Array, Array]:
         """Mean of ln ratios of each measured mode over the days that wait, and its covariance."""
         noise, slopes = self.filter.noise, self.filter.effects.slopes
-        weights = waiting.known / np.maximum(waiting.known.sum(axis=0), 1)
+        known_days = ~np.isnan(waiting.values)
+        weights = known_days / np.maximum(known_days.sum(axis=0), 1)
         ahead = np.arange(1, len(weights) + 1)
         later = ahead @ weights * length_of(self.filter.records.freq)
         n_modes, n_groups = slopes.shape
@@ -267,13 +292,8 @@ class DriftFollower:
         deviations = np.sqrt(fading + fresh)
         walked = WALK**2 * np.sqrt(np.outer(later, later)) * (slopes @ slopes.T)
         spread = design @ known.covariance @ design.T + walked + noise.correlation * np.outer(deviations, deviations)
-        modes = np.flatnonzero(waiting.known.any(axis=0))
+        modes = np.flatnonzero(known_days.any(axis=0))
         return (design @ known.mean)[modes], spread[np.ix_(modes, modes)]
-
-
-def _part(daily: DailyMeans, rows: slice) -> DailyMeans:
-    """Some of the days."""
-    return DailyMeans(daily.days[rows], daily.values[rows], daily.counts[rows], daily.basis[rows])
 
 
 def _latest(memory: Memory, T: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
@@ -283,7 +303,9 @@ def _latest(memory: Memory, T: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
     return times[first:], T.to_numpy(dtype=float)[first:]
 
 
-def _stamps(times: NDArray[np.int64], like: pd.DatetimeIndex) -> pd.DatetimeIndex:
-    """Nanoseconds as stamps of the same time zone as others."""
-    stamps = pd.DatetimeIndex(times.astype("datetime64[ns]"), name=like.name)
-    return stamps if like.tz is None else stamps.tz_localize("UTC").tz_convert(like.tz)
+def _history(state: FollowerState, zone: Any, names: list[str]) -> pd.DataFrame:
+    """The latest temperatures that a state holds."""
+    stamps = pd.DatetimeIndex(state.times.astype("datetime64[ns]"))
+    return pd.DataFrame(
+        state.temperatures, stamps if zone is None else stamps.tz_localize("UTC").tz_convert(zone), names
+    )
