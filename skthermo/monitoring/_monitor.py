@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
@@ -29,6 +30,7 @@ from skthermo._warnings import warn_user
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._course import Bench, Course, nothing_judged
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
+from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory, longest_window
 from skthermo.monitoring._promise import promised_rule
@@ -105,6 +107,8 @@ class Monitor(SavesFrames, Estimator):
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
+    versions_ : dict
+        Versions of skthermo and scikit-learn by which it was fitted.
     bench_, store_, course_, said_ : object
         What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
         what the owner has said of events.
@@ -250,6 +254,7 @@ class Monitor(SavesFrames, Estimator):
         self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
+        self.versions_ = versions()
         return self
 
     def update(self, new: pd.DataFrame) -> pd.DataFrame:
@@ -333,6 +338,27 @@ class Monitor(SavesFrames, Estimator):
             events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
         )
         self.said_ = (*self.said_, said)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, which ends with ``.skops`` (skops, runs no code when it is read) or ``.joblib``. An older one is
+            replaced when the new one is complete and on the disk, so that a crash leaves one of the two.
+
+        Raises
+        ------
+        NotFittedError
+            If the monitor is not fitted.
+        ValueError
+            If the path has another ending, the folder does not exist, or skops cannot save a part of the monitor, such
+            as a class of another package.
+        ImportError
+            If the file ends with ``.skops``, and skops is not installed.
+        """
+        write_monitor(self, path)
 
     def summary(self) -> str:
         """What the owner should know, in a few lines.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import gamma, nbinom
 
 from skthermo._arrays import Array
+from skthermo._saved_frames import SavesFrames
 from skthermo._warnings import warn_user
 
 YEAR = pd.Timedelta(days=365.25)
@@ -29,7 +30,7 @@ class EventState:
 
 
 @dataclass(frozen=True)
-class EventRule:
+class EventRule(SavesFrames):
     """An event opens with a record above ``threshold`` and closes when those of ``hold`` stayed within ``release``.
 
     Records that are not judged (NaN) neither open nor close it: the time of silence counts only between judged records.
