@@ -137,7 +137,7 @@ class Course(SavesFrames):
         new = _days_of(answers)
         drifts = {day: bench.stages.drifts(state) for day, state in zip(days, stages, strict=True)}
         if any(drift is not None for drift in drifts.values()):
-            shares = pd.DataFrame({day: drifts[day]["change"] for day in new.index}).T
+            shares = pd.DataFrame({day: drifts[day]["taken_out"] for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
         return pd.concat([self.days[self.days.index < days[0]], new]) if len(self.days) else new
 

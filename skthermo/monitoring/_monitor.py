@@ -36,6 +36,7 @@ from skthermo.monitoring._memory import Memory, longest_window
 from skthermo.monitoring._promise import promised_rule
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
+from skthermo.monitoring.drift import DriftFollower
 
 ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
@@ -248,7 +249,9 @@ class Monitor(SavesFrames, Estimator):
         self.promise_ = promised_rule(index, self.false_alarms_per_year, hold=hold)
         rule = self.promise_.rule
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
+        others = [name for name in baseline.columns if name not in self.targets_]
+        follower = None if self.fem is None else DriftFollower.of(self.fem, cleaned[others], cleaned[self.targets_])
+        stages = Stages(others, self.targets_, drift=follower)
         self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, rule.threshold)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
         self.course_ = Course.of(self.bench_, baseline, EventLog(rule))

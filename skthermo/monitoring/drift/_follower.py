@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._arrays import Array
+from skthermo._warnings import without_warnings
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._filter import WALK, ParameterFilter, ParameterState, length_of
@@ -158,7 +159,8 @@ class DriftFollower:
         for _ in days[:-1]:
             state = self._with_day(state, self._no_records())
         beside = pd.concat([_history(state, T.index.tz, self.temperatures), T[self.temperatures]])
-        daily = self.filter.records.means(beside, F[self.modes], days[-1:], state.weather)
+        with without_warnings():  # earlier temperatures have no lags; gaps of the day are the detector's to tell
+            daily = self.filter.records.means(beside, F[self.modes], days[-1:], state.weather)
         times, temperatures = _latest(self.memory, beside)
         return replace(self._with_day(state, daily), times=times, temperatures=temperatures)
 
