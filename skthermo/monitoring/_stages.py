@@ -7,6 +7,9 @@ from typing import Any
 
 import pandas as pd
 
+from skthermo.monitoring.drift import DriftFollower
+from skthermo.monitoring.sensors import SensorWatch
+
 
 @dataclass(frozen=True)
 class StageState:
@@ -24,6 +27,14 @@ class Stages:
     modes: list[Any]
     sensors: Any = None
     drift: Any = None
+
+    @classmethod
+    def of(cls, baseline: pd.DataFrame, targets: list[Any], *, fem: Any = None, sensors: bool = True) -> Stages:
+        """Learned from the baseline that the detector was fitted on; drift is followed where there is a chain."""
+        T, F = baseline.drop(columns=targets), baseline[targets]
+        watch = SensorWatch.of(T, F) if sensors else None
+        follower = None if fem is None else DriftFollower.of(fem, T, F)
+        return cls(list(T.columns), list(targets), watch, follower)
 
     def start(self) -> StageState:
         """The states after the baseline."""
@@ -58,7 +69,7 @@ class Stages:
     def faults(self, state: StageState) -> pd.DataFrame:
         """Sensors that have failed."""
         if self.sensors is None:
-            return pd.DataFrame(columns=["column", "kind", "since", "told", "until", "detail"])
+            return pd.DataFrame({name: [] for name in ("column", "kind", "since", "told", "until", "detail")})
         return self.sensors.faults(state.sensors)
 
     def drifts(self, state: StageState) -> pd.DataFrame | None:
