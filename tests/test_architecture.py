@@ -56,6 +56,8 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "plotting.structures": set(),
     "monitoring.drift": set(),
     "monitoring.sensors": set(),
+    "reporting": {"reporting.service"},
+    "reporting.service": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
     "studies.extension": {"studies.detectability", "studies.scenarios"},
