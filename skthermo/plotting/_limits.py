@@ -86,8 +86,8 @@ def mark_unjudged(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
         if len(x):
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
             ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not judged", **style)
-            counted = f"{len(x)} {noun} not judged" if noun else f"{len(x)} not judged"
-            texts.append(f"{label}: {counted}" if len(places) > 1 else counted)
+            nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not judged")
     if texts:
         _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not judged")
 

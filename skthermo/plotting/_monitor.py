@@ -18,10 +18,11 @@ NEEDED = ("days_", "events_", "threshold_")
 PARTS = ("index", "drift", "sensors")
 DRIFT = "drift "  # how columns of daily drift begin
 N_ERRORS = 2  # standard errors on either side of a change
+DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, Any]] = {
-    "damage event": {"facecolor": ORANGE, "alpha": 0.2},
-    "stiffening event": {"facecolor": SKY, "alpha": 0.3, "hatch": "//"},
-    "event said to be harmless": {"facecolor": LIGHT, "alpha": 0.4, "hatch": ".."},
+    "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
+    "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
+    "event said to be harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
 }
 
 
@@ -180,9 +181,10 @@ class MonitorDisplay:
         self.drift_lines_, self.fault_bars_ = [], []
         draw = {"index": self._draw_index, "drift": self._draw_drift, "sensors": self._draw_sensors}
         first, last = self._ends()
+        room = DODGE * self.drift.shape[1] * (last - first) if "drift" in self.parts else pd.Timedelta(0)
         for one, part in zip(self.axes_, self.parts, strict=True):
             draw[part](one)
-            one.set_xlim(first, last)
+            one.set_xlim(first, last + room)
             if ax is not None or part == self.parts[-1]:
                 date_axis(one, self.index.index)
         figure_legend(self.axes_, ax is None, n_columns=4)
@@ -199,7 +201,7 @@ class MonitorDisplay:
             label = "event said to be harmless" if event["harmless"] else f"{event['kind']} event"
             span = self._span(event["start"], event["end"])
             style = SHADES.get(label, SHADES["damage event"])
-            self.event_spans_.append(ax.axvspan(*span, linewidth=0, edgecolor=GREY, label=label, **style))
+            self.event_spans_.append(ax.axvspan(*span, linewidth=1, label=label, **style))
         x, values = in_time(self.index[["index"]])
         index, is_alarm = values[:, 0], self.index["is_alarm"].to_numpy(dtype=bool)
         is_daily = "median" in self.index
@@ -211,7 +213,7 @@ class MonitorDisplay:
             style = marker_style(number, len(x)) | {"marker": "o" if colour == BLUE else "^", "color": colour}
             if rows.any() or colour == BLUE:
                 self.points_ += ax.plot(x[rows], index[rows], **style, label=label)
-        mark_unjudged(ax, {"": x[np.isnan(index)]}, "days" if is_daily else "")
+        mark_unjudged(ax, {"": x[np.isnan(index)]}, "day" if is_daily else "")
         style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold of an alarm"}
         self.threshold_line_ = ax.axhline(self.threshold, **style)
         ax.set_ylim(bottom=0)
@@ -228,8 +230,9 @@ class MonitorDisplay:
             self.drift_lines_ += ax.plot(x, values[:, 0], **style)
             error = N_ERRORS * 100 * float(self.drift_errors.get(group, np.nan))
             if len(known) and np.isfinite(error):
-                at = known[-1]
-                ax.errorbar(x[at : at + 1], values[at : at + 1, 0], error, color=style["color"], capsize=3)
+                first, last = self._ends()
+                beside = last + (number + 0.5) * DODGE * (last - first)
+                ax.errorbar([beside], values[known[-1:], 0], error, color=style["color"], marker="o", capsize=3)
         ax.axhline(0, color=BLACK, linewidth=0.8)
         ax.set_ylabel("change of\nstiffness (%)")
 

@@ -65,6 +65,7 @@ img { display: block; width: 100%; max-width: 34rem; height: auto; background: v
   border: 1px solid var(--line); padding: 0.25rem; }
 figcaption { font-size: 0.92rem; margin-top: 0.5rem; max-width: 46rem; }
 code { font-size: 0.88em; overflow-wrap: anywhere; }
+.cards th, .cards td { min-width: 3.5rem; }
 @media screen and (max-width: 40rem) {
   .cards thead { display: none; }
   .cards, .cards tbody, .cards tr { display: block; }

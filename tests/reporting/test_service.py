@@ -158,7 +158,7 @@ def test_stiffening_is_reported_and_is_no_alarm():
     monitor = FakeMonitor(events=[event_row("2025-06-10", None, kind="stiffening")])
     page = today_of(monitor)
     assert state_of(page) == "healthy"
-    assert f"Event 1 (stiffening) is open since 10{SPACE}June{SPACE}2025" in page.text
+    assert f"Event 1 (stiffening) has been open since 10{SPACE}June{SPACE}2025" in page.text
     assert "No damage event is open." in page.text
 
 
@@ -226,7 +226,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
         }
     )
     page = Page(sensors(standing_of(FakeMonitor(faults=faults))))
-    assert f"Thermometer T1 repeats one value since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
+    assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
     assert "Mode f2" not in page.text
     assert "is swapped with another" in page.cells
     assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import listed, percent, significant
+from skthermo._formatting import SPACE, listed, percent, significant
 from skthermo.reporting._html import Html, bullets, figure, paragraphs, section, table
 from skthermo.reporting.service._figures import draw_drift
 from skthermo.reporting.service._standing import YEAR, Standing, moment
@@ -48,7 +48,7 @@ def _group(name: Any, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
 
 def _size(value: float, error: float) -> str:
     """A size in percent with two standard errors."""
-    return f"{100 * abs(value):.1f}\N{NO-BREAK SPACE}% (± {percent(N_ERRORS * error, '.1f')})"
+    return f"{100 * abs(value):.1f}{SPACE}% (± {percent(N_ERRORS * error, '.1f')})"
 
 
 def _reached(row: pd.Series, last: pd.Timestamp, limit: float) -> str:
@@ -107,8 +107,8 @@ def drift(standing: Standing, limit: float) -> Html:
 def _signed(value: float, error: float) -> str:
     if not np.isfinite(value):
         return "not known"
-    size = N_ERRORS * error
-    return f"{100 * value + 0.0:+.2f} % ± {significant(100 * size)} %"
+    size = significant(100 * N_ERRORS * error)
+    return f"{100 * value:+.2f}{SPACE}% ±{SPACE}{size}{SPACE}%"
 
 
 def sensor_sentences(standing: Standing) -> list[str]:
@@ -119,8 +119,8 @@ def sensor_sentences(standing: Standing) -> list[str]:
         return ["All sensors work." if standing.has_records else "No sensor has been seen to fail."]
     targets = set(standing.monitor.targets_)
     return [
-        f"{'Mode' if fault['column'] in targets else 'Thermometer'} {fault['column']} "
-        f"{KINDS.get(fault['kind'], fault['kind'])} since {moment(fault['since'])}"
+        f"{'Mode' if fault['column'] in targets else 'Thermometer'} {fault['column']}: "
+        f"{KINDS.get(fault['kind'], fault['kind'])}, since {moment(fault['since'])}"
         + (f" ({fault['detail']})." if fault["detail"] else ".")
         for _, fault in standing.failed.iterrows()
     ]
@@ -144,9 +144,9 @@ def sensors(standing: Standing) -> Html:
             [
                 str(fault["column"]),
                 KINDS.get(fault["kind"], fault["kind"]),
-                moment(fault["since"]),
-                moment(fault["told"]),
-                moment(fault["until"]) or "it lasts",
+                moment(fault["since"], is_short=True),
+                moment(fault["told"], is_short=True),
+                moment(fault["until"], is_short=True) or "it lasts",
                 fault["detail"],
             ]
             for _, fault in known.iloc[::-1].iterrows()

@@ -11,7 +11,7 @@ from skthermo.reporting._html import Html, element, paragraphs, section, table
 from skthermo.reporting.service._standing import Standing, moment
 
 MOST_LISTED = 30  # largest number of events in the table
-COLUMNS = ["Event", "Kind", "Start", "End", "Highest index", "Modes that drive it", "Records", "Acknowledged", "Note"]
+COLUMNS = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
 
 
 def events(standing: Standing) -> Html:
@@ -26,9 +26,8 @@ def events(standing: Standing) -> Html:
     rest = len(known) - MOST_LISTED
     older = f"The table lists the newest {MOST_LISTED}; {rest:,} older ones are in the monitor." if rest > 0 else ""
     rows = [_cells(number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
-    return section(
-        "events", "Events", paragraphs(text, older), table("Events, the newest first.", COLUMNS, rows, is_cards=True)
-    )
+    caption = "Events, the newest first, with the modes that drive each, the worst first, and its number of records."
+    return section("events", "Events", paragraphs(text, older), table(caption, COLUMNS, rows, is_cards=True))
 
 
 def _cells(number: Hashable, event: pd.Series) -> list[object]:
@@ -36,9 +35,9 @@ def _cells(number: Hashable, event: pd.Series) -> list[object]:
     return [
         f"{number}",
         event["kind"],
-        moment(event["start"]),
-        moment(event["end"]) or element("strong", "still open"),
-        f"{significant(event['peak'], 3)} on {moment(event['peak_time'])}",
+        moment(event["start"], is_short=True),
+        moment(event["end"], is_short=True) or element("strong", "still open"),
+        f"{significant(event['peak'], 3)} on {moment(event['peak_time'], is_short=True)}",
         event["modes"] or "none named",
         f"{event['n_alarms']:,}",
         said,

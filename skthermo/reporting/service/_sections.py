@@ -50,7 +50,7 @@ def _index(standing: Standing) -> Html:
         "judged, days without any record among them: nothing is known of them."
     )
     drawn = [draw_month(standing)] if len(standing.judged) else []
-    caption = "Damage index: of each record in the last month, and the highest and the median of each day before."
+    caption = "Damage index: of each record in the last month; the highest and the median of each day in longer times."
     return section("index", title, paragraphs(text), figure(caption, drawn + draw_days(standing)))
 
 

@@ -161,10 +161,11 @@ class Standing:
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
 
 
-def moment(time: Any) -> str:
+def moment(time: Any, *, is_short: bool = False) -> str:
     """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
     if pd.isna(time):
         return ""
     stamp = pd.Timestamp(time)
-    day = f"{stamp.day} {stamp.month_name()} {stamp.year}".replace(" ", SPACE)
+    month = stamp.month_name()[: 3 if is_short else None]
+    day = SPACE.join([str(stamp.day), month, str(stamp.year)])
     return day if stamp == stamp.normalize() else f"{day}, {stamp:%H:%M}"

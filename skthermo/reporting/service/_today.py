@@ -57,7 +57,7 @@ def _newest(standing: Standing) -> list[str]:
 def _events(standing: Standing) -> list[str]:
     sentences = []
     for number, event in standing.events[standing.events["end"].isna()].iterrows():
-        text = f"Event {number} ({event['kind']}) is open since {moment(event['start'])}"
+        text = f"Event {number} ({event['kind']}) has been open since {moment(event['start'])}"
         text += f"; modes that drive it: {event['modes']}." if event["modes"] else "."
         sentences.append(text)
     if not len(standing.opened("damage")):
