@@ -1,5 +1,6 @@
 """State of objects that hold pandas' frames and times, as arrays, lists and numbers, which skops can save."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,9 +47,9 @@ class SavedTime:
 
 @dataclass
 class SavedTable:
-    """Values and labels of a frame, or of a series where there are no columns."""
+    """Values and labels of a frame, or of a series where there are no columns; texts are one text in JSON."""
 
-    values: NDArray | list | SavedLabels
+    values: NDArray | list | str | SavedLabels
     index: SavedLabels
     columns: SavedLabels | None
     name: Any = None
@@ -87,6 +88,8 @@ def from_saved(value: Any) -> Any:
     index = _from_labels(value.index)
     if isinstance(value.values, SavedLabels):
         return pd.Series(_from_labels(value.values), index, name=value.name)
+    if isinstance(value.values, str):
+        return pd.Series(json.loads(value.values), index, name=value.name, dtype=value.dtype)
     if value.columns is None:
         return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
     if isinstance(value.values, list):
@@ -127,7 +130,7 @@ def _of_objects(series: pd.Series, axes: list[Any]) -> Any:
     values = series.tolist()
     texts = series.dtype == object or str(series.dtype) == "str"
     plain = texts and all(isinstance(value, str | int | float | None) for value in values)
-    return SavedTable(values, axes[0], None, series.name, str(series.dtype)) if plain else series
+    return SavedTable(json.dumps(values), axes[0], None, series.name, str(series.dtype)) if plain else series
 
 
 def _to_labels(index: pd.Index) -> SavedLabels | None:

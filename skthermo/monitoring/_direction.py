@@ -1,0 +1,86 @@
+"""Whether records depart from a healthy baseline as by a loss of stiffness, or as by a gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from sklearn.pipeline import Pipeline
+
+from skthermo._arrays import Array
+from skthermo._gaussian import Gaussian, whitenings
+from skthermo._validation import last_step
+from skthermo._warnings import without_warnings
+
+LOWERED = 1e-3  # share by which a frequency is lowered to see what the detector gets
+MOST_ROWS = 500  # of the baseline, the last ones, on which that is tried
+
+
+@dataclass(frozen=True)
+class Direction:
+    """Tells softening from stiffening, by Rayleigh's principle.
+
+    A loss of stiffness lowers some natural frequencies and raises none, whatever the structure. A record, or the mean
+    of a window, counts as softening if frequencies that are lowered, each by as much as suits best, explain more of
+    its departure from the baseline than raised ones do: least squares in standard deviations of the baseline.
+
+    ``steps`` are those of the detector before its last one, ``lowered`` what they make of one that is lowered by a
+    share of itself, (n_features, n_modes), ``baseline`` the distribution of (means of) what the last step gets.
+    """
+
+    steps: Any
+    columns: list
+    window: int | str
+    lowered: Array
+    baseline: Gaussian
+
+    @classmethod
+    def of(cls, detector: Any, baseline: pd.DataFrame, targets: Sequence) -> Direction:
+        """Learned from a fitted detector and its baseline, whose frequencies are the columns ``targets``."""
+        while hasattr(last_step(detector), "detectors_"):  # several that are fused: the first speaks for all
+            detector = last_step(detector).detectors_[0]
+        steps = detector[:-1] if isinstance(detector, Pipeline) and len(detector) > 1 else None
+        columns, window = list(targets), getattr(last_step(detector), "window", 1)
+        some = baseline.iloc[-MOST_ROWS:]
+        before, lowered = _features(steps, columns, some), []
+        for mode in columns:
+            changed = _features(steps, columns, some.assign(**{mode: some[mode] * (1 - LOWERED)}))
+            lowered.append(((changed - before) / LOWERED).median().fillna(0.0))
+        means = _means(_features(steps, columns, baseline), window)
+        return cls(steps, columns, window, np.array(lowered).T, Gaussian.of(means))
+
+    def of_rows(self, X: pd.DataFrame, rows: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+        """+1 (softening) or -1 (stiffening) for some of the rows in order of time, 0 for others and where no mode is.
+
+        The rows have to begin with those that lags and windows need.
+        """
+        means = _means(_features(self.steps, self.columns, X), self.window)
+        wanted = ~np.isnan(means).all(axis=1) & (True if rows is None else rows)
+        signs = np.zeros(len(means), dtype=np.int64)
+        for row in np.flatnonzero(wanted):
+            signs[row] = self._sign(means[row])
+        return signs
+
+    def _sign(self, departure: Array) -> int:
+        present = ~np.isnan(departure)
+        root = whitenings(self.baseline.covariance, present[np.newaxis])[0][0]
+        white = root @ np.where(present, departure - self.baseline.mean, 0.0)
+        effects = root @ self.lowered
+        return 1 if nnls(effects, white)[1] <= nnls(-effects, white)[1] else -1
+
+
+def _features(steps: Any, columns: list, X: pd.DataFrame) -> pd.DataFrame:
+    """What the last step gets of records; of a detector without steps before it, the frequencies."""
+    with without_warnings():
+        features = X[columns] if steps is None else steps.transform(X)
+    return pd.DataFrame(np.asarray(features, dtype=float), X.index)
+
+
+def _means(features: pd.DataFrame, window: int | str) -> Array:
+    """Mean of what is there in the window that ends with each row."""
+    return features.rolling(window, min_periods=1).mean().to_numpy()

@@ -1,0 +1,107 @@
+"""Faults that were told, with their beginning and end."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+
+LASTS = np.iinfo(np.int64).min  # end of a fault that lasts
+SOON = 7 * 86400 * 10**9  # nanoseconds after its end in which a fault that comes again is the same
+COLUMNS = ["column", "kind", "since", "told", "until", "detail"]
+LEFT_OUT = ("dead", "stuck", "absurd", "offset", "drift")
+DEPARTURES = ("offset", "drift", "disagree")
+MONTH = 30.4  # days
+DAY = 86400 * 10**9  # nanoseconds
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Column of each fault by its position, the other one where two are concerned (else -1), times in nanoseconds.
+
+    ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
+    """
+
+    column: NDArray[np.int64]
+    other: NDArray[np.int64]
+    kind: NDArray[np.str_]
+    since: NDArray[np.int64]
+    told: NDArray[np.int64]
+    until: NDArray[np.int64]
+    size: Array
+    rate: Array
+
+    @classmethod
+    def none(cls) -> Faults:
+        """No fault."""
+        whole, real = np.empty(0, dtype=np.int64), np.empty(0)
+        return cls(whole, whole, np.empty(0, dtype="<U8"), whole, whole, whole, real, real)
+
+    def lasting(self, *kinds: str) -> list[int]:
+        """Positions of the faults that last, of these kinds."""
+        return [int(fault) for fault in np.flatnonzero(self.until == LASTS) if self.kind[fault] in kinds]
+
+    def left_out(self, n_columns: int) -> NDArray[np.int64]:
+        """Position of the fault for which each column is left out; -1 where it is not."""
+        found = np.full(n_columns, -1)
+        for fault in self.lasting(*LEFT_OUT):
+            found[self.column[fault]] = fault
+        return found
+
+    def opened(
+        self, kind: str, column: int, since: int, told: int, *, other: int = -1, size: float = 0.0, rate: float = 0.0
+    ) -> Faults:
+        """With one more fault, or with that one again which has just ended."""
+        same = (self.column == column) & (self.other == other) & (self.kind == kind)
+        again = np.flatnonzero(same & (self.until > since - SOON))
+        if again.size:
+            return self.with_values(int(again[-1]), until=LASTS)
+        values = (column, other, kind, since, told, LASTS, size, rate)
+        whole = (np.append(getattr(self, part.name), value) for part, value in zip(fields(self), values, strict=True))
+        return Faults(*whole)
+
+    def with_values(self, fault: int, **values: str | float) -> Faults:
+        """With other values of one fault."""
+        changed = {name: getattr(self, name).copy() for name in values}
+        for name, value in values.items():
+            changed[name][fault] = value
+        return replace(self, **changed)
+
+    def table(self, names: Sequence[Hashable], zone: str) -> pd.DataFrame:
+        """One row a fault, two where two columns are concerned."""
+        rows = []
+        for fault in range(len(self.column)):
+            ours, other = int(self.column[fault]), int(self.other[fault])
+            for column, partner in [(ours, other), (other, ours)][: 1 if other < 0 else 2]:
+                rows.append(
+                    [names[column], str(self.kind[fault]), *self._times(fault), self._detail(fault, names, partner)]
+                )
+        table = pd.DataFrame(rows, columns=COLUMNS)
+        for name in ("since", "told", "until"):
+            stamps = pd.DatetimeIndex(np.array(table[name].tolist(), dtype="datetime64[ns]"))
+            table[name] = stamps if not zone else stamps.tz_localize("UTC").tz_convert(zone)
+        return table
+
+    def _times(self, fault: int) -> list[int]:
+        """Beginning, day of telling and end."""
+        return [int(self.since[fault]), int(self.told[fault]), int(self.until[fault])]
+
+    def _detail(self, fault: int, names: Sequence[Hashable], partner: int) -> str:
+        """What was seen, and what is done about it."""
+        size, rate = self.size[fault], self.rate[fault]
+        return {
+            "dead": "has had no value for longer than gaps of the baseline",
+            "stuck": f"repeats {size:.6g}; left out",
+            "absurd": f"shows what cannot be, such as {size:.6g}; left out",
+            "offset": f"{size:+.1f} degrees beside what the other thermometers foretell; left out",
+            "drift": f"{rate * MONTH:+.2f} degrees a month, {size:+.1f} so far, beside what the other thermometers "
+            "foretell; left out",
+            "disagree": f"{abs(size):.1f} degrees between what it, {names[partner]!r} and any others foretell: which "
+            "is wrong cannot be told, none is left out",
+            "swapped": f"its values are in the column of {names[partner]!r}; put back in place",
+        }[str(self.kind[fault])]

@@ -1,0 +1,87 @@
+"""Frequencies that no structure has: absurd values of a mode, and columns of modes that were exchanged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array
+from skthermo._weather_regression import WeatherRegression, median, robust_deviation
+from skthermo.monitoring.sensors._thermometers import local_days
+
+ABSURD = 0.25  # change of a frequency, as a logarithm, that no damage gives to one mode alone
+UNMOVED = 0.05  # median of the changes of all modes up to which one moves alone
+FEWEST = 3  # modes of which one can be told to move alone
+FAR = 4.0  # daily deviations by which both modes are away from their places
+NEARER = 0.5  # distance of both from their places when exchanged, over that as they are
+CERTAIN = 20.0  # logarithm of the odds that two modes are exchanged
+LARGEST = 50.0  # logarithm of the odds that one record may add
+LEAST_DEVIATION = 1e-4  # of the logarithm of a frequency
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Frequencies that the weather foretells, and how far daily medians are from them in the baseline."""
+
+    regression: WeatherRegression
+    lowest: Array
+    highest: Array
+    deviations: Array
+
+    @classmethod
+    def of(cls, temperatures: Array, frequencies: Array, stamps: pd.DatetimeIndex) -> Modes:
+        """Learn from the baseline."""
+        regression = WeatherRegression.of(temperatures, frequencies)
+        bare = cls(regression, np.fmin.reduce(frequencies), np.fmax.reduce(frequencies), np.empty(0))
+        rest = pd.DataFrame(bare.logarithms(temperatures, frequencies)[0])
+        by_day = rest.groupby(local_days(stamps)).median().to_numpy()
+        deviations = np.maximum(np.nan_to_num(robust_deviation(by_day), nan=np.inf), LEAST_DEVIATION)
+        return cls(regression, bare.lowest, bare.highest, deviations)
+
+    def logarithms(self, temperatures: Array, frequencies: Array) -> tuple[Array, Array]:
+        """Logarithms of frequencies beside those that the weather foretells, and of these."""
+        expected = self.regression.predict(temperatures)
+        expected = np.where(np.isnan(expected), self.regression.centre, expected)
+        expected = np.log(np.clip(expected, self.lowest, self.highest))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = np.log(np.where(frequencies > 0, frequencies, 1e-300))
+        return np.where(np.isnan(frequencies), np.nan, found - expected), expected
+
+    def absurd(self, rest: Array) -> NDArray[np.bool_]:
+        """Values that moved by tens of percent while the other modes of their record stay."""
+        with np.errstate(invalid="ignore"):
+            far = np.abs(rest) > ABSURD
+        if not far.any() or rest.shape[1] < FEWEST:
+            return far & False
+        rows = far.any(axis=1)
+        far[rows] &= (median(np.abs(rest[rows]).T) < UNMOVED)[:, np.newaxis]
+        return far
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Pairs of modes, by position."""
+        return list(combinations(range(len(self.lowest)), 2))
+
+    def odds_of_exchange(self, rest: Array, expected: Array) -> Array:
+        """Logarithm of the odds that a day's values of each pair are exchanged, against their being in place.
+
+        Modes are exchanged only where the lower column rises and the upper one falls, by about their distance: no
+        damage does that, and the odds are as bad as they can be otherwise.
+        """
+        today, places = median(rest), median(expected)
+        found = np.zeros(len(self.pairs()))
+        for pair, (first, second) in enumerate(self.pairs()):
+            both = [first, second]
+            if np.isnan(today[both]).any():
+                continue
+            gap = places[second] - places[first]
+            here = today[both] / self.deviations[both]
+            exchanged = np.array([today[second] + gap, today[first] - gap]) / self.deviations[both]
+            odds = (here @ here - exchanged @ exchanged) / 2
+            is_far = (np.sign(gap) * here * [1, -1] > FAR).all()
+            is_near = (np.abs(exchanged) < NEARER * np.abs(here)).all()
+            found[pair] = min(odds, LARGEST) if is_far and is_near else -LARGEST
+        return found

@@ -1,0 +1,305 @@
+"""The watch on sensors: from day to day, which are at fault."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import columns_by_sensor, frame_like
+from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
+from skthermo.monitoring.sensors._faults import DAY, DEPARTURES, Faults
+from skthermo.monitoring.sensors._modes import CERTAIN, Modes
+from skthermo.monitoring.sensors._runs import ABSURD, MISSING, REPEATED, RunLimits, Runs
+from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
+
+A_DEGREE = 1.0  # below which thermometers may depart without a fault
+IMPOSSIBLE = 30.0  # degrees, or the baseline's range, outside that range, which no weather gives
+LEAST_OTHERS = 2  # thermometers that tell which one is at fault
+ENDED = 7.0  # logarithm of the odds that an offset or a drift has ended
+RECENT = 7  # days that may already be without the fault
+KINDS_OF_RUNS = {"absurd": ABSURD, "stuck": REPEATED, "dead": MISSING}
+
+
+@dataclass(frozen=True)
+class WatchState:
+    """What the watch remembers: current runs, daily means of the last months, evidence, faults."""
+
+    runs: Runs
+    days: Days
+    means: Array
+    departures: Array
+    exchanged: Array
+    exchanged_since: NDArray[np.int64]
+    faults: Faults
+
+
+@dataclass(frozen=True)
+class SensorWatch:
+    """Watches thermometers and modes in service, and tells faults of sensors from damage where the data can.
+
+    Damage moves no thermometer: one that departs from what the others foretell is at fault, unless most depart at once,
+    as in weather that the baseline does not have. A mode that moves may be damaged: it is left out only where no damage
+    explains what it shows.
+
+    Make one by `of`; the state is immutable and small, and what it says depends on complete days alone.
+    """
+
+    sensors: list[Hashable]
+    columns: list[list[int]]
+    modes: list[Hashable]
+    zone: str
+    lowest: Array
+    highest: Array
+    run_limits: RunLimits
+    thermometers: Thermometers | None
+    expected: Modes
+
+    @classmethod
+    def of(cls, T: pd.DataFrame, F: pd.DataFrame, *, per_year: float = 0.1) -> SensorWatch:
+        """Learn from the baseline.
+
+        Parameters
+        ----------
+        T : DataFrame of shape (n_samples, n_temperatures)
+            Temperatures in degrees Celsius on a ``DatetimeIndex``; lags of a sensor may have columns of their own.
+        F : DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz, on the same index.
+        per_year : float, default=0.1
+            Offsets and drifts of healthy thermometers that may be told in a year, over all of them.
+
+        Returns
+        -------
+        SensorWatch
+            For the days after the baseline.
+        """
+        by_sensor = columns_by_sensor(T)
+        order = np.argsort(T.index.asi8, kind="stable")
+        stamps = T.index[order]
+        columns = list(by_sensor.values())
+        temperatures = as_floats(T)[order][:, [own[0] for own in columns]]
+        frequencies = as_floats(F)[order]
+        lowest, highest = np.fmin.reduce(temperatures), np.fmax.reduce(temperatures)
+        beyond = np.maximum(highest - lowest, IMPOSSIBLE)
+        per_day = len(stamps) / max(len(np.unique(local_days(stamps))), 1)
+        return cls(
+            list(by_sensor),
+            columns,
+            list(F.columns),
+            "" if stamps.tz is None else str(stamps.tz),
+            lowest - beyond,
+            highest + beyond,
+            RunLimits.of(np.hstack([temperatures, frequencies]), per_day),
+            Thermometers.of(stamps, temperatures, per_year),
+            Modes.of(temperatures, frequencies, stamps),
+        )
+
+    def start(self) -> WatchState:
+        """The state before the first day."""
+        n_sensors, n_pairs = len(self.sensors), len(self.expected.pairs())
+        return WatchState(
+            Runs.none(self.run_limits.last),
+            np.empty(0, dtype=np.int64),
+            np.empty((0, n_sensors)),
+            np.empty((4, 0, n_sensors)),
+            np.zeros(n_pairs),
+            np.zeros(n_pairs, dtype=np.int64),
+            Faults.none(),
+        )
+
+    def faults(self, state: WatchState) -> pd.DataFrame:
+        """Faults told so far: ``column``, ``kind``, ``since``, ``told``, ``until`` (NaT while it lasts), ``detail``."""
+        return state.faults.table([*self.sensors, *self.modes], self.zone)
+
+    def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Records without what sensors at fault show: NaN there, and exchanged modes back in place."""
+        temperatures, frequencies = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
+        own = [columns[0] for columns in self.columns]
+        impossible, absurd, _, _ = self._judged(temperatures[:, own], frequencies)
+        out = self._left_out(state.faults)
+        for sensor, columns in enumerate(self.columns):
+            temperatures[impossible[:, sensor], columns[0]] = np.nan
+            if out[sensor]:
+                temperatures[:, columns] = np.nan
+        frequencies = np.where(absurd | out[len(self.sensors) :], np.nan, frequencies)
+        return frame_like(T, temperatures), frame_like(F, frequencies)
+
+    def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
+        """The state after one complete day with these records, if any."""
+        if not len(T_day):
+            return state
+        stamps = T_day.index
+        day = int(local_days(stamps[:1])[0])
+        moments = stamps.as_unit("ns").asi8
+        temperatures = as_floats(T_day)[:, [own[0] for own in self.columns]]
+        frequencies = self._in_place(state.faults, as_floats(F_day))
+        impossible, absurd, rest, expected = self._judged(temperatures, frequencies)
+        runs = state.runs.after(moments, np.hstack([temperatures, frequencies]), np.hstack([impossible, absurd]))
+        midnight = int(self._midnight(day))
+        before, state = state.faults, replace(state, runs=runs)
+        state = self._with_exchanges(state, rest, expected, midnight)
+        state = self._with_runs(state, midnight)
+        if self.thermometers is None:
+            return state
+        means = self.thermometers.daily_means(stamps, np.where(impossible, np.nan, temperatures))
+        kept = state.days > day - LONGEST
+        departures = self.thermometers.departures(means, self._trusted(state.faults))
+        state = replace(
+            state,
+            days=np.append(state.days[kept], day),
+            means=np.vstack([state.means[kept], means]),
+            departures=np.concatenate([state.departures[:, kept], departures], axis=1),
+        )
+        if not np.array_equal(self._trusted(state.faults), self._trusted(before)):
+            state = self._departing(state)
+        return self._with_departures(self._without_ended(state, midnight), midnight)
+
+    def _midnight(self, day: int) -> np.int64:
+        """Beginning of a day, in nanoseconds."""
+        stamp = pd.Timestamp(day * DAY)
+        return np.int64(
+            (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
+        )
+
+    def _judged(
+        self, temperatures: Array, frequencies: Array
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array]:
+        """Impossible temperatures, absurd frequencies, and logarithms of frequencies beside expected ones and these."""
+        impossible = (temperatures < self.lowest) | (temperatures > self.highest)
+        rest, expected = self.expected.logarithms(np.where(impossible, np.nan, temperatures), frequencies)
+        return impossible, self.expected.absurd(rest), rest, expected
+
+    def _in_place(self, faults: Faults, frequencies: Array) -> Array:
+        """Frequencies with exchanged modes back in their columns."""
+        frequencies = frequencies.copy()
+        for fault in faults.lasting("swapped"):
+            pair = np.array([faults.column[fault], faults.other[fault]]) - len(self.sensors)
+            frequencies[:, pair] = frequencies[:, pair[::-1]]
+        return frequencies
+
+    def _with_exchanges(self, state: WatchState, rest: Array, expected: Array, midnight: int) -> WatchState:
+        """Modes that are exchanged from now on, or no longer."""
+        odds = self.expected.odds_of_exchange(rest, expected)
+        evidence = np.maximum(state.exchanged + odds, 0.0)
+        since = np.where((state.exchanged == 0) & (evidence > 0), midnight, state.exchanged_since)
+        faults = state.faults
+        for pair in np.flatnonzero(evidence > CERTAIN):
+            first, second = (len(self.sensors) + mode for mode in self.expected.pairs()[pair])
+            known = [
+                fault
+                for fault in faults.lasting("swapped")
+                if {first, second} == {faults.column[fault], faults.other[fault]}
+            ]
+            if known:
+                faults = faults.with_values(int(known[0]), until=since[pair])
+            else:
+                faults = faults.opened("swapped", first, since[pair], midnight, other=second)
+            evidence[pair] = 0.0
+        return replace(state, exchanged=evidence, exchanged_since=since, faults=faults)
+
+    def _with_runs(self, state: WatchState, midnight: int) -> WatchState:
+        """Columns that are dead, stuck or absurd, or no longer."""
+        faults, runs = state.faults, state.runs
+        is_run = runs.counts >= self.run_limits.limits
+        out = faults.left_out(is_run.shape[1])
+        for column in np.flatnonzero(is_run.any(axis=0) | (out >= 0)):
+            fault = int(out[column])
+            kind = next((name for name, row in KINDS_OF_RUNS.items() if is_run[row, column]), None)
+            known = str(faults.kind[fault]) if fault >= 0 else None
+            if known == kind:
+                continue
+            if known in KINDS_OF_RUNS:
+                faults = faults.with_values(fault, until=midnight)
+                state = self._forgotten(state, column, int(state.days[-1]) + 1 if len(state.days) else 0)
+                known = None
+            if kind is not None:
+                if known is not None:  # an offset turns out to be something else
+                    faults = faults.with_values(fault, until=midnight)
+                since = int(runs.since[KINDS_OF_RUNS[kind], column])
+                faults = faults.opened(kind, column, since, midnight, size=float(runs.last[column]))
+        return replace(state, faults=faults)
+
+    def _forgotten(self, state: WatchState, column: int, before: int) -> WatchState:
+        """Without a thermometer's daily means before a day, on which its fault ended."""
+        if column >= len(self.sensors):
+            return state
+        means = state.means.copy()
+        means[state.days < before, column] = np.nan
+        return replace(state, means=means)
+
+    def _departing(self, state: WatchState) -> WatchState:
+        """With what each thermometer shows beside those that can be trusted."""
+        return replace(state, departures=self.thermometers.departures(state.means, self._trusted(state.faults)))
+
+    def _trusted(self, faults: Faults) -> NDArray[np.bool_]:
+        """Thermometers that are not left out."""
+        return ~self._left_out(faults)[: len(self.sensors)]
+
+    def _left_out(self, faults: Faults) -> NDArray[np.bool_]:
+        """Thermometers and modes that are left out."""
+        return faults.left_out(len(self.sensors) + len(self.modes)) >= 0
+
+    def _change(self, state: WatchState, sensor: int) -> Change | None:
+        """The offset or drift of a thermometer that noise does not explain and that matters; None without one."""
+        noise = self.thermometers.noises[sensor]
+        found = noise.change(Departures(state.days, *state.departures[:, :, sensor]))
+        return found if found is not None and found.z > noise.limit and abs(found.size) > A_DEGREE else None
+
+    def _without_ended(self, state: WatchState, midnight: int) -> WatchState:
+        """Offsets and drifts that have ended are closed; those that last are estimated again."""
+        for fault in state.faults.lasting(*DEPARTURES):
+            faults = state.faults
+            sensor, told = int(faults.column[fault]), int(faults.told[fault])
+            after = state.days * DAY > told
+            departures = Departures(state.days, *state.departures[:, :, sensor])
+            before = departures.rows(after & (state.days <= state.days[-1] - RECENT)).known()
+            level = faults.size[fault] if len(before.days) < RECENT else np.median(before.values * before.deviations)
+            noise = self.thermometers.noises[sensor]
+            odds, end = noise.for_no_change(departures.rows(after), float(level))
+            if odds > ENDED and state.days[-1] - end >= LEAST_DAYS - 1:
+                until = int(self._midnight(end))
+                state = replace(state, faults=faults.with_values(fault, until=until))
+                state = self._departing(self._forgotten(state, sensor, end))
+            elif midnight - told < LONGEST * DAY / 2 and faults.kind[fault] != "disagree":
+                found = self._change(state, sensor)
+                if found is not None:
+                    state = replace(state, faults=faults.with_values(fault, **self._described(found)))
+        return state
+
+    def _described(self, change: Change) -> dict[str, Any]:
+        """A change in the words of `Faults`."""
+        kind = "drift" if change.rate else "offset"
+        return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
+
+    def _with_departures(self, state: WatchState, midnight: int) -> WatchState:
+        """Thermometers that depart from the others from now on: the worst first, then without it."""
+        before = state
+        while True:
+            free = np.flatnonzero(self._trusted(state.faults))
+            changes = {sensor: found for sensor in free if (found := self._change(state, sensor)) is not None}
+            if not changes:
+                return self._agreed(state, midnight) if state is not before else state
+            worst = max(changes, key=lambda sensor: changes[sensor].weight)
+            others = [sensor for sensor in free if sensor != worst and not np.isnan(state.means[-1, sensor])]
+            n_departing = 1 + len(state.faults.lasting("offset", "drift"))
+            if len(others) < LEAST_OTHERS or 2 * n_departing >= len(self.sensors):
+                if before.faults.lasting("disagree") or not others:
+                    return before
+                other = max(others, key=lambda sensor: changes[sensor].weight if sensor in changes else 0.0)
+                found = self._described(changes[worst]) | {"kind": "disagree", "rate": 0.0}
+                faults = before.faults.opened(column=int(worst), other=int(other), told=midnight, **found)
+                return replace(before, faults=faults)
+            found = self._described(changes[worst])
+            faults = state.faults.opened(column=int(worst), told=midnight, **found)
+            state = self._departing(replace(state, faults=faults))
+
+    def _agreed(self, state: WatchState, midnight: int) -> WatchState:
+        """Thermometers that disagreed do so no longer: the one at fault has been found."""
+        for fault in state.faults.lasting("disagree"):
+            state = replace(state, faults=state.faults.with_values(fault, until=midnight))
+        return state
