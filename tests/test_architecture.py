@@ -58,6 +58,8 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "monitoring.drift": set(),
     "monitoring.retraining": set(),
     "monitoring.sensors": set(),
+    "reporting": {"reporting.service"},
+    "reporting.service": set(),
     "studies.scenarios": set(),
     "studies.detectability": {"studies.scenarios"},
     "studies.extension": {"studies.detectability", "studies.scenarios"},

@@ -254,7 +254,7 @@ class Monitor(SavesFrames, Estimator):
                 "are taken as missing; expected NaN there",
                 "markers",
             )
-        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
         charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
         charge.bench.judge.check_memory(cleaned)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
@@ -457,12 +457,18 @@ class Monitor(SavesFrames, Estimator):
         """The promised threshold of a detector that was fitted on some records."""
         return self._charge_of(detector, trained, self.bench_.judge.columns, self.bench_.stages).promise.rule.threshold
 
+    def _renewed_chain(self, trained: pd.DataFrame) -> Any:
+        """The chain of the structure after an intervention, from which drift is followed; None without one."""
+        if self.fem is None:
+            return None
+        return clone(self.fem).fit(trained.drop(columns=self.targets_), trained[self.targets_])
+
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
         trained, end, stages = retraining.baseline, None, self.bench_.stages
         if retraining.kind == "new baseline":
             end = retraining.since.as_unit("ns").value
-            stages = Stages.of(trained, self.targets_, sensors=self.sensors)
+            stages = Stages.of(trained, self.targets_, fem=self._renewed_chain(trained), sensors=self.sensors)
         charge = self._charge_of(retraining.detector, trained, self.bench_.judge.columns, stages)
         course = self.course_.handed_over(charge.bench, self.store_, charge.rules, end)
         self._put_in_charge(charge, trained, course)
