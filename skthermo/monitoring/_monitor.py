@@ -261,7 +261,7 @@ class Monitor(SavesFrames, Estimator):
         rules = {kind: promise.rule for kind, promise in promises.items()}
         self.promise_, rule = promises["damage"], rules["damage"]
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
         release = min(one.release for one in rules.values())
         self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
