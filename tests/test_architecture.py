@@ -54,6 +54,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
     "plotting.comparison": set(),
     "plotting.structures": set(),
+    "monitoring": {"monitoring.drift", "monitoring.retraining", "monitoring.sensors"},  # the monitor joins them
     "monitoring.drift": set(),
     "monitoring.sensors": set(),
     "studies.scenarios": set(),

@@ -29,6 +29,7 @@ from skthermo._validation import (
 from skthermo._warnings import warn_user
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._course import Bench, Course, nothing_judged
+from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
@@ -230,10 +231,11 @@ class Monitor(SavesFrames, Estimator):
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
         self.targets_ = self._frequency_columns(baseline, compensators)
         columns = list(baseline.columns) if compensators else self.targets_
-        cleaned, _, n_implausible = Plausible.of_anything(baseline).cleaned(baseline)
-        if n_implausible:
+        anything = Plausible.of_anything(baseline)
+        n_markers, cleaned = int(anything.implausible(baseline).sum()), anything.cleaned(baseline)[0]
+        if n_markers:
             warn_user(
-                f"{n_implausible} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
+                f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
                 "markers",
             )
@@ -245,13 +247,21 @@ class Monitor(SavesFrames, Estimator):
         judge.check_memory(cleaned)
         index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
         hold = max(ONE_DAY, longest_window(self.detector_, baseline.index))
-        self.promise_ = promised_rule(index, self.false_alarms_per_year, hold=hold)
-        rule = self.promise_.rule
+        direction, by_kind = None, {"damage": index}
+        if self.direction == "softening":
+            direction = Direction.of(self.detector_, cleaned[columns], self.targets_)
+            stiffer = direction.of_rows(cleaned[columns]) < 0
+            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
+            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
+        promises = {kind: promised_rule(one, self.false_alarms_per_year, hold=hold) for kind, one in by_kind.items()}
+        rules = {kind: promise.rule for kind, promise in promises.items()}
+        self.promise_, rule = promises["damage"], rules["damage"]
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
-        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, rule.threshold)
+        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        release = min(one.release for one in rules.values())
+        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
+        self.course_ = Course.of(self.bench_, baseline, EventLog(rules))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
         self.versions_ = versions()
@@ -295,7 +305,7 @@ class Monitor(SavesFrames, Estimator):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
         _warn_of_not_judged(answers)
-        self.store_, self.course_, self.counts_ = store, course, counts
+        self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not judged"]:
@@ -479,7 +489,7 @@ class Monitor(SavesFrames, Estimator):
             "n_late": counts["n_late"] + intake.n_late,
             "n_too_late": n_too_late,
             "n_not_judged": int(n_records - n_judged) + n_too_late,
-            "n_implausible": counts["n_implausible"] + self.bench_.plausible.cleaned(intake.fresh)[2],
+            "n_implausible": counts["n_implausible"] + int(self.bench_.plausible.implausible(intake.fresh).sum()),
         }
 
 
