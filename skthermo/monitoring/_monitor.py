@@ -33,13 +33,8 @@ from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
-<<<<<<< HEAD
-from skthermo.monitoring._memory import Memory, longest_window
-from skthermo.monitoring._promise import EventRule, Promise, promised_rule
-=======
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import promised_rule, release_level
->>>>>>> main
+from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
@@ -259,31 +254,6 @@ class Monitor(SavesFrames, Estimator):
                 "are taken as missing; expected NaN there",
                 "markers",
             )
-<<<<<<< HEAD
-=======
-        self.detector_ = detector.fit(cleaned[columns])
-        self.memory_ = (
-            Memory.of(self.detector_) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
-        )
-        judge = Judge.of(self.detector_, self.memory_, columns, self.targets_, cleaned)
-        judge.check_memory(cleaned)
-        index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
-        hold = ONE_DAY
-        direction, by_kind = None, {"damage": index}
-        if self.direction == "softening":
-            direction = Direction.of(self.detector_, cleaned[columns], self.targets_)
-            stiffer = direction.of_rows(cleaned[columns]) < 0
-            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
-            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        level = release_level(index, hold)
-        promises = {
-            kind: promised_rule(one, self.false_alarms_per_year, hold=hold, release=level)
-            for kind, one in by_kind.items()
-        }
-        rules = {kind: promise.rule for kind, promise in promises.items()}
-        self.promise_, rule = promises["damage"], rules["damage"]
-        self.threshold_, self.release_ = rule.threshold, rule.release
->>>>>>> main
         stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
         charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
         charge.bench.judge.check_memory(cleaned)
@@ -458,14 +428,17 @@ class Monitor(SavesFrames, Estimator):
         """All by which a detector judges that was fitted on some records."""
         memory = Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        hold = max(ONE_DAY, longest_window(detector, trained.index))
         direction, by_kind = None, {"damage": index}
         if self.direction == "softening":
             direction = Direction.of(detector, trained[columns], self.targets_)
             stiffer = direction.of_rows(trained[columns]) < 0
             by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
             by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        promises = {kind: promised_rule(one, self.false_alarms_per_year, hold=hold) for kind, one in by_kind.items()}
+        level = release_level(index, ONE_DAY)
+        promises = {
+            kind: promised_rule(one, self.false_alarms_per_year, hold=ONE_DAY, release=level)
+            for kind, one in by_kind.items()
+        }
         rules = {kind: promise.rule for kind, promise in promises.items()}
         judge = Judge.of(detector, memory, columns, self.targets_, trained)
         release = min(one.release for one in rules.values())
