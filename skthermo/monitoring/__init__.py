@@ -3,5 +3,6 @@
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
 from skthermo.monitoring.drift import ParameterHistory, track_parameters
+from skthermo.monitoring.retraining import Retraining
 
-__all__ = ["Monitor", "ParameterHistory", "load_monitor", "track_parameters"]
+__all__ = ["Monitor", "ParameterHistory", "Retraining", "load_monitor", "track_parameters"]

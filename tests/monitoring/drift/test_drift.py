@@ -120,19 +120,23 @@ def test_memory_and_variances_of_noise_are_recovered():
 def test_a_known_drift_is_recovered(history):
     truth = 1 - 0.02 * 7 * np.arange(len(history.days)) / 365
     table, rate = history.table["bottom"], history.rates.loc["bottom"]
-    assert history.has_drift and history.explanations["groups"].iloc[0] == ("bottom",)
+    assert history.has_drift
+    assert history.explanations["groups"].iloc[0] == ("bottom",)
     assert abs(table["estimate"].iloc[-1] - truth[-1]) < 2.5 * rate["change_error"]
     assert ((table["lower"] <= truth) & (truth <= table["upper"])).mean() > 0.9
     assert history.rates["drifts"].to_dict() == {"bottom": "yes", "top": "no sign", "diagonal": "no sign"}
-    assert "bottom loses" in history.summary() and "bottom" in repr(history)
+    assert "bottom loses" in history.summary()
+    assert "bottom" in repr(history)
     assert_allclose(history.modes["measured"], history.modes["explained"], atol=0.02)
 
 
 def test_without_drift_none_is_claimed(healthy):
     campaign, fem = healthy
     found = track_parameters(fem, campaign.temperatures, campaign.frequencies, GROUPS, WEEK, random_state=0)
-    assert not found.has_drift and set(found.rates["drifts"]) == {"no sign"}
-    assert (found.noticed_from > 0).all() and found.summary().startswith("No drift")
+    assert not found.has_drift
+    assert set(found.rates["drifts"]) == {"no sign"}
+    assert (found.noticed_from > 0).all()
+    assert found.summary().startswith("No drift")
     pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
     bands = found.table.iloc[-1].unstack()
     assert ((bands["lower"] < 1) & (bands["upper"] > 1)).all()
@@ -143,7 +147,8 @@ def test_one_year_is_told_with_wide_bands(ageing):
     T, F = campaign.temperatures[:365], campaign.frequencies[:365]
     found = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
     bottom = found.table["bottom"].iloc[-1]
-    assert bottom["lower"] < 0.98 < bottom["upper"] and "1.0 years long" in found.summary()
+    assert bottom["lower"] < 0.98 < bottom["upper"]
+    assert "1.0 years long" in found.summary()
 
 
 def test_removed_drift_leaves_the_weather(ageing, history):
@@ -199,7 +204,8 @@ def test_days_and_modes_may_be_missing(ageing, history):
     found = track_parameters(fem, campaign.temperatures.iloc[kept], F.iloc[kept], GROUPS, WEEK, random_state=0)
     assert len(found.days) == len(history.days)
     table = found.table["bottom"]
-    assert found.has_drift and found.explanations["groups"].iloc[0] == ("bottom",)
+    assert found.has_drift
+    assert found.explanations["groups"].iloc[0] == ("bottom",)
     assert table["lower"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["upper"].iloc[-1]
 
 
@@ -212,10 +218,12 @@ def trends_of(change, slopes, error=1e-3, years=4.0):
 def test_groups_with_like_effects_are_named_together():
     slopes = np.array([[0.3, 0.3, 0.0], [0.1, 0.1001, 0.3], [0.2, 0.2, -0.1], [0.0, 0.0, 0.2]])
     found = Explanations.of(trends_of([-0.04, 0, 0], slopes), 100.0, np.random.RandomState(0))
-    assert found.p_value < 0.01 and found.instead(found.sets[0][0]) == [0, 1]
+    assert found.p_value < 0.01
+    assert found.instead(found.sets[0][0]) == [0, 1]
     assert found.lookalikes == {0: [1], 1: [0]}
     apart = Explanations.of(trends_of([0, 0, -0.04], slopes), 100.0, np.random.RandomState(0))
-    assert apart.sets[0] == (2,) and apart.instead(2) == [2]
+    assert apart.sets[0] == (2,)
+    assert apart.instead(2) == [2]
 
 
 def test_two_groups_that_drift_are_both_found():
@@ -231,7 +239,8 @@ def test_p_values_without_drift_are_uniform():
         trends = trends_of([0, 0], slopes)
         noisy = ModeTrends(1e-3 * random.standard_normal(len(trends.mean)), trends.covariance, slopes, 4.0)
         p_values.append(Explanations.of(noisy, 1000.0, random).p_value)
-    assert np.mean(np.array(p_values) < 0.2) < 0.35 and 0.35 < np.mean(p_values) < 0.75
+    assert np.mean(np.array(p_values) < 0.2) < 0.35
+    assert 0.35 < np.mean(p_values) < 0.75
 
 
 def test_one_day_after_the_other_equals_all_at_once(healthy):
@@ -243,11 +252,14 @@ def test_one_day_after_the_other_equals_all_at_once(healthy):
     for day in range(365, 380):
         state = follower.advance(state, T[day : day + 1], F[day : day + 1])
     assert_allclose(state.mean, at_once.mean, atol=1e-12)
-    assert state.day == at_once.day and state.n_modes == 6
+    assert state.day == at_once.day
+    assert state.n_modes == 6
     kept = follower.advance(state, T[380:381], 1.2 * F[380:381], absorb=False)
-    assert kept.distance > 100 and np.array_equal(kept.mean[3:6], state.mean[3:6])
+    assert kept.distance > 100
+    assert np.array_equal(kept.mean[3:6], state.mean[3:6])
     empty = follower.advance(state, T[:0], F[:0])
-    assert empty.day == T.index[380] and np.isnan(empty.distance)
+    assert empty.day == T.index[380]
+    assert np.isnan(empty.distance)
     assert_allclose(pickle.loads(pickle.dumps(state)).covariance, state.covariance)
     with pytest.raises(ValueError, match="expected times after the day"):
         follower.advance(state, T[370:371], F[370:371])
