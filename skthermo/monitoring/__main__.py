@@ -20,7 +20,6 @@ from typing import Any, NoReturn
 
 import pandas as pd
 
-from skthermo._formatting import counted
 from skthermo._io import alone_with
 from skthermo._warnings import told_around
 from skthermo.monitoring import load_monitor
@@ -43,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit code."""
     options = _parser().parse_args(arguments)
     with warnings.catch_warnings():
+        warnings.simplefilter("default", UserWarning)  # once for each line of code, whatever the environment says
         warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
         try:
             return options.command(options)
@@ -93,6 +93,7 @@ def _update(options: argparse.Namespace) -> int:
         monitor = load_monitor(options.monitor)
         form = {name: getattr(options, name) for name in ("separator", "decimal", "stamps")}
         records = read_file(options.records, **form, zone=monitor.last_.tz)
+        records.index.name = monitor.baseline_.index.name
         before = dict(monitor.counts_)
         with told_around({"records not judged"}):  # said below, with all reasons
             judged = monitor.update(records) if len(records) else None
@@ -158,7 +159,7 @@ def _code(monitor: Any, judged: pd.DataFrame | None) -> int:
 
 def _read(file: Path, records: pd.DataFrame) -> str:
     period = f", {records.index.min()} to {records.index.max()}" if len(records) else ""
-    return f"read: {counted(len(records), 'record')} of {file}{period}"
+    return f"read from {file}: {len(records)}{period}"
 
 
 def _taken_in(before: dict[str, int], after: dict[str, int], judged: pd.DataFrame | None) -> list[str]:
@@ -172,7 +173,7 @@ def _taken_in(before: dict[str, int], after: dict[str, int], judged: pd.DataFram
     lines = [f"new: {len(new)} ({states}); {others}"]
     lines += [f"judged anew, as records came late: {revised}"] if revised else []
     reasons = new.loc[new["state"] == "not judged", "reason"].value_counts()
-    return lines + [f"not judged: {counted(number, 'record')}: {reason}" for reason, number in reasons.items()]
+    return lines + [f"not judged, {reason}: {number}" for reason, number in reasons.items()]
 
 
 def _standing(monitor: Any) -> list[str]:

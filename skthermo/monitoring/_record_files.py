@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from skthermo._arrays import Array
-from skthermo._formatting import counted
 
 ISO = "ISO8601"
 PARQUET = (".parquet", ".pq")
@@ -58,7 +57,7 @@ def _csv(file: Path, separator: str, decimal: str, stamps: str) -> pd.DataFrame:
         )
     for line, row in records:
         if len(row) != len(names):
-            raise ValueError(f"{file}, line {line}: {counted(len(row), 'value')}; expected {len(names)} as named above")
+            raise ValueError(f"{file}, line {line}: values: {len(row)}; expected {len(names)} as named above")
     if not text.endswith(("\n", "\r")):
         warnings.warn(f"{file} does not end with a line break: its last value may be cut off", stacklevel=2)
     numbers = [line for line, _ in records]
@@ -92,7 +91,7 @@ def _times(texts: Sequence[str], form: str, file: Path, lines: Sequence[int]) ->
     if n_offsets not in (0, len(texts)):
         raise ValueError(f"{file}: {n_offsets} of {len(texts)} stamps have an offset from UTC; expected all or none")
     index = pd.DatetimeIndex(pd.to_datetime(texts, format=form, errors="coerce", utc=n_offsets > 0))
-    is_wrong = index.isna() | [form == ISO and DATE.match(text) is None for text in texts]
+    is_wrong = np.array([form == ISO and DATE.match(text) is None for text in texts], dtype=bool) | index.isna()
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
         expected = "2026-01-31 13:00" if form == ISO else f"the format {form}"
