@@ -75,6 +75,11 @@ def track_parameters(
         have other columns than in fit, a group is unknown, the period is not a day or some days, or no mode was
         measured on enough days.
 
+    See Also
+    --------
+    Monitor : Follows drift day by day.
+    skthermo.studies.identify_damage : Which damage explains a sudden shift.
+
     Notes
     -----
     Daily means of ln(measured / predicted frequency) are the sum of four parts. The drift is the product of the
@@ -92,11 +97,6 @@ def track_parameters(
     Kalman smoother, with the effects of changes as large as theirs. Each other group is followed as one that changes
     beside it, and a group that explains the trends about as well as one of the set in the place of that: the two are
     named as a set.
-
-    See Also
-    --------
-    Monitor : Follows drift day by day.
-    skthermo.studies.identify_damage : Which damage explains a sudden shift.
 
     Examples
     --------
