@@ -143,3 +143,14 @@ def test_lags_see_the_days_before():
     expected = apart.groupby(apart.index.normalize()).mean()
     np.testing.assert_allclose(state.waiting.values, expected, rtol=1e-9)
     assert state.day == expected.index[-1]
+
+
+def test_states_are_saved_without_types_of_others(follower, steady):
+    skops = pytest.importorskip("skops.io")
+    state = follower.advance(follower.start(), steady.temperatures[FIRST : FIRST + 1], steady.frequencies[FIRST:][:1])
+    file = skops.dumps(state)
+    unknown = skops.get_untrusted_types(data=file)
+    assert all(name.startswith("skthermo.") for name in unknown)
+    again = skops.loads(file, trusted=unknown)
+    assert (again.day, again.n_left_out) == (state.day, 0)
+    pd.testing.assert_frame_equal(follower.report(again), follower.report(state), check_exact=True)
