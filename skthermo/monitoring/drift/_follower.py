@@ -276,7 +276,7 @@ class DriftFollower:
 
     def _foretold(self, known: ParameterState, waiting: Waiting) -> tuple[Array, Array]:
         """Mean of ln ratios of each measured mode over the days that wait, and its covariance."""
-        noise, slopes = self.filter.noise, self.filter.effects.slopes
+        noise, slopes = self.filter.noise, self.filter.slopes
         known_days = ~np.isnan(waiting.values)
         weights = known_days / np.maximum(known_days.sum(axis=0), 1)
         ahead = np.arange(1, len(weights) + 1)
