@@ -36,6 +36,7 @@ campaign = make_truss_campaign(
     3,
     samples_per_year=6 * 365,
     samples_per_day=6,
+    noise=0.005,
     correlation=0.5,
     drift={"bottom": 0.01},
     damage={"top": 0.12},
@@ -55,7 +56,7 @@ baseline, later = records[:"2025"], records["2026":]
 # mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
 # share of the records, but what an owner asks for: one false alarm a year.
 
-fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.01), random_state=0)
+fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.005), random_state=0)
 fem.fit(baseline[campaign.temperatures.columns], baseline[modes])
 compensator = TemperatureCompensator(make_pipeline(HingeFeatures(), Ridge()), targets=modes)
 monitor = Monitor(make_pipeline(compensator, WindowedAlarm("1D")), fem=fem, false_alarms_per_year=1)
