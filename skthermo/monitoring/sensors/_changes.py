@@ -17,6 +17,7 @@ CLIPPED = 5.0  # standard deviations at which an innovation is clipped: one odd 
 LEAST_DAYS = 2  # with values since an offset began
 LEAST_DRIFT = 7  # with values since a drift began
 MONTH = 30  # days in the means that tell how far a level wanders
+SEASONAL = 0.3  # degrees by which a level, and its course over `LONGEST`, differ from those of the baseline's season
 BEYOND = 1.0  # standard deviation of the error of what new weather moves a prediction by, as a share of that
 MOST_CORRELATED = 0.95  # of neighbouring days
 TESTS_A_DAY = 10.0  # independent ones to which the search over dates and shapes amounts; found by simulation
@@ -103,7 +104,8 @@ class DailyNoise:
         """The most likely offset or drift that still lasts on the last day; None with too few days.
 
         The level before the change is unknown: by as much as it wanders, by the errors of what foretells it, as if days
-        of the baseline were independent, and in new weather by some share of what lies beyond the baseline's.
+        of the baseline were independent, by what seasons differ from year to year, and in new weather by as much as
+        that moves the prediction.
         """
         given = departures.known()
         if len(given.days) < LEAST_DAYS:
@@ -111,12 +113,13 @@ class DailyNoise:
         at, scale = given.days.astype(float), self.scale * given.deviations
         since = at - at[: 1 - LEAST_DAYS, np.newaxis]
         ramps = np.maximum(since[: max(len(at) + 1 - LEAST_DRIFT, 0)] + 1.0, 0.0)
-        shapes = np.vstack([given.deviations, given.beyond, since >= 0, ramps]) / scale
+        line = 2 * (at - at[0]) / LONGEST - 1
+        shapes = np.vstack([given.deviations, np.ones(len(at)), line, given.beyond, since >= 0, ramps]) / scale
         white = self._whitened(at, np.vstack([given.values / self.scale, shapes]))
-        exact, levels, steps = white[0], white[1:3], white[3:]
+        exact, levels, steps = white[0], white[1:5], white[5:]
         slower = (1 + self.correlation) / (1 - self.correlation)
         unknown = self.wander**2 + slower * self.scale**2 * float(np.median(given.errors))
-        prior = np.diag([1 / max(unknown, 1e-12), 1 / BEYOND**2])
+        prior = np.diag([1 / max(unknown, 1e-12), 1 / SEASONAL**2, 1 / SEASONAL**2, 1 / BEYOND**2])
         evidence = steps - steps @ levels.T @ np.linalg.solve(levels @ levels.T + prior, levels)
         information = np.maximum((steps * evidence).sum(axis=1), 1e-12)
         slopes, roots = evidence @ exact / information, np.sqrt(information)
