@@ -1,5 +1,6 @@
-"""State of objects that hold pandas' frames, as arrays and lists, which skops can save."""
+"""State of objects that hold pandas' frames and times, as arrays, lists and numbers, which skops can save."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,10 +36,20 @@ class SavedLabels:
 
 
 @dataclass
-class SavedTable:
-    """Values and labels of a frame, or of a series where there are no columns."""
+class SavedTime:
+    """A time or a length of time of pandas as an integer of a unit."""
 
-    values: NDArray | list | SavedLabels
+    kind: str
+    count: int
+    unit: str
+    zone: str | None = None
+
+
+@dataclass
+class SavedTable:
+    """Values and labels of a frame, or of a series where there are no columns; texts are one text in JSON."""
+
+    values: NDArray | list | str | SavedLabels
     index: SavedLabels
     columns: SavedLabels | None
     name: Any = None
@@ -46,9 +57,14 @@ class SavedTable:
 
 
 def to_saved(value: Any) -> Any:
-    """A frame or series as a table, also within a tuple, if the table gives exactly the frame again; else unchanged."""
+    """A frame or series as a table, also within a tuple, if the table gives exactly the frame again; else unchanged.
+
+    A time, or a length of time, becomes a number.
+    """
     if isinstance(value, tuple) and type(value) is tuple:
         return tuple(to_saved(part) for part in value)
+    if isinstance(value, pd.Timestamp | pd.Timedelta):
+        return _to_time(value)
     if not isinstance(value, pd.DataFrame | pd.Series) or value.attrs:
         return value
     is_frame = isinstance(value, pd.DataFrame)
@@ -62,20 +78,42 @@ def to_saved(value: Any) -> Any:
 
 
 def from_saved(value: Any) -> Any:
-    """The frame or series of a table, also within a tuple; anything else unchanged."""
+    """The frame or series of a table, or the time of a number, also within a tuple; anything else unchanged."""
     if isinstance(value, tuple) and type(value) is tuple:
         return tuple(from_saved(part) for part in value)
+    if isinstance(value, SavedTime):
+        return _from_time(value)
     if not isinstance(value, SavedTable):
         return value
     index = _from_labels(value.index)
     if isinstance(value.values, SavedLabels):
         return pd.Series(_from_labels(value.values), index, name=value.name)
+    if isinstance(value.values, str):
+        return pd.Series(json.loads(value.values), index, name=value.name, dtype=value.dtype)
     if value.columns is None:
         return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
     if isinstance(value.values, list):
         columns = dict(enumerate(map(from_saved, value.values)))
         return pd.DataFrame(columns, index).set_axis(_from_labels(value.columns), axis=1)
     return pd.DataFrame(value.values, index, _from_labels(value.columns))
+
+
+def _to_time(value: Any) -> Any:
+    """A time as a number, or unchanged if the number would not give it again."""
+    zone = str(value.tz) if isinstance(value, pd.Timestamp) and value.tz is not None else None
+    saved = SavedTime(type(value).__name__, int(value.asm8.astype("int64")), value.unit, zone)
+    try:
+        same = _from_time(saved)
+    except (TypeError, ValueError, LookupError):
+        return value
+    return saved if type(value) is type(same) and same == value and str(same) == str(value) else value
+
+
+def _from_time(saved: SavedTime) -> Any:
+    if saved.kind == "Timedelta":
+        return pd.Timedelta(np.timedelta64(saved.count, saved.unit))
+    time = pd.Timestamp(np.datetime64(saved.count, saved.unit))
+    return time if saved.zone is None else time.tz_localize("UTC").tz_convert(saved.zone)
 
 
 def _of_columns(frame: pd.DataFrame, axes: list[Any]) -> Any:
@@ -92,7 +130,7 @@ def _of_objects(series: pd.Series, axes: list[Any]) -> Any:
     values = series.tolist()
     texts = series.dtype == object or str(series.dtype) == "str"
     plain = texts and all(isinstance(value, str | int | float | None) for value in values)
-    return SavedTable(values, axes[0], None, series.name, str(series.dtype)) if plain else series
+    return SavedTable(json.dumps(values), axes[0], None, series.name, str(series.dtype)) if plain else series
 
 
 def _to_labels(index: pd.Index) -> SavedLabels | None:

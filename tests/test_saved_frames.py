@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo._saved_frames import SavedTable, from_saved, to_saved
+from skthermo._saved_frames import SavedTable, SavedTime, from_saved, to_saved
 
 VALUES = np.arange(6.0).reshape(3, 2)
 HOURS = pd.date_range("2025-01-01", periods=3, freq="h", name="time")
@@ -25,6 +25,14 @@ TABLES = {
     "texts": pd.DataFrame({"a": [1.0, 2.0], "b": ["x", None], "c": ["y", "z"]}),
     "times": pd.DataFrame({"from": HOURS, "to": HOURS.tz_localize("Europe/Brussels"), "rows": [1, 2, 3]}),
 }
+TIMES = [
+    pd.Timestamp("2026-03-29 01:30"),
+    pd.Timestamp("2026-10-25 02:30+01:00").tz_convert("Europe/Brussels"),
+    pd.Timestamp("2026-10-25 01:30:00.000000001", tz="UTC"),
+    pd.Timestamp("1890-01-01").as_unit("s"),
+    pd.Timedelta("-7D"),
+    pd.Timedelta("90min").as_unit("ms"),
+]
 OTHERS = {
     "levels": pd.DataFrame(VALUES, pd.MultiIndex.from_tuples([(1, 2), (3, 4), (5, 6)])),
     "periods": pd.DataFrame(VALUES, pd.period_range("2025", periods=3, freq="Y")),
@@ -58,3 +66,21 @@ def test_frames_with_attributes_stay_as_they_are():
     table = TABLES["hours"].copy()
     table.attrs["unit"] = "Hz"
     assert to_saved(table) is table
+
+
+@pytest.mark.parametrize("time", TIMES, ids=str)
+def test_a_number_is_exactly_the_time_again(time):
+    saved = pickle.loads(pickle.dumps(to_saved((time,))))
+    assert isinstance(saved[0], SavedTime)
+    (got,) = from_saved(saved)
+    assert type(got) is type(time)
+    assert (got, str(got), got.unit, getattr(got, "tz", None)) == (
+        time,
+        str(time),
+        time.unit,
+        getattr(time, "tz", None),
+    )
+
+
+def test_a_time_that_does_not_exist_stays_as_it_is():
+    assert to_saved(pd.NaT) is pd.NaT

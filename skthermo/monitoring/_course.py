@@ -13,12 +13,43 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo._saved_frames import SavesFrames
+from skthermo.monitoring._days import days_of
+from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import EventLog
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._records import Plausible, RecordStore, stamps_of
 from skthermo.monitoring._stages import Stages, StageState
 
-ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
+ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What records go through: plausible values, stages, the detector, the direction. It does not change.
+
+    Without a direction, all changes are damage.
+    """
+
+    plausible: Plausible
+    stages: Stages
+    judge: Judge
+    direction: Direction | None
+    threshold: float
+    release: float
+
+    def series(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
+        """Index of the records from a position on for each kind of event: 0 where they go the other way."""
+        if self.direction is None:
+            return {"damage": index}
+        with np.errstate(invalid="ignore"):
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.release)
+        stiffer = np.zeros(len(index), dtype=bool)
+        if wanted.any():
+            begin = self.judge.memory.start(stamps_of(records), first)
+            signs = self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])
+            stiffer = signs[first - begin :] < 0
+        quiet = np.where(np.isnan(index), np.nan, 0.0)
+        return {"damage": np.where(stiffer, quiet, index), "stiffening": np.where(stiffer, index, quiet)}
 
 
 @dataclass(frozen=True)
@@ -28,16 +59,6 @@ class Checkpoint(SavesFrames):
     day: pd.Timestamp
     stages: StageState
     log: EventLog
-
-
-@dataclass(frozen=True)
-class Bench:
-    """What records go through: plausible values, stages, the detector and the threshold. It does not change."""
-
-    plausible: Plausible
-    stages: Stages
-    judge: Judge
-    threshold: float
 
 
 @dataclass(frozen=True)
@@ -55,13 +76,12 @@ class Course(SavesFrames):
 
     @classmethod
     def of(cls, bench: Bench, baseline: pd.DataFrame, log: EventLog) -> Course:
-        """The course that begins after a baseline."""
-        cleaned, _, _ = bench.plausible.cleaned(baseline)
+        """The course that begins after a baseline, whose last records are the first memory."""
         times, end = stamps_of(baseline), baseline.index[-1]
         start = bench.judge.memory.start(times, len(times), int(times[-1]) + 1)
-        checkpoint = Checkpoint(end.normalize(), bench.stages.start(), log)
         nothing = nothing_judged(baseline.index[:0])
-        return cls(cleaned.iloc[start:], (checkpoint,), log, nothing, _days_of(nothing))
+        checkpoint = Checkpoint(end.normalize(), bench.stages.start(), log)
+        return cls(bench.plausible.cleaned(baseline)[0].iloc[start:], (checkpoint,), log, nothing, days_of(nothing))
 
     @property
     def stages(self) -> StageState:
@@ -71,147 +91,123 @@ class Course(SavesFrames):
     def advanced(self, bench: Bench, fresh: pd.DataFrame, store: RecordStore) -> tuple[Course, pd.DataFrame]:
         """The course after new records, which are in the store already, and what it says of these and of later ones.
 
-        It goes on from the day of the first new record, and judges all records from that one on.
+        It goes on from the beginning of the day of the first new record, and judges all records from that one on.
         """
         first = fresh.index[0]
-        place = max(n for n, checkpoint in enumerate(self.checkpoints) if n == 0 or checkpoint.day <= first)
+        place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
         begin = self.checkpoints[place]
-        raw = store.kept[store.kept.index >= begin.day]
-        cleaned, marks, _ = bench.plausible.cleaned(raw)
-        days, stages, corrected = _through_stages(bench.stages, begin, cleaned)
-        memory = self.corrected[self.corrected.index < (raw.index[0] if len(raw) else first)]
-        records = pd.concat([memory, corrected])
-        told = self.judged[(self.judged.index >= begin.day) & (self.judged.index < first)]
-        n_told = len(told)
-        index = np.concatenate([told["index"].to_numpy(), bench.judge.index(records, len(memory) + n_told)])
-        modes = told["modes"].tolist() + [""] * (len(raw) - n_told)
-        log, numbers, checkpoints = begin.log, np.zeros(len(raw), dtype=np.intp), []
-        is_alarm = np.zeros(len(raw), dtype=bool)
-        bounds = raw.index.searchsorted(pd.DatetimeIndex([*days, days[-1] + pd.Timedelta(days=2)]))
-        open_before = _open_after(log, index, stamps_of(raw))
-        rows = np.flatnonzero(open_before & ~np.isnan(index))
-        rows = rows[rows >= n_told]
-        for row, names in zip(rows, bench.judge.drivers(records, rows + len(memory)), strict=True):
-            modes[row] = names
-        for day, state, start, stop in zip(days, stages, bounds[:-1], bounds[1:], strict=True):
-            checkpoints.append(Checkpoint(day, state, log))
-            if start == stop:
-                continue
-            by_kind, log = log.follow({"damage": index[start:stop]}, stamps_of(raw)[start:stop], modes[start:stop])
-            numbers[start:stop] = by_kind["damage"]
-            is_alarm[start:stop] = by_kind["damage"] > 0
-        reasons = told["reason"].tolist() + _reasons(
-            bench.judge, records, len(memory) + n_told, index[n_told:], marks[n_told:]
+        raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
+        cleaned, marks = bench.plausible.cleaned(raw)
+        days, states, corrected = _through_stages(bench.stages, begin, cleaned)
+        memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
+        records, n_memory = pd.concat([memory, corrected]), len(memory)
+        told = self.judged.iloc[slice(*self.judged.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
+        new = n_memory + len(told)
+        index = np.append(told["index"].to_numpy(), bench.judge.index(records, new))
+        series, times = bench.series(records, n_memory, index), stamps_of(raw)
+        is_open = np.any(list(begin.log.follow(series, times)[0].values()), axis=0) & ~np.isnan(index)
+        modes, rows = np.full(len(raw), "", dtype=object), np.flatnonzero(is_open)
+        modes[rows] = bench.judge.drivers(records, rows + n_memory)
+        bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
+        log, numbers, points = begin.log, {kind: np.zeros(len(raw), dtype=np.int64) for kind in series}, []
+        for day, state, (start, stop) in zip(days, states, pairwise(bounds), strict=True):
+            points.append(Checkpoint(day, state, log))
+            own = slice(start, stop)
+            found, log = log.follow({kind: one[own] for kind, one in series.items()}, times[own], modes[own])
+            for kind, number in found.items():
+                numbers[kind][own] = number
+        reasons = bench.judge.reasons(records, new, index[len(told) :], marks[len(told) :])
+        reasons = _with_stiffening(told["reason"].tolist() + reasons, numbers, len(told))
+        answers = _answers(raw.index, index, bench.threshold, modes, reasons, numbers)
+        points = _since([*self.checkpoints[:place], *points], store.last - store.late)
+        needed = bench.judge.memory.start(
+            stamps_of(records), records.index.searchsorted(points[0].day), points[0].day.value
         )
-        answers = _answers(raw.index, index, bench.threshold, modes, reasons, numbers, is_alarm)
-        judged = pd.concat([self.judged[self.judged.index < begin.day], answers])
-        horizon = store.last - store.late
-        all_points = [*self.checkpoints[:place], *checkpoints]
-        first_kept = max(n for n, checkpoint in enumerate(all_points) if n == 0 or checkpoint.day <= horizon)
-        all_points = all_points[first_kept:]
-        after = all_points[0].day
-        times = stamps_of(records)
-        start = bench.judge.memory.start(times, records.index.searchsorted(after), int(after.value))
-        start = min(start, int(records.index.searchsorted(store.last - store.keep)))
+        judged = pd.concat([self.judged.iloc[: self.judged.index.searchsorted(begin.day)], answers])
         course = Course(
-            records.iloc[start:],
-            tuple(all_points),
+            records.iloc[min(needed, records.index.searchsorted(store.last - store.keep)) :],
+            tuple(points),
             log,
-            judged[judged.index >= store.last - store.keep],
-            self._with_days(days, stages, bench, answers),
+            judged.iloc[judged.index.searchsorted(store.last - store.keep) :],
+            self._with_days(bench.stages, days, states, answers),
         )
-        return course, self._news(answers[n_told:], fresh)
+        return course, self._news(answers.iloc[len(told) :], fresh.index)
 
-    def _news(self, answers: pd.DataFrame, fresh: pd.DataFrame) -> pd.DataFrame:
+    def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
         """The answers to new records, and those to others that have changed."""
-        before = self.judged.reindex(answers.index)
-        same = [(answers[c] == before[c]) | (answers[c].isna() & before[c].isna()) for c in ANSWER]
-        is_new = answers.index.isin(fresh.index)
-        changed = ~np.all(same, axis=0) & ~is_new
+        is_new = answers.index.isin(fresh)
+        changed = np.zeros(len(answers), dtype=bool)
+        if not is_new.all():
+            known = answers[~is_new]
+            before = self.judged.loc[known.index]
+            same = [(known[c] == before[c]) | (known[c].isna() & before[c].isna()) for c in ANSWER]
+            changed[~is_new] = ~np.all(same, axis=0)
         return answers.assign(revised=changed)[is_new | changed]
 
     def _with_days(
-        self, days: Sequence[pd.Timestamp], stages: Sequence[StageState], bench: Bench, answers: pd.DataFrame
+        self, stages: Stages, days: Sequence[pd.Timestamp], states: Sequence[StageState], answers: pd.DataFrame
     ) -> pd.DataFrame:
-        """Daily summaries with those of some days anew."""
-        new = _days_of(answers)
-        drifts = {day: bench.stages.drifts(state) for day, state in zip(days, stages, strict=True)}
-        if any(drift is not None for drift in drifts.values()):
-            shares = pd.DataFrame({day: drifts[day]["change"] for day in new.index}).T
+        """Daily summaries, those of some days anew."""
+        new = days_of(answers)
+        if stages.drift is not None:
+            by_day = dict(zip(days, states, strict=True))
+            shares = pd.DataFrame({day: stages.drifts(by_day[day])["change"] for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
-        return pd.concat([self.days[self.days.index < days[0]], new]) if len(self.days) else new
+        before = self.days.iloc[: self.days.index.searchsorted(days[0])]
+        return pd.concat([before, new]) if len(before) else new
 
 
 def _through_stages(
     stages: Stages, begin: Checkpoint, records: pd.DataFrame
 ) -> tuple[list[pd.Timestamp], list[StageState], pd.DataFrame]:
     """Days from a checkpoint to the last record, the states of the stages before each, and the corrected records."""
-    last = max(records.index[-1].normalize(), begin.day)
-    days = list(pd.date_range(begin.day, last, freq="D"))
+    days = list(pd.date_range(begin.day, records.index[-1].normalize(), freq="D"))
     bounds = [*records.index.searchsorted(pd.DatetimeIndex(days)), len(records)]
-    state, states, corrected = begin.stages, [], []
-    for n, (start, stop) in enumerate(pairwise(bounds)):
-        day = records.iloc[start:stop]
-        if n:
-            state = stages.advance(state, records.iloc[bounds[n - 1] : start])
-        states.append(state)
-        corrected.append(stages.corrected(state, day))
+    parts = [records.iloc[start:stop] for start, stop in pairwise(bounds)]
+    states = [begin.stages]
+    for day in parts[:-1]:
+        states.append(stages.advance(states[-1], day))
+    corrected = [stages.corrected(state, day) for state, day in zip(states, parts, strict=True) if len(day)]
     return days, states, pd.concat(corrected)
 
 
-def _open_after(log: EventLog, index: Array, times: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether a damage event is open after each record."""
-    return log.follow({"damage": index}, times, [""] * len(times))[0]["damage"] > 0
+def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Checkpoint]:
+    """The checkpoints from the last one before a time on."""
+    return points[max(n for n, one in enumerate(points) if n == 0 or one.day <= horizon) :]
 
 
-def _reasons(judge: Judge, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str]) -> list[str]:
-    """Why records from a position on are not judged, and what else is worth saying of them."""
-    unknown = np.flatnonzero(np.isnan(index))
-    causes = dict(zip(unknown.tolist(), judge.causes(records, unknown + first), strict=True))
-    outside = judge.far_outside(records.iloc[first:])
-    phrases = (
-        [causes.get(n, ""), marks[n], "temperatures far outside those of the baseline" if outside[n] else ""]
-        for n in range(len(index))
-    )
-    return ["; ".join(filter(None, parts)) for parts in phrases]
+def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], n_told: int) -> list[str]:
+    """Reasons that say so of records, from a position on, that are stiffer than the baseline."""
+    stiffer = np.flatnonzero(numbers.get("stiffening", np.zeros(0)) > 0)
+    for row in stiffer[stiffer >= n_told]:
+        reasons[row] = "; ".join(filter(None, [reasons[row], "stiffer than the baseline"]))
+    return reasons
 
 
 def nothing_judged(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
     """A row for each of some records that are not judged."""
-    nothing, nobody = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
-    return _answers(stamps, nothing, threshold, [""] * len(stamps), reasons, nobody, nobody > 0)
+    modes, number = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=np.int64)
+    return _answers(stamps, np.full(len(stamps), np.nan), threshold, modes, list(reasons), {"damage": number})
 
 
 def _answers(
-    stamps: pd.DatetimeIndex, index: Array, threshold: float, modes: Any, reasons: Any, numbers: Any, is_alarm: Any
+    stamps: pd.DatetimeIndex,
+    index: Array,
+    threshold: float,
+    modes: NDArray[Any],
+    reasons: list[str],
+    numbers: dict[str, NDArray[np.int64]],
 ) -> pd.DataFrame:
     """A row for each record."""
-    judged = ~np.isnan(index)
+    judged, is_alarm = ~np.isnan(index), numbers["damage"] > 0
     state = np.where(judged, np.where(is_alarm, "alarm", "healthy"), "not judged")
+    event = np.where(is_alarm, numbers["damage"], numbers.get("stiffening", 0))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(
-            np.where(judged & is_alarm, np.array(modes, dtype=object), "").tolist(), stamps, dtype=object
-        ),
+        "modes": pd.Series(np.where(judged & is_alarm, modes, "").tolist(), stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
-        "event": np.where(judged, numbers, 0),
+        "event": np.where(judged, event, 0),
     }
     return pd.DataFrame(table, stamps)
-
-
-def _days_of(answers: pd.DataFrame) -> pd.DataFrame:
-    """A row for each day that has records."""
-    index, day = answers["index"], answers.index.normalize()
-    groups = pd.DataFrame(
-        {
-            "n_records": np.ones(len(answers), dtype=np.int64),
-            "n_judged": index.notna().to_numpy().astype(np.int64),
-            "n_alarms": (answers["state"] == "alarm").to_numpy().astype(np.int64),
-        },
-        day,
-    ).groupby(level=0)
-    by_index = index.set_axis(day).groupby(level=0)
-    table = groups.sum().assign(index_median=by_index.median(), index_max=by_index.max())
-    return table.rename_axis("day")

@@ -31,18 +31,19 @@ class Event:
 class EventLog:
     """All events in order of their start, and for each kind whether one is open."""
 
-    rule: EventRule
+    rules: dict[str, EventRule]
     states: dict[str, EventState] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
 
     def follow(
-        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str]
-    ) -> tuple[dict[str, NDArray[np.intp]], EventLog]:
+        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str] | None = None
+    ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
+        modes = [""] * len(times) if modes is None else modes
         is_open, states = {}, dict(self.states)
         for kind, index in by_kind.items():
-            is_open[kind], states[kind] = self.rule.follow(states.get(kind, EventState()), index, times)
-        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.intp) for kind in by_kind}
+            is_open[kind], states[kind] = self.rules[kind].follow(states.get(kind, EventState()), index, times)
+        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
         for kind, index in by_kind.items():

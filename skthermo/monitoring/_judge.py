@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ CLOSE = 1e-9  # relative distance to where rounding changes, within which an ind
 MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
 N_CHECKED = 5  # baseline records that are judged alone and among others
-N_BEFORE = 100  # records before their memory
+N_AROUND = 100  # records before their memory, and after them
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,9 @@ class Judge:
         """Refuse a detector that looks at later records, or farther back than its memory: it would judge batches
         differently from all records at once."""
         times = stamps_of(baseline)
-        rows = np.unique(np.linspace(len(times) // 2, max(len(times) - N_CHECKED, 0), N_CHECKED).astype(np.intp))
-        start = max(self.memory.start(times, int(rows[0])) - N_BEFORE, 0)
-        whole = self._exact(baseline.iloc[start:])[rows - start]
+        rows = np.linspace(len(times) // 2, min(len(times) // 2 + N_AROUND, len(times) - 1), N_CHECKED).astype(np.intp)
+        start = max(self.memory.start(times, int(rows[0])) - N_AROUND, 0)
+        whole = self._exact(baseline.iloc[start : rows[-1] + N_AROUND])[rows - start]
         alone = np.array([self.alone(baseline, times, int(row)) for row in rows])
         same = np.isclose(whole, alone, rtol=1e-6, atol=1e-9, equal_nan=True)
         if not same.all():
@@ -195,6 +195,17 @@ class Judge:
             else:
                 causes.append("the detector gives no damage index")
         return causes
+
+    def reasons(self, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str]) -> list[str]:
+        """Why records from a position on are not judged, and what else is worth saying of them, beside their marks."""
+        unknown = np.flatnonzero(np.isnan(index))
+        causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
+        outside = self.far_outside(records.iloc[first:])
+        phrases = (
+            [causes.get(n, ""), mark, "temperatures far outside those of the baseline" if far else ""]
+            for n, (mark, far) in enumerate(zip(marks, outside, strict=True))
+        )
+        return ["; ".join(filter(None, parts)) for parts in phrases]
 
     def far_outside(self, records: pd.DataFrame) -> NDArray[np.bool_]:
         """Which records have a temperature far outside those of the baseline."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
@@ -28,7 +29,9 @@ from skthermo._validation import (
 from skthermo._warnings import warn_user
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._course import Bench, Course, nothing_judged
+from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
+from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory, longest_window
 from skthermo.monitoring._promise import promised_rule
@@ -105,6 +108,8 @@ class Monitor(SavesFrames, Estimator):
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
+    versions_ : dict
+        Versions of skthermo and scikit-learn by which it was fitted.
     bench_, store_, course_, said_ : object
         What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
         what the owner has said of events.
@@ -226,10 +231,11 @@ class Monitor(SavesFrames, Estimator):
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
         self.targets_ = self._frequency_columns(baseline, compensators)
         columns = list(baseline.columns) if compensators else self.targets_
-        cleaned, _, n_implausible = Plausible.of_anything(baseline).cleaned(baseline)
-        if n_implausible:
+        anything = Plausible.of_anything(baseline)
+        n_markers, cleaned = int(anything.implausible(baseline).sum()), anything.cleaned(baseline)[0]
+        if n_markers:
             warn_user(
-                f"{n_implausible} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
+                f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
                 "markers",
             )
@@ -241,15 +247,24 @@ class Monitor(SavesFrames, Estimator):
         judge.check_memory(cleaned)
         index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
         hold = max(ONE_DAY, longest_window(self.detector_, baseline.index))
-        self.promise_ = promised_rule(index, self.false_alarms_per_year, hold=hold)
-        rule = self.promise_.rule
+        direction, by_kind = None, {"damage": index}
+        if self.direction == "softening":
+            direction = Direction.of(self.detector_, cleaned[columns], self.targets_)
+            stiffer = direction.of_rows(cleaned[columns]) < 0
+            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
+            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
+        promises = {kind: promised_rule(one, self.false_alarms_per_year, hold=hold) for kind, one in by_kind.items()}
+        rules = {kind: promise.rule for kind, promise in promises.items()}
+        self.promise_, rule = promises["damage"], rules["damage"]
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages([name for name in baseline.columns if name not in self.targets_], self.targets_)
-        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, rule.threshold)
+        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        release = min(one.release for one in rules.values())
+        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.course_ = Course.of(self.bench_, baseline, EventLog(rule))
+        self.course_ = Course.of(self.bench_, baseline, EventLog(rules))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
+        self.versions_ = versions()
         return self
 
     def update(self, new: pd.DataFrame) -> pd.DataFrame:
@@ -290,7 +305,7 @@ class Monitor(SavesFrames, Estimator):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
         _warn_of_not_judged(answers)
-        self.store_, self.course_, self.counts_ = store, course, counts
+        self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not judged"]:
@@ -333,6 +348,27 @@ class Monitor(SavesFrames, Estimator):
             events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
         )
         self.said_ = (*self.said_, said)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, which ends with ``.skops`` (skops, runs no code when it is read) or ``.joblib``. An older one is
+            replaced when the new one is complete and on the disk, so that a crash leaves one of the two.
+
+        Raises
+        ------
+        NotFittedError
+            If the monitor is not fitted.
+        ValueError
+            If the path has another ending, the folder does not exist, or skops cannot save a part of the monitor, such
+            as a class of another package.
+        ImportError
+            If the file ends with ``.skops``, and skops is not installed.
+        """
+        write_monitor(self, path)
 
     def summary(self) -> str:
         """What the owner should know, in a few lines.
@@ -453,7 +489,7 @@ class Monitor(SavesFrames, Estimator):
             "n_late": counts["n_late"] + intake.n_late,
             "n_too_late": n_too_late,
             "n_not_judged": int(n_records - n_judged) + n_too_late,
-            "n_implausible": counts["n_implausible"] + self.bench_.plausible.cleaned(intake.fresh)[2],
+            "n_implausible": counts["n_implausible"] + int(self.bench_.plausible.implausible(intake.fresh).sum()),
         }
 
 

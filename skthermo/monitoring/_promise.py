@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from scipy.stats import gamma, nbinom
 
 from skthermo._arrays import Array
+from skthermo._saved_frames import SavesFrames
 from skthermo._warnings import warn_user
 
 YEAR = pd.Timedelta(days=365.25)
 N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
 NEAR = 15  # days of the year, up to which a record stands for the season around it
+FEWEST_PEAKS = 3
+DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
 
@@ -29,7 +32,7 @@ class EventState:
 
 
 @dataclass(frozen=True)
-class EventRule:
+class EventRule(SavesFrames):
     """An event opens with a record above ``threshold`` and closes when those of ``hold`` stayed within ``release``.
 
     Records that are not judged (NaN) neither open nor close it: the time of silence counts only between judged records.
@@ -101,41 +104,79 @@ class Promise:
         )
 
 
+@dataclass(frozen=True)
+class Tail:
+    """The highest excursions of a baseline: ``k`` squared peaks above a ``base``, with excesses of ``excess`` in all.
+
+    A time as long as the baseline has k + 1 peaks above the (k + 1)-th highest of the baseline, on average. Taken as
+    exponential, n of them exceed the square
+
+        base + excess (((k + 1) / n)^(1 / k) - 1),
+
+    on average over baselines: exact for an exponential tail, however few peaks there are.
+    """
+
+    k: int
+    base: float
+    excess: float
+
+    @classmethod
+    def of(cls, squares: Array, asked: float) -> Tail:
+        """That of squared peaks, highest first, from which as many as are asked for are to be exceeded."""
+        k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
+        return cls(k, float(squares[k]), float((squares[:k] - squares[k]).sum()))
+
+    def factor(self, asked: float) -> float:
+        """The excess that so many peaks exceed, in sums of all excesses."""
+        return ((self.k + 1) / asked) ** (1 / self.k) - 1
+
+    def threshold(self, asked: float) -> float:
+        """The index that so many peaks exceed."""
+        return float(np.sqrt(self.base + self.factor(asked) * self.excess))
+
+    def numbers(self, asked: float, n_years: float) -> tuple[int, int]:
+        """Between which numbers events in one year lie, given what the excesses tell of the tail and of its rate."""
+        spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k)
+        share = np.exp(-self.factor(asked) * spread) / n_years
+
+        def at_most(number: int) -> float:
+            return float(nbinom.cdf(number, self.k + 1, 1 / (1 + share)).mean())
+
+        tail, numbers = (1 - COVERAGE) / 2, range(1_000_000)
+        lowest, highest = (next(n for n in numbers if at_most(n) >= level) for level in (tail, 1 - tail))
+        return lowest, highest
+
+
 def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Timedelta = "1D") -> Promise:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
     An excursion lasts from the first record above the release level until all records of ``hold`` have stayed within
     it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
-    it. A year without end would have k + 1 peaks above the (k + 1)-th highest of a year's baseline, on average; the
-    excess of squared peaks over that one, S in all, is taken as exponential, so that
-
-        threshold^2 = peak^2 + S ((k + 1) / n)^(1 / k) - S,
-
-    where n is the number of events asked for in the time of the baseline. Averaged over baselines, that is exact for an
-    exponential tail, however few peaks there are.
+    it, and the threshold comes from the `Tail` of the squared peaks.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
-    if len(known) < 2:
-        raise ValueError(f"{len(known)} baseline records have a damage index; expected at least 2")
-    steps = known.index[1:] - known.index[:-1]
-    lengths = steps.to_series()
-    covered = lengths.clip(upper=max(hold, lengths.median())).sum()
-    n_years = float(covered / YEAR)
+    n_years = _years(known.index, hold)
+    if len(known) < 2 or np.isinf(known).any():
+        raise ValueError(
+            f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
+            "expected at least 2, all of them finite"
+        )
     release = _release(known, hold)
-    peaks = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))["peak"].to_numpy()
-    squares, asked = np.sort(peaks**2)[::-1], per_year * n_years
-    if len(squares) < 3 or asked > len(squares):
+    excursions = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))
+    excursions = excursions.sort_values("peak", ascending=False)
+    squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
+    if len(squares) < FEWEST_PEAKS or asked > len(squares):
         raise ValueError(
             f"false_alarms_per_year is {per_year:g}, but the {n_years:.2g} years of the baseline have only "
-            f"{len(squares)} excursions of {hold} or more; expected at least 3, and as many as alarms are asked for"
+            f"{len(squares)} excursions that end with {hold} of quiet; expected at least {FEWEST_PEAKS}, and as "
+            "many as alarms are asked for"
         )
-    k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
-    excess, factor = (squares[:k] - squares[k]).sum(), ((k + 1) / asked) ** (1 / k) - 1
-    threshold = float(np.sqrt(squares[k] + max(factor, 0.0) * excess))
-    lowest, highest = _range(k, max(factor, 0.0), n_years)
-    unseen, method = (
-        _unseen_season(known.index),
-        (f"by the {k + 1} highest of {len(squares)} excursions of the damage index in {n_years:.2g} years of baseline"),
+    tail = Tail.of(squares, asked)
+    rule, unseen = EventRule(tail.threshold(asked), release, hold), _unseen_season(known.index)
+    lowest, highest = tail.numbers(asked, n_years)
+    method = (
+        f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {n_years:.2g} years of "
+        "baseline" + (", extrapolated beyond all of them" if asked < FAR else "")
     )
     if unseen:
         warn_user(
@@ -144,14 +185,33 @@ def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Tim
             "seasons without baseline",
         )
     if asked < FAR:
-        method += ", extrapolated beyond all of them"
         warn_user(
             f"{per_year:g} false alarms a year are {asked:.2g} in the {n_years:.2g} years of the baseline: the "
-            f"threshold {threshold:.3g} is extrapolated beyond its highest excursion ({np.sqrt(squares[0]):.3g}); "
+            f"threshold {rule.threshold:.3g} is extrapolated beyond its highest excursion ({np.sqrt(squares[0]):.3g}); "
             f"expected at least {FAR}, by a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
-    return Promise(EventRule(threshold, release, hold), per_year, lowest, highest, n_years, k + 1, unseen, method)
+    if (squares[0] - tail.base) / tail.excess > _largest_share(tail.k):
+        others = Tail.of(squares[1:], asked).threshold(asked)
+        warn_user(
+            f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
+            f"(damage index {np.sqrt(squares[0]):.3g}, next {np.sqrt(squares[1]):.3g}) and raises the threshold "
+            f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
+            "without records of a fault or of another state",
+            "excursion of the baseline",
+        )
+    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method)
+
+
+def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:
+    """Time that records cover; of a gap, only the time that ends an event, or the usual step."""
+    steps = np.diff(stamps.as_unit("ns").asi8).astype(float)
+    return float(np.minimum(steps, max(hold.value, np.median(steps))).sum() / YEAR.value) if len(steps) else 0.0
+
+
+def _largest_share(k: int) -> float:
+    """Share that the largest of k exponential excesses has of their sum once in so many baselines (Fisher, Cochran)."""
+    return 1.0 - (DOUBTFUL / k) ** (1 / (k - 1)) if k > 1 else 1.0
 
 
 def _release(known: pd.Series, hold: pd.Timedelta) -> float:
@@ -160,18 +220,6 @@ def _release(known: pd.Series, hold: pd.Timedelta) -> float:
     whole = stamps - stamps[0] >= hold.value
     highest = known.rolling(hold, closed="both").max().to_numpy()
     return float(np.median(highest[whole] if whole.any() else highest))
-
-
-def _range(k: int, factor: float, n_years: float) -> tuple[int, int]:
-    """Between which numbers events in one year lie, given what k excesses tell of the tail and of its rate."""
-    spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k)
-    share = np.exp(-factor * spread) / n_years
-
-    def at_most(number: int) -> float:
-        return float(nbinom.cdf(number, k + 1, 1 / (1 + share)).mean())
-
-    tail, numbers = (1 - COVERAGE) / 2, range(1_000_000)
-    return tuple(next(n for n in numbers if at_most(n) >= level) for level in (tail, 1 - tail))
 
 
 def _unseen_season(stamps: pd.DatetimeIndex) -> str:

@@ -19,6 +19,8 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
     """Records in order of time as floats, in the columns and the time zone of the baseline."""
     if not isinstance(X, pd.DataFrame):
         raise ValueError(f"the records are of type {type(X).__name__}; expected a frame on a DatetimeIndex")
+    if columns is not None and not len(X):
+        return pd.DataFrame(np.empty((0, len(columns))), pd.DatetimeIndex([], tz=zone).as_unit("ns"), columns)
     if not isinstance(X.index, pd.DatetimeIndex):
         raise ValueError(
             f"the records have an index of type {type(X.index).__name__} ({X.index.dtype}); expected a DatetimeIndex, "
@@ -98,12 +100,16 @@ class RecordStore(SavesFrames):
         return Intake(fresh, batch[is_too_late], n_given - len(batch), n_late)
 
     def with_records(self, fresh: pd.DataFrame) -> RecordStore:
-        """The store with new records, and without those that are too old."""
+        """The store with new records."""
         if not len(fresh):
             return self
         kept = pd.concat([self.kept, fresh]) if len(self.kept) else fresh
-        kept = kept if kept.index.is_monotonic_increasing else kept.sort_index()
-        return replace(self, kept=kept[kept.index >= kept.index[-1] - self.keep])
+        return replace(self, kept=kept if kept.index.is_monotonic_increasing else kept.sort_index())
+
+    def trimmed(self) -> RecordStore:
+        """The store without records that are too old to be kept."""
+        first = self.kept.index.searchsorted(self.last - self.keep)
+        return replace(self, kept=self.kept.iloc[first:]) if first else self
 
     def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows of a batch stand in a table; an error if some have other values there."""
@@ -148,14 +154,17 @@ class Plausible:
         least = np.full(records.shape[1], -np.inf)
         return cls(least, -least)
 
-    def cleaned(self, records: pd.DataFrame) -> tuple[pd.DataFrame, list[str], int]:
-        """Records with NaN for what no sensor measures, a phrase about each, and the number of such values."""
+    def implausible(self, records: pd.DataFrame) -> NDArray[np.bool_]:
+        """Which values no sensor measures."""
         values = records.to_numpy()
-        wrong = np.isin(values, MARKERS) | (values < self.lowest) | (values > self.highest)
+        return np.isin(values, MARKERS) | (values < self.lowest) | (values > self.highest)
+
+    def cleaned(self, records: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+        """Records with NaN for what no sensor measures, and a phrase about each that had such values."""
+        values = records.to_numpy()
+        wrong = self.implausible(records)
         told = [""] * len(records)
         for row in np.flatnonzero(wrong.any(axis=1)):
             parts = [f"{records.columns[k]} is {values[row, k]:g}" for k in np.flatnonzero(wrong[row])]
             told[row] = f"{', '.join(parts)}: taken as missing"
-        if not wrong.any():
-            return records, told, 0
-        return records.mask(wrong), told, int(wrong.sum())
+        return records.mask(wrong) if wrong.any() else records, told

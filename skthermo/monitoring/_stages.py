@@ -7,6 +7,8 @@ from typing import Any
 
 import pandas as pd
 
+from skthermo.monitoring.sensors import SensorWatch
+
 
 @dataclass(frozen=True)
 class StageState:
@@ -24,6 +26,12 @@ class Stages:
     modes: list[Any]
     sensors: Any = None
     drift: Any = None
+
+    @classmethod
+    def of(cls, baseline: pd.DataFrame, targets: list[Any], *, sensors: bool) -> Stages:
+        """Learned from the baseline that the detector was fitted on."""
+        T, F = baseline.drop(columns=targets), baseline[targets]
+        return cls(list(T.columns), list(targets), SensorWatch.of(T, F) if sensors else None)
 
     def start(self) -> StageState:
         """The states after the baseline."""
@@ -58,7 +66,7 @@ class Stages:
     def faults(self, state: StageState) -> pd.DataFrame:
         """Sensors that have failed."""
         if self.sensors is None:
-            return pd.DataFrame(columns=["column", "kind", "since", "told", "until", "detail"])
+            return pd.DataFrame({name: [] for name in ("column", "kind", "since", "told", "until", "detail")})
         return self.sensors.faults(state.sensors)
 
     def drifts(self, state: StageState) -> pd.DataFrame | None:

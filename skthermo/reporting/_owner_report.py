@@ -9,12 +9,12 @@ from datetime import date
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from sklearn.exceptions import NotFittedError
 
 from skthermo._arguments import check_path
 from skthermo._formatting import counted
+from skthermo._io import write_when_complete
 from skthermo.fem import Structure
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._choice import Choice
@@ -179,13 +179,3 @@ def _versions() -> list[list[str]]:
     names = {"sklearn": "scikit-learn"}
     versions = [[names.get(name, name), str(import_module(name).__version__)] for name in PACKAGES]
     return [["Python", platform.python_version()], *versions]
-
-
-def write_when_complete(file: Path, text: str) -> None:
-    """Write a file beside it, and put it in its place when it is complete."""
-    unfinished = file.with_name(f".{file.name}.{uuid4().hex}")
-    try:
-        unfinished.write_text(text, encoding="utf-8")
-        os.replace(unfinished, file)
-    finally:
-        unfinished.unlink(missing_ok=True)

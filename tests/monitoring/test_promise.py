@@ -1,5 +1,7 @@
 """Events of a damage index, and promises of their number in a year."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -83,7 +85,7 @@ def test_events_keep_the_time_zone():
 @pytest.mark.parametrize("per_year", [0.5, 1.0, 12.0])
 def test_a_healthy_year_has_as_many_events_as_promised_on_average(per_year):
     random, n, counts, promises = np.random.default_rng(0), 365, [], []
-    for _ in range(60):
+    for _ in range(40):
         promise = promised_rule(pd.Series(chi(random, n), stamps(n)), per_year)
         later = find_events(chi(random, 10 * n), stamps(10 * n), promise.rule)
         counts.append(len(later) / 10)
@@ -94,7 +96,7 @@ def test_a_healthy_year_has_as_many_events_as_promised_on_average(per_year):
 
 def test_the_range_of_a_year_holds_nine_years_in_ten():
     random, n, within = np.random.default_rng(1), 365, []
-    for _ in range(120):
+    for _ in range(100):
         promise = promised_rule(pd.Series(chi(random, n), stamps(n)), 4.0)
         number = len(find_events(chi(random, n), stamps(n), promise.rule))
         within.append(promise.lowest <= number <= promise.highest)
@@ -144,5 +146,24 @@ def test_more_alarms_than_excursions_are_refused():
     index = pd.Series(chi(np.random.default_rng(7), 365), stamps(365))
     with pytest.raises(ValueError, match=r"false_alarms_per_year is 500, .* only \d+ excursions"):
         promised_rule(index, 500.0)
-    with pytest.raises(ValueError, match="0 baseline records have a damage index"):
+    with pytest.raises(ValueError, match="0 baseline records have a damage index, 0 of them"):
         promised_rule(index * np.nan)
+
+
+def test_a_day_that_was_no_healthy_one_is_named():
+    index = pd.Series(chi(np.random.default_rng(8), 365), stamps(365))
+    spoilt = index.copy()
+    spoilt.iloc[100] = 30.0
+    with pytest.warns(UserWarning, match=r"highest excursion of the baseline, 2025-04-11 00:00:00, .* index 30, next"):
+        raised = promised_rule(spoilt)
+    assert raised.rule.threshold > 2 * promised_rule(index).rule.threshold
+
+
+def test_few_healthy_baselines_are_said_to_have_such_a_day():
+    random, told = np.random.default_rng(9), 0
+    for _ in range(80):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            promised_rule(pd.Series(chi(random, 365), stamps(365)))
+        told += len(caught)
+    assert told <= 4

@@ -16,7 +16,6 @@ from skthermo.reporting import owner_report
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._html import STYLE
 from skthermo.reporting._identified import identified_damage
-from skthermo.reporting._owner_report import write_when_complete
 from skthermo.studies import (
     DetectabilityStudy,
     ProgressiveDamage,
@@ -224,24 +223,6 @@ def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(file, stu
     assert plt.get_fignums() == [opened.number]
     plt.close(opened)
     assert Page(again.read_text(encoding="utf-8")).values("src") == Page(file.read_text(encoding="utf-8")).values("src")
-
-
-def test_an_older_report_stays_until_the_new_one_is_complete(tmp_path, monkeypatch):
-    path = tmp_path / "a.html"
-    path.write_text("older")
-
-    def fails(*args):
-        raise OSError("the disk is full")
-
-    with monkeypatch.context() as patched:
-        patched.setattr("os.replace", fails)
-        with pytest.raises(OSError, match="disk is full"):
-            write_when_complete(path, "newer")
-    assert path.read_text() == "older"
-    assert list(tmp_path.iterdir()) == [path]
-    write_when_complete(path, "newer")
-    assert path.read_text() == "newer"
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_control_characters_in_names_are_seen_and_harm_nothing(identified, tmp_path):

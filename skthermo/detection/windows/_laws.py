@@ -43,7 +43,8 @@ class MeanLaw:
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window; NaN where no record has a mode."""
-        sums, counts = _sums_and_counts(windows, self.records.whiten(windows.rows))
+        white = self.records.whiten(windows.rows)
+        sums, counts = windows.sums_apart(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
         variances = (1 - self.correlation) * counts + self.correlation * counts**2
         known = counts > 0
         squared = np.where(known, sums**2, 0.0) / np.where(known, variances, 1.0)

@@ -54,6 +54,14 @@ class Windows:
         totals = np.concatenate([np.zeros((1, *values.shape[1:])), values.cumsum(axis=0)])
         return totals[1:] - totals[self.first]
 
+    def sums_apart(self, values: Array) -> Array:
+        """The same, each window for itself: what comes before it, however large, moves no digit of its sum."""
+        totals, sizes = np.zeros_like(values), self.sizes
+        for back in range(self.longest):
+            inside = sizes[back:, np.newaxis] > back
+            totals[back:] += np.where(inside, values[: len(values) - back], 0.0)
+        return totals
+
     def ending_in(self, start: int, stop: int) -> Windows:
         """The windows that end in a run of records, after those of the records before it that they need."""
         before = self.first[start]

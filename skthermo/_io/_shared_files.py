@@ -1,0 +1,92 @@
+"""Files that several processes use: locks, and files that are replaced when the new one is complete."""
+
+import os
+import shutil
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import IO
+from uuid import uuid4
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
+UNFINISHED = ".unfinished"
+PAUSE = 0.05  # seconds between two looks at a lock
+
+
+def lock(file: IO) -> None:
+    """Wait until no other process holds a file's lock, then hold it until the file is closed."""
+    if fcntl is not None:
+        fcntl.flock(file, fcntl.LOCK_EX)
+
+
+@contextmanager
+def alone_with(path: Path, seconds: float) -> Iterator[None]:
+    """Be the only process that works on a file, which may be replaced meanwhile; wait for others so long at most.
+
+    The lock is a file beside it, which says who holds it. What killed processes left half written is removed.
+
+    Raises
+    ------
+    TimeoutError
+        If another process still works on the file; it is named.
+    """
+    path = path.resolve()
+    with open(path.with_name(f".{path.name}.lock"), "a+") as holder:
+        end = time.monotonic() + seconds
+        while not _has_locked(holder):
+            if time.monotonic() >= end:
+                holder.seek(0)
+                who = holder.read().strip() or "another process"
+                raise TimeoutError(f"{path} is in use by {who}; waited {seconds:g} s for it")
+            time.sleep(PAUSE)
+        holder.truncate(0)
+        holder.write(f"process {os.getpid()} on {socket.gethostname()} since {datetime.now():%Y-%m-%d %H:%M:%S}\n")
+        holder.flush()
+        for left in path.parent.glob(f".*{UNFINISHED}"):
+            if left.name.startswith(f".{path.name}."):
+                left.unlink(missing_ok=True)
+        yield
+
+
+def _has_locked(file: IO) -> bool:
+    """Whether a file's lock was free, and is held from now on until the file is closed; always true on Windows."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def write_when_complete(path: Path, content: str | bytes) -> None:
+    """Write a file beside it, and put it in its place when it is complete and on the disk; links and rights stay."""
+    path = path.resolve()
+    unfinished = path.with_name(f".{path.name}.{uuid4().hex}{UNFINISHED}")
+    try:
+        with open(unfinished, "wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        if path.exists():
+            shutil.copymode(path, unfinished)
+        os.replace(unfinished, path)
+        _flush_folder(path.parent)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Make the new name of a file survive a power failure, where a folder can be opened."""
+    if hasattr(os, "O_DIRECTORY"):
+        opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)

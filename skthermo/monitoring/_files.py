@@ -1,0 +1,178 @@
+"""Files of a monitor: written beside and renamed, read as a whole or refused."""
+
+from __future__ import annotations
+
+import io
+import os
+import warnings
+import zlib
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import joblib
+import sklearn
+from sklearn.exceptions import InconsistentVersionWarning
+from sklearn.utils.validation import check_is_fitted
+
+import skthermo
+from skthermo._arguments import check_path
+from skthermo._io import write_when_complete
+from skthermo._optional import import_optional
+from skthermo._warnings import warn_user
+
+ENDINGS = (".joblib", ".skops")
+TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
+PLAIN = {"zoneinfo.ZoneInfo", "datetime.timezone", "datetime.timedelta", "builtins.frozenset"}
+SPEED = 1  # fastest compression of zlib, which adds a checksum
+
+
+def versions() -> dict[str, str]:
+    """Versions of the programs on which a monitor's decisions depend."""
+    return {"skthermo": skthermo.__version__, "scikit-learn": sklearn.__version__}
+
+
+def write_monitor(monitor: Any, path: str | os.PathLike[str]) -> None:
+    """Replace a file by one that holds a monitor, once that is complete and could be read again."""
+    check_is_fitted(monitor)
+    file = _checked(path)
+    if not file.parent.is_dir():
+        raise ValueError(
+            f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
+        )
+    write_when_complete(file, _by_skops(monitor, file) if file.suffix == ".skops" else _by_joblib(monitor))
+
+
+def load_monitor(path: str | os.PathLike[str]) -> Any:
+    """Read a monitor that was saved; it goes on where it stopped.
+
+    Parameters
+    ----------
+    path : str or path
+        A file of `Monitor.save`, which ends with ``.skops`` or ``.joblib``.
+
+    Returns
+    -------
+    Monitor
+        As it was saved, with its events, the memory of its lags and windows, and the records that it keeps.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file has another ending, is damaged, holds something else than a monitor, or, ending with ``.skops``,
+        holds classes that are not part of skthermo or scikit-learn.
+    ImportError
+        If the file ends with ``.skops``, and skops is not installed.
+
+    Warns
+    -----
+    UserWarning
+        If the monitor was fitted with another version of skthermo or scikit-learn, each time that it is read.
+
+    See Also
+    --------
+    Monitor.save : Writes the file.
+
+    Notes
+    -----
+    Reading a ``.joblib`` file can run any code: read only your own. A ``.skops`` file runs none. Only classes that
+    skthermo and scikit-learn define are read from it, beside arrays, numbers, texts and time zones, and never
+    functions. Where a detector holds a class of another package, such as a regressor of its own, save the monitor as
+    ``.joblib``.
+
+    Examples
+    --------
+    >>> from skthermo.monitoring import load_monitor
+    >>> load_monitor("bridge.pkl")
+    Traceback (most recent call last):
+    ...
+    ValueError: path is 'bridge.pkl'; expected a file that ends with .joblib or .skops
+    """
+    file = _checked(path)
+    content = file.read_bytes()
+    if file.suffix == ".skops":
+        import_optional("skops.io", extra="drop-ins")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InconsistentVersionWarning)  # one warning below stands for all
+            monitor = _from_skops(content) if file.suffix == ".skops" else _from_joblib(content)
+    except Exception as error:  # damaged files raise errors of every type
+        raise ValueError(
+            f"{file} cannot be read: {type(error).__name__}: {error}; expected the whole file of a monitor, saved with "
+            f"versions like {_listed(versions())}"
+        ) from error
+    if not all(hasattr(monitor, name) for name in ("update", "events_", "versions_")):
+        raise ValueError(f"{file} holds {type(monitor).__name__!r}; expected a fitted Monitor")
+    if monitor.versions_ != versions():
+        warn_user(
+            f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}: its decisions "
+            "may differ from those of the monitor that was fitted",
+            "versions of a monitor",
+        )
+    return monitor
+
+
+def _checked(path: Any) -> Path:
+    """A path with the ending of one of the forms."""
+    file = check_path(path)
+    if file.suffix not in ENDINGS:
+        raise ValueError(f"path is {str(file)!r}; expected a file that ends with {' or '.join(ENDINGS)}")
+    return file
+
+
+def _listed(numbers: dict[str, str]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in numbers.items())
+
+
+def _by_joblib(monitor: Any) -> bytes:
+    """A compressed file of joblib, which ends with a checksum."""
+    stream = io.BytesIO()
+    joblib.dump(monitor, stream)
+    return zlib.compress(stream.getbuffer(), SPEED)
+
+
+def _from_joblib(content: bytes) -> Any:
+    """What joblib wrote, compressed as here or plain."""
+    is_compressed = content[:1] == zlib.compress(b"", SPEED)[:1]
+    return joblib.load(io.BytesIO(zlib.decompress(content) if is_compressed else content))
+
+
+def _by_skops(monitor: Any, file: Path) -> bytes:
+    """A file of skops; an error if it could not be read again."""
+    skops = import_optional("skops.io", extra="drop-ins")
+    try:
+        content: bytes = skops.dumps(monitor)
+        foreign = _foreign(skops.get_untrusted_types(data=content))
+    except Exception as error:  # of what it cannot save
+        raise ValueError(f"skops cannot save this monitor: {error}; expected a path that ends with .joblib") from error
+    if foreign:
+        raise ValueError(
+            f"{file} would hold {foreign}, which are no classes of skthermo or scikit-learn and would not be read "
+            "again; expected a path that ends with .joblib"
+        )
+    return content
+
+
+def _from_skops(content: bytes) -> Any:
+    skops = import_optional("skops.io", extra="drop-ins")
+    types = skops.get_untrusted_types(data=content)
+    if foreign := _foreign(types):
+        raise ValueError(f"{foreign} are no classes of this skthermo or scikit-learn, and are not read")
+    return skops.loads(content, trusted=types)
+
+
+def _foreign(types: list[str]) -> list[str]:
+    """Names that are not of classes which trusted packages define: what these import, and functions, are foreign."""
+    return [name for name in types if name not in PLAIN and not _is_own_class(*name.rpartition(".")[::2])]
+
+
+def _is_own_class(module: str, name: str) -> bool:
+    if module.partition(".")[0] not in TRUSTED:
+        return False
+    try:
+        found = getattr(import_module(module), name, None)
+    except ImportError:
+        return False
+    return isinstance(found, type) and found.__module__ == module

@@ -1,0 +1,202 @@
+"""A saved monitor goes on where it stopped, and what is no whole monitor is refused."""
+
+import copy
+import json
+import re
+import sys
+import warnings
+import zipfile
+import zlib
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.linear_model import LinearRegression
+
+from skthermo.monitoring import load_monitor
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
+
+ENDINGS = ("joblib", "skops")
+each_form = pytest.mark.parametrize("ending", ENDINGS)
+
+
+class OwnRegression(LinearRegression):
+    """A regressor of a package that skthermo does not know."""
+
+
+@pytest.fixture(scope="module")
+def records():
+    return truss_records()
+
+
+@pytest.fixture(scope="module")
+def fitted(records):
+    return fitted_monitor(records)
+
+
+@pytest.fixture
+def monitor(fitted):
+    return copy.deepcopy(fitted)
+
+
+@pytest.fixture
+def path(tmp_path, ending):
+    if ending == "skops":
+        pytest.importorskip("skops.io")
+    return tmp_path / f"bridge.{ending}"
+
+
+@each_form
+@pytest.mark.parametrize("stop", [FIRST, FIRST + 3, DAMAGED + 4], ids=["fitted", "in a window", "in an event"])
+def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
+    late = [stop + 1, *([stop - 2] if stop > FIRST else [])]  # the second one comes after the monitor was loaded
+    if stop > FIRST:
+        monitor.update(records[FIRST:stop].drop(records.index[late], errors="ignore"))
+    assert (monitor.state() == "alarm") is (stop > DAMAGED)
+    monitor.save(path)
+    loaded = load_monitor(path)
+    assert_same_course(loaded, monitor)
+    batches = [records[stop : stop + 4].drop(records.index[late], errors="ignore"), records.iloc[late]]
+    for batch in [*batches, records[stop + 2 : stop + 12]]:
+        pd.testing.assert_frame_equal(loaded.update(batch), monitor.update(batch), check_exact=True)
+    for one in (monitor, loaded) if stop > DAMAGED else ():
+        one.acknowledge(1, harmless=False)
+    assert_same_course(loaded, monitor)
+
+
+@each_form
+def test_a_time_zone_comes_back(records, path):
+    zoned = records.tz_localize("Europe/Brussels")
+    monitor = fitted_monitor(zoned)
+    monitor.update(zoned[FIRST : FIRST + 5])
+    monitor.save(path)
+    loaded = load_monitor(path)
+    assert str(loaded.last_.tz) == "Europe/Brussels"
+    assert_same_course(loaded, monitor)
+
+
+@each_form
+def test_a_file_that_was_cut_off_is_refused(monitor, path):
+    monitor.save(path)
+    content = path.read_bytes()
+    for share in (0.0, 0.3, 0.999):
+        path.write_bytes(content[: int(share * len(content))])
+        with pytest.raises(ValueError, match=rf"{path.name} cannot be read: .*; expected the whole file of a monitor"):
+            load_monitor(path)
+
+
+@each_form
+def test_a_changed_bit_is_noticed(monitor, path):
+    monitor.save(path)
+    content = bytearray(path.read_bytes())
+    values = monitor.baseline_.to_numpy()[0].tobytes()
+    place = len(content) // 3 if path.suffix == ".joblib" else bytes(content).index(values[:8])
+    content[place] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_monitor(path)
+
+
+@each_form
+def test_something_else_is_no_monitor(path, ending):
+    if ending == "joblib":
+        joblib.dump(LinearRegression(), path)
+    else:
+        pytest.importorskip("skops.io").dump(LinearRegression(), path)
+    with pytest.raises(ValueError, match="holds 'LinearRegression'; expected a fitted Monitor"):
+        load_monitor(path)
+
+
+def test_joblib_itself_reads_and_writes_such_files(monitor, tmp_path):
+    monitor.save(tmp_path / "saved.joblib")
+    joblib.dump(monitor, tmp_path / "dumped.joblib")
+    assert_same_course(joblib.load(tmp_path / "saved.joblib"), load_monitor(tmp_path / "dumped.joblib"))
+
+
+def test_skops_itself_reads_such_files(monitor, tmp_path):
+    io = pytest.importorskip("skops.io")
+    monitor.save(tmp_path / "saved.skops")
+    types = io.get_untrusted_types(file=tmp_path / "saved.skops")
+    assert all(name.startswith(("skthermo.", "sklearn.")) for name in types)
+    assert_same_course(io.load(tmp_path / "saved.skops", trusted=types), monitor)
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("os", "system"),
+        ("numpy", "memmap"),  # a class that can write a file
+        ("skthermo._io._shared_files", "write_when_complete"),  # a function
+        ("skthermo.monitoring._files", "Path"),  # another package's class by a name of this one
+        ("skthermo.monitoring", "NoSuchClass"),
+    ],
+)
+def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name):
+    pytest.importorskip("skops.io")
+    path = tmp_path / "bridge.skops"
+    monitor.save(path)
+    with zipfile.ZipFile(path) as archive:
+        members = {member: archive.read(member) for member in archive.namelist()}
+    schema = json.loads(members["schema.json"])
+    schema["content"]["content"]["note_"] = {"__class__": name, "__module__": module, "__loader__": "TypeNode"}
+    with zipfile.ZipFile(path, "w") as archive:
+        for member, content in (members | {"schema.json": json.dumps(schema)}).items():
+            archive.writestr(member, content)
+    with pytest.raises(ValueError, match=rf"\['{module}.{name}'\] are no classes of this skthermo or scikit-learn"):
+        load_monitor(path)
+
+
+def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
+    pytest.importorskip("skops.io")
+    monitor = fitted_monitor(records, OwnRegression())
+    with pytest.raises(ValueError, match=r"would hold \[.*OwnRegression'\].*; expected a path that ends with .joblib"):
+        monitor.save(tmp_path / "bridge.skops")
+    assert not list(tmp_path.iterdir())
+    monitor.save(tmp_path / "bridge.joblib")
+    assert_same_course(load_monitor(tmp_path / "bridge.joblib"), monitor)
+
+
+@pytest.mark.parametrize(("program", "ending"), [("skthermo", "joblib"), ("scikit-learn", "skops")])
+def test_other_versions_are_told_each_time(monitor, path, program):
+    fitted = dict(monitor.versions_)
+    monitor.versions_ = fitted | {program: "0.0.1"}
+    monitor.save(path)
+    expected = rf"fitted with .*{program} 0\.0\.1.*, and this is .*{program} {re.escape(fitted[program])}"
+    for _ in range(2):
+        with pytest.warns(UserWarning, match=expected):
+            loaded = load_monitor(path)
+        loaded.save(path)
+    loaded.versions_ = fitted
+    loaded.save(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_monitor(path)
+
+
+def test_paths_are_checked(monitor, tmp_path):
+    for function in (monitor.save, load_monitor):
+        with pytest.raises(ValueError, match=r"path is 'bridge.pkl'; expected a file that ends with .joblib or .skops"):
+            function("bridge.pkl")
+    with pytest.raises(ValueError, match="there is no folder"):
+        monitor.save(tmp_path / "nowhere" / "bridge.joblib")
+    with pytest.raises(FileNotFoundError):
+        load_monitor(tmp_path / "bridge.joblib")
+    with pytest.raises(NotFittedError):
+        clone(monitor).save(tmp_path / "bridge.joblib")
+
+
+def test_a_missing_skops_is_named(monitor, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "skops.io", None)
+    (tmp_path / "bridge.skops").write_bytes(b"")
+    for function in (monitor.save, load_monitor):
+        with pytest.raises(ImportError, match=r"'skops\.io' is not installed"):
+            function(tmp_path / "bridge.skops")
+
+
+def test_a_plain_zlib_stream_is_no_monitor(tmp_path):
+    (tmp_path / "bridge.joblib").write_bytes(zlib.compress(np.zeros(3).tobytes()))
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_monitor(tmp_path / "bridge.joblib")
