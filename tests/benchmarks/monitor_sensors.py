@@ -216,7 +216,7 @@ def alarms(seeds):
     """Damage events within 30 days of a fault, by a monitor with and without the watch."""
     table = {}
     for seed in range(seeds):
-        campaign = make_truss_campaign(2, samples_per_year=8760, samples_per_day=24, noise=0.01, random_state=seed)
+        campaign = make_truss_campaign(2, samples_per_year=8760, samples_per_day=24, noise=0.002, random_state=seed)
         T, F = campaign.temperatures, campaign.frequencies
         healthy = Service("truss", T, F, 8760)
         for with_watch in (True, False):

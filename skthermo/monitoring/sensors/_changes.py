@@ -28,7 +28,8 @@ HIGHEST = 2.0  # times the lowest threshold, so that a fault of the baseline doe
 class Change(NamedTuple):
     """An offset or a drift: its statistic, first day, size on the last day and rate in a day (0 for an offset).
 
-    ``z`` is robust, so that a few odd days do not make it; ``weight`` is the same without a bound.
+    One of a single day is found only where no longer one is. ``z`` is robust, so that a few odd days do not make it;
+    ``weight`` is the same without a bound.
     """
 
     z: float
@@ -36,6 +37,7 @@ class Change(NamedTuple):
     first: int
     size: float
     rate: float
+    n_days: int
 
 
 class Departures(NamedTuple):
@@ -97,7 +99,8 @@ class DailyNoise:
         largest = 0.0
         for last in range(LONGEST // 4, len(departures.days) + 1, 4):
             change = self.change(departures.rows(slice(max(last - LONGEST, 0), last)))
-            largest = max(largest, change.z if change is not None else 0.0)
+            if change is not None and change.n_days >= LEAST_DAYS:
+                largest = max(largest, change.z)
         return float(np.clip(SAFER * largest, self.limit, HIGHEST * self.limit))
 
     def change(self, departures: Departures) -> Change | None:
@@ -111,7 +114,7 @@ class DailyNoise:
         if len(given.days) < LEAST_DAYS:
             return None
         at, scale = given.days.astype(float), self.scale * given.deviations
-        since = at - at[: 1 - LEAST_DAYS, np.newaxis]
+        since = at - at[:, np.newaxis]
         ramps = np.maximum(since[: max(len(at) + 1 - LEAST_DRIFT, 0)] + 1.0, 0.0)
         line = 2 * (at - at[0]) / LONGEST - 1
         shapes = np.vstack([given.deviations, np.ones(len(at)), line, given.beyond, since >= 0, ramps]) / scale
@@ -125,10 +128,13 @@ class DailyNoise:
         slopes, roots = evidence @ exact / information, np.sqrt(information)
         weights = np.abs(slopes) * roots
         z = np.abs(evidence @ np.clip(exact, -CLIPPED, CLIPPED)) / roots
-        best = int(np.where(z >= min(self.limit, z.max()), weights, 0.0).argmax())
-        first, is_drift = int(at[best % len(since)]), best >= len(since)
+        lasts = np.tile(np.arange(len(at))[::-1] + 1, 2)[: len(z)]
+        certain = (z > self.limit) & (lasts >= LEAST_DAYS)
+        best = int(np.where(certain | (not certain.any()), weights, 0.0).argmax())
+        first, is_drift = int(at[best % len(at)]), best >= len(at)
         size = slopes[best] * (at[-1] - first + 1) if is_drift else slopes[best]
-        return Change(float(z.max()), float(weights[best]), first, float(size), float(slopes[best] * is_drift))
+        rate = float(slopes[best] * is_drift)
+        return Change(float(z[best]), float(weights[best]), first, float(size), rate, int(lasts[best]))
 
     def for_no_change(self, departures: Departures, expected: float) -> tuple[float, int]:
         """Logarithm of the odds that a change has ended, against its going on as expected, and the day it ended."""
