@@ -5,6 +5,7 @@ from skthermo.plotting._fit_report import FitReportDisplay
 from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
 from skthermo.plotting._history import HistoryDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
+from skthermo.plotting._monitor import MonitorDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
@@ -19,6 +20,7 @@ __all__ = [
     "HistoryDisplay",
     "IdentifiedDamageDisplay",
     "ModeShapesDisplay",
+    "MonitorDisplay",
     "PODCurveDisplay",
     "PredictionDisplay",
     "ROCDisplay",

@@ -79,14 +79,15 @@ def _mark_edge(
     _write(ax, text, gid=f"{BEYOND} {direction}", **place)
 
 
-def mark_unjudged(ax: Axes, places: dict[str, Array]) -> None:
+def mark_unjudged(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
     """Grey ticks at the bottom where records of each label are not judged, and a text that counts them."""
     texts = []
     for label, x in places.items():
         if len(x):
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
             ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not judged", **style)
-            texts.append(f"{label}: {len(x)} not judged" if len(places) > 1 else f"{len(x)} not judged")
+            nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not judged")
     if texts:
         _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not judged")
 

@@ -54,7 +54,7 @@ def draw(
             plt.close(number)
 
 
-def _fold_legend(figure: Any, place: str, n_columns: int) -> None:
+def fold_legend(figure: Any, place: str, n_columns: int) -> None:
     """Put the legend of a figure into fewer columns, so that it fits a narrow drawing."""
     for legend in list(figure.legends):
         labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
@@ -149,7 +149,7 @@ def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) ->
 
     def make() -> DamageIndexDisplay:
         display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
-        _fold_legend(display.figure_, "outside upper center", n_columns=2)
+        fold_legend(display.figure_, "outside upper center", n_columns=2)
         return display
 
     return draw(make, f"Damage index over time. {above}.", height=3.4)
@@ -162,7 +162,7 @@ def draw_groups(structure: Any, families: list[str]) -> Html:
 
     def make() -> StructureDisplay:
         display = StructureDisplay.from_structure(structure, groups=known)
-        _fold_legend(
+        fold_legend(
             display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=3
         )
         return display

@@ -17,9 +17,9 @@ class Html(str):
 VOID = {"img", "meta"}  # elements without content
 STYLE = """
 :root { color-scheme: light dark; --page: #f6f7f9; --card: #ffffff; --text: #1d2530; --soft: #4c5866; --line: #d5dae1;
-  --accent: #00609a; --bar: #cfe3f2; --drawing: #ffffff; }
+  --accent: #00609a; --bar: #cfe3f2; --drawing: #ffffff; --healthy: #006b4f; --alarm: #a83a00; --unjudged: #5b5200; }
 @media (prefers-color-scheme: dark) { :root { --page: #12161c; --card: #1b2129; --text: #e6eaf0; --soft: #b0bac6;
-  --line: #3a4450; --accent: #7cc4f5; --bar: #24506f; } }
+  --line: #3a4450; --accent: #7cc4f5; --bar: #24506f; --healthy: #4fd1a5; --alarm: #ff9a62; --unjudged: #e3cf5a; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--text); line-height: 1.55; overflow-wrap: break-word;
   font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
@@ -35,7 +35,7 @@ a { color: var(--accent); }
 nav ul { list-style: none; padding: 0; display: flex; flex-wrap: wrap; gap: 0.25rem 1.25rem; }
 section { background: var(--card); border: 1px solid var(--line); border-radius: 0.6rem; margin: 0 0 1.25rem;
   padding: clamp(0.9rem, 3vw, 1.75rem); }
-#answer { border-top: 0.3rem solid var(--accent); }
+#answer, #today { border-top: 0.3rem solid var(--accent); }
 .soft, figcaption, caption, footer { color: var(--soft); }
 .scroll { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92rem; }
@@ -48,15 +48,38 @@ thead th { vertical-align: bottom; border-bottom-width: 2px; }
 tbody th { font-weight: 600; min-width: 7rem; }
 .rate { position: relative; display: block; min-width: 6rem; padding: 0 0.35rem; z-index: 0; }
 .bar { position: absolute; inset: 0 auto 0 0; background: var(--bar); border-radius: 0.2rem; z-index: -1; }
+.state { --state: var(--unjudged); display: flex; gap: clamp(0.75rem, 3vw, 1.5rem); align-items: flex-start;
+  border: 3px solid var(--state); border-left-width: 0.9rem; border-radius: 0.6rem; margin: 0 0 1rem;
+  padding: clamp(0.75rem, 3vw, 1.25rem); }
+.state.healthy { --state: var(--healthy); }
+.state.alarm { --state: var(--alarm); }
+.state svg { flex: none; width: clamp(2.4rem, 9vw, 3.6rem); fill: none; stroke: var(--card); stroke-width: 2.6;
+  stroke-linecap: round; stroke-linejoin: round; }
+.state circle { fill: var(--state); stroke: none; }
+.state p { margin: 0.35rem 0; }
+.state .headline { color: var(--state); font-size: clamp(1.4rem, 5.5vw, 2.1rem); font-weight: 700; line-height: 1.2;
+  margin: 0; }
 figure { margin: 1.25rem 0; }
 .panels { display: grid; gap: 0.75rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 21rem), 1fr)); }
 img { display: block; width: 100%; max-width: 34rem; height: auto; background: var(--drawing); border-radius: 0.35rem;
   border: 1px solid var(--line); padding: 0.25rem; }
 figcaption { font-size: 0.92rem; margin-top: 0.5rem; max-width: 46rem; }
 code { font-size: 0.88em; overflow-wrap: anywhere; }
+.cards th, .cards td { min-width: 3.5rem; }
+@media screen and (max-width: 40rem) {
+  .cards thead { display: none; }
+  .cards, .cards tbody, .cards tr { display: block; }
+  .cards tr { border-bottom: 2px solid var(--line); padding: 0.4rem 0; }
+  .cards caption { display: block; }
+  .cards th, .cards td { display: flex; gap: 0.75rem; max-width: none; min-width: 0; border: 0; padding: 0.15rem 0; }
+  .cards td:empty { display: none; }
+  .cards th::before, .cards td::before { content: attr(data-label); flex: none; width: 8.5rem; color: var(--soft);
+    font-weight: 400; }
+  .cards .text { min-width: 0; }
+}
 @media print {
   :root { color-scheme: light; --page: #fff; --card: #fff; --text: #000; --soft: #333; --line: #bbb; --bar: #ddd;
-    --accent: #00466f; }
+    --accent: #00466f; --healthy: #004d38; --alarm: #7d2b00; --unjudged: #423c00; }
   body { font-size: 10pt; }
   table, figcaption { font-size: 9pt; }
   header, main, footer { max-width: none; padding: 0; }
@@ -101,14 +124,20 @@ def section(name: str, title: str, *content: Html) -> Html:
     return element("section", heading, Html("\n"), joined(content), id=name, aria_labelledby=f"{name}-title")
 
 
-def table(caption: str, columns: Sequence[Any], rows: Iterable[Sequence[Any]]) -> Html:
-    """A table that scrolls within itself; the first column heads the rows, other columns are right-aligned numbers."""
+def table(caption: str, columns: Sequence[Any], rows: Iterable[Sequence[Any]], *, is_cards: bool = False) -> Html:
+    """A table that scrolls within itself, or on a telephone has its rows as cards; the first column heads the rows."""
     head = element("tr", *(element("th", name, scope="col") for name in columns))
+    labels = [{"data_label": name} if is_cards else {} for name in columns]
     body = [
-        element("tr", element("th", first, scope="row"), *(element("td", v) for v in rest)) for first, *rest in rows
+        element(
+            "tr",
+            element("th", first, scope="row", **labels[0]),
+            *(element("td", value, **label) for value, label in zip(rest, labels[1:], strict=True)),
+        )
+        for first, *rest in rows
     ]
     parts = element("caption", caption), element("thead", head), element("tbody", joined(body))
-    inner = element("table", *parts)
+    inner = element("table", *parts, **({"class_": "cards"} if is_cards else {}))
     return element("div", inner, class_="scroll", tabindex=0, role="region", aria_label=caption)
 
 

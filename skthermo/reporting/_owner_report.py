@@ -1,36 +1,33 @@
-"""The report of a study for the owner of a structure: one HTML file."""
+"""Pages for the owners of structures: one HTML file each."""
 
 from __future__ import annotations
 
 import os
-import platform
-from collections.abc import Iterator
-from datetime import date
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from sklearn.exceptions import NotFittedError
 
-from skthermo._arguments import check_path
+from skthermo._arguments import check_path, check_size
 from skthermo._formatting import counted
 from skthermo._io import write_when_complete
 from skthermo.fem import Structure
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._choice import Choice
 from skthermo.reporting._findings import findings_of
-from skthermo.reporting._html import Html, bullets, element, page, paragraphs, section, table
+from skthermo.reporting._html import Html, page, paragraphs
 from skthermo.reporting._identified import identified_damage
 from skthermo.reporting._model import monitored, quality
+from skthermo.reporting._settings import parameters, settings
+from skthermo.reporting.service import monitor_page
 from skthermo.studies import IdentifiedDamage
 
-TITLE = "Which damage the monitoring would find"
-LONGEST_VALUE = 400  # number of letters after which the text of a setting is cut
-PACKAGES = ("skthermo", "numpy", "scipy", "pandas", "sklearn", "matplotlib")
+STUDY_TITLE, MONITOR_TITLE = "Which damage the monitoring would find", "The structure today"
 
 
 def owner_report(
-    study: Any,
+    subject: Any,
     path: str | os.PathLike[str],
     *,
     identified: Any = None,
@@ -38,17 +35,25 @@ def owner_report(
     structure: Any = None,
     detector: str | None = None,
     max_false_alarms: float = 0.02,
+    drift_limit: float = 0.1,
+    now: Any = None,
 ) -> Path:
     """Write a report for the owner of a structure: one HTML file, with all drawings in it.
 
-    It says in plain sentences which damage the monitoring would find, what was monitored, how good the model is, which
-    damage was identified, and with which settings and warnings all this was computed. Of a study with several
-    detectors, it says which one is recommended and why, and the rest is on that one.
+    Of a study, it says in plain sentences which damage the monitoring would find, what was monitored, how good the
+    model is, which damage was identified, and with which settings and warnings all this was computed. If the study has
+    several detectors, it says which one is recommended and why, and the rest is on that one.
+
+    Of a monitor, it says whether the structure is healthy today, in alarm or not judged, since when and why; which
+    events there were; how the damage index, the stiffness and the sensors changed; what was not judged; and what the
+    promise of few false alarms means. A monitor that has had no record for two days more than usual is not called
+    healthy.
 
     Parameters
     ----------
-    study : DetectabilityStudy
-        With the results of `~skthermo.studies.DetectabilityStudy.run`.
+    subject : DetectabilityStudy or Monitor
+        A study with the results of `~skthermo.studies.DetectabilityStudy.run`, or a fitted
+        `~skthermo.monitoring.Monitor`.
     path : str or path
         The file; an older one is replaced when the new one is complete.
     identified : IdentifiedDamage, optional
@@ -62,6 +67,10 @@ def owner_report(
         ranking.
     max_false_alarms : float, default=0.02
         Limit of the share of false alarms, by which several detectors are ranked.
+    drift_limit : float, default=0.1
+        Loss of stiffness of which the page on a monitor says when slow drift reaches it.
+    now : time, optional
+        When the page on a monitor is written, in the time zone of its records; by default the clock's time.
 
     Returns
     -------
@@ -71,10 +80,10 @@ def owner_report(
     Raises
     ------
     NotFittedError
-        If the study has no results.
+        If the study has no results, or the monitor is not fitted.
     ValueError
-        If the folder does not exist, the path is a folder, ``study`` or ``identified`` is something else, the detector
-        has no results, or several cannot be ranked, as no scenario is healthy or none is damaged.
+        If the folder does not exist, the path is a folder, an argument is something else or does not belong to this
+        subject, the detector has no results, or several cannot be ranked, as no scenario is healthy or none is damaged.
     ImportError
         If matplotlib is not installed.
 
@@ -99,16 +108,25 @@ def owner_report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
-    if not hasattr(study, "scenarios"):
-        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
+    is_monitor = hasattr(subject, "update") and hasattr(subject, "acknowledge")
+    if not is_monitor and not hasattr(subject, "scenarios"):
+        raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy or a Monitor")
     if identified is not None and not isinstance(identified, IdentifiedDamage):
         raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
-    if not hasattr(study, "results_"):
-        raise NotFittedError("the study has no results yet; expected a call of run before")
+    if not hasattr(subject, "events_" if is_monitor else "results_"):
+        text = "the monitor is not fitted" if is_monitor else "the study has no results"
+        raise NotFittedError(f"{text} yet; expected a call of {'fit' if is_monitor else 'run'} before")
     if title is not None and not isinstance(title, str):
         raise ValueError(f"title is {title!r:.100}; expected a text")
     if structure is not None and not isinstance(structure, Structure):
         raise ValueError(f"structure is {structure!r:.200}; expected a Structure")
+    others = {"structure": structure, "detector": detector} if is_monitor else {"now": now}
+    wrong = [name for name, value in others.items() if value is not None]
+    if wrong:
+        raise ValueError(
+            f"{' and '.join(wrong)} given for a {type(subject).__name__}; expected only for a "
+            f"{'DetectabilityStudy' if is_monitor else 'Monitor'}"
+        )
     file = check_path(path)
     if not file.parent.is_dir():
         raise ValueError(
@@ -116,6 +134,25 @@ def owner_report(
         )
     if file.is_dir():
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
+    if is_monitor:
+        limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
+        introduction, sections = monitor_page(subject, now, limit)
+        if identified is not None:
+            sections["identified"] = ("Identified damage", identified_damage(identified))
+            sections["settings"] = sections.pop("settings")
+    else:
+        introduction, sections = _study_page(subject, identified, structure, detector, max_false_alarms)
+    heading = title if title is not None else MONITOR_TITLE if is_monitor else STUDY_TITLE
+    written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
+    ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
+    write_when_complete(file, page(heading, introduction, sections, ending))
+    return file
+
+
+def _study_page(
+    study: Any, identified: Any, structure: Any, detector: str | None, max_false_alarms: float
+) -> tuple[Html, dict[str, tuple[str, Html]]]:
+    """What stands above the sections, and these with their titles."""
     choice = None
     if study.results_["detector"].nunique() > 1:
         choice = Choice.of(study, detector, max_false_alarms)
@@ -125,11 +162,8 @@ def owner_report(
     tested = "The alarm system was" if choice is None else f"{counted(len(choice.ranking), 'alarm system')} were"
     introduction = [f"{tested} tested by simulation, in {n_states} of the structure."]
     introduction += [] if choice is None else [choice.sentence()]
-    ending = paragraphs(f"Written by skthermo on {date.today():%Y-%m-%d}.")
     sections = _sections(study if choice is None else choice.only(), identified, structure, choice)
-    heading = TITLE if title is None else title
-    write_when_complete(file, page(heading, paragraphs(*introduction), sections, ending))
-    return file
+    return paragraphs(*introduction), sections
 
 
 def _sections(study: Any, identified: Any, structure: Any, choice: Choice | None) -> dict[str, tuple[str, Html]]:
@@ -149,33 +183,13 @@ def _sections(study: Any, identified: Any, structure: Any, choice: Choice | None
 
 
 def _settings(study: Any, identified: Any) -> Html:
-    """Parameters, versions and warnings."""
+    """Parameters and warnings of a study."""
     parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()]}
-    rows = [[f"{part}: {name}", value] for part, estimator in parts.items() for name, value in _parameters(estimator)]
+    rows = [[f"{part}: {name}", value] for part, estimator in parts.items() for name, value in parameters(estimator)]
     rows += [
-        [f"study: {name}", value] for name, value in _parameters(study) if name not in ("fem", "detectors", "scenarios")
+        [f"study: {name}", value] for name, value in parameters(study) if name not in ("fem", "detectors", "scenarios")
     ]
     warned = [*getattr(study, "warnings_", [])]
     warned += [f"Identified damage: {text}" for _, text in ([] if identified is None else identified.warnings())]
-    return section(
-        "settings",
-        "Settings",
-        paragraphs("For the engineer who repeats this study."),
-        table("Settings of the model, of the alarm system and of the study.", ["Setting", "Value"], rows),
-        table("Versions of the programs.", ["Program", "Version"], _versions()),
-        element("h3", "Warnings"),
-        bullets(warned) or paragraphs("There was no warning."),
-    )
-
-
-def _parameters(estimator: Any) -> Iterator[tuple[str, Html]]:
-    """Parameters by name, as short text."""
-    for name, value in estimator.get_params(deep=False).items():
-        text = " ".join(repr(value).split())
-        yield name, element("code", text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ...")
-
-
-def _versions() -> list[list[str]]:
-    names = {"sklearn": "scikit-learn"}
-    versions = [[names.get(name, name), str(import_module(name).__version__)] for name in PACKAGES]
-    return [["Python", platform.python_version()], *versions]
+    caption = "Settings of the model, of the alarm system and of the study."
+    return settings("For the engineer who repeats this study.", caption, rows, warned)

@@ -262,7 +262,7 @@ def test_wrong_paths_and_studies_without_results(chain, study, tmp_path):
 def test_text_has_enough_contrast(number):
     """Contrast of at least 4.5, as WCAG 2 asks of text at level AA."""
     colours = dict(re.findall(r"--(\w+): (#\w{6})", STYLE.split("@media")[number]))
-    for text in ("text", "soft", "accent"):
+    for text in ("text", "soft", "accent", "healthy", "alarm", "unjudged"):
         for ground in ("page", "card"):
             assert contrast(colours[text], colours[ground]) >= 4.5
     assert contrast(colours["text"], colours["bar"]) >= 4.5
@@ -287,7 +287,7 @@ def test_families_of_damage_and_strengthening_are_named(chain, tmp_path):
 
 
 def test_what_is_no_study_and_no_identified_damage_is_named(study, chain, tmp_path):
-    with pytest.raises(ValueError, match="study is DataInformedFEM"):
+    with pytest.raises(ValueError, match="subject is DataInformedFEM"):
         owner_report(chain[0], tmp_path / "a.html")
     with pytest.raises(ValueError, match=r"identified is \{'top': 0.1\}; expected what identify_damage gives"):
         owner_report(study, tmp_path / "a.html", identified={"top": 0.1})

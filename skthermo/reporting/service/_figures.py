@@ -1,0 +1,71 @@
+"""Drawings of a page on a monitor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from skthermo._formatting import counted, significant
+from skthermo.plotting import MonitorDisplay
+from skthermo.reporting._figures import draw, fold_legend
+from skthermo.reporting._html import Html
+from skthermo.reporting.service._standing import MONTH, NOT_JUDGED, YEAR, Standing
+
+LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
+
+
+def draw_month(standing: Standing) -> Html:
+    """Damage index of each record in the month before the newest one."""
+    start = standing.last - MONTH
+    judged = standing.judged[standing.judged.index >= start]
+    alarms, unknown = ((judged["state"] == state).sum() for state in ("alarm", NOT_JUDGED))
+    alt = (
+        f"Damage index of {counted(len(judged), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
+        f"judged. {_highest(judged['index'])}"
+    )
+    return _drawn(standing, alt, "The last month, by record", start=start, by="record", parts=["index"])
+
+
+def draw_days(standing: Standing) -> list[Html]:
+    """Highest and median damage index of each day in the last year and, where service is longer, in all of it."""
+    drawn = []
+    whole = standing.monitor.days_.index[0]
+    spans = {"The last year, by day": max(standing.last - YEAR, whole).normalize()}
+    if standing.last - whole > LONGEST:
+        spans["All of the service, by day"] = whole
+    for title, start in spans.items():
+        days = standing.monitor.days_[standing.monitor.days_.index >= start]
+        n_days = (standing.last.normalize() - days.index[0]).days + 1
+        alt = (
+            f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "
+            f"{n_days - int((days['n_judged'] > 0).sum()):,} without a judged record. {_highest(days['index_max'])}"
+        )
+        drawn.append(_drawn(standing, alt, title, start=start, parts=["index"]))
+    return drawn
+
+
+def draw_drift(standing: Standing) -> Html | None:
+    """Change of each group's stiffness by day; nothing where none is known yet."""
+    days = standing.monitor.days_
+    columns = [name for name in days.columns if str(name).startswith("drift ")]
+    if not columns or not days[columns].notna().any(axis=None):
+        return None
+    names = ", ".join(str(name).removeprefix("drift ") for name in columns)
+    return _drawn(standing, f"Change of stiffness over time of the groups {names}.", parts=["drift"], height=3.0)
+
+
+def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4, **options: Any) -> Html:
+    """A display of the monitor, with its legend below."""
+
+    def make() -> MonitorDisplay:
+        display = MonitorDisplay.from_estimator(standing.monitor, **options)
+        fold_legend(display.figure_, "outside lower center", n_columns=2)
+        return display
+
+    return draw(make, alt, title, height=height)
+
+
+def _highest(index: pd.Series) -> str:
+    highest = index.max()
+    return f"The highest index is {significant(highest, 3)}." if highest == highest else "None was judged."

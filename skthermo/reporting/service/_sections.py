@@ -1,0 +1,111 @@
+"""The page on a monitor: its sections in their order, and those on records."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from skthermo._formatting import counted, share_text
+from skthermo.reporting._html import Html, element, figure, paragraphs, section, table
+from skthermo.reporting._settings import parameters, settings
+from skthermo.reporting.service._changes import drift, sensors
+from skthermo.reporting.service._events import events, promise
+from skthermo.reporting.service._figures import draw_days, draw_month
+from skthermo.reporting.service._standing import NOT_JUDGED, Standing, moment
+from skthermo.reporting.service._today import today
+
+MOST_REASONS = 12  # largest number of reasons in a table
+
+
+def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, tuple[str, Html]]]:
+    """What stands above the sections, and these with their titles."""
+    standing = Standing.of(monitor, now)
+    first, last = (moment(time) for time in monitor.baseline_.index[[0, -1]])
+    n_records = int(monitor.counts_["n_records"])
+    introduction = (
+        f"The monitor compares new records with those of the healthy structure from {first} to {last}. "
+        f"{counted(n_records, 'record')} {'has' if n_records == 1 else 'have'} come since."
+    )
+    return paragraphs(introduction), {
+        "today": ("Today", today(standing, limit)),
+        "events": ("Events", events(standing)),
+        "index": ("Damage index", _index(standing)),
+        "drift": ("Slow change", drift(standing, limit)),
+        "sensors": ("Sensors", sensors(standing)),
+        "unjudged": ("What was not judged", unjudged(standing)),
+        "promise": ("The promise", promise(standing)),
+        "settings": ("Settings", _settings(monitor)),
+    }
+
+
+def _index(standing: Standing) -> Html:
+    """Damage indices of the last month and of the last year."""
+    title = "Damage index"
+    if not standing.has_records:
+        return section("index", title, paragraphs("No record has come since the baseline."))
+    text = (
+        f"The drawings end with the newest record, of {moment(standing.last)}. Points below the dashed line are as the "
+        "healthy structure; an event begins above it. Grey ticks at the bottom are records or days that were not "
+        "judged, days without any record among them: nothing is known of them."
+    )
+    drawn = [draw_month(standing)] if len(standing.judged) else []
+    caption = "Damage index: of each record in the last month; the highest and the median of each day in longer times."
+    return section("index", title, paragraphs(text), figure(caption, drawn + draw_days(standing)))
+
+
+def unjudged(standing: Standing) -> Html:
+    """How many records were not judged, and why."""
+    counts, judged, days = standing.monitor.counts_, standing.judged, standing.monitor.days_
+    title = "What was not judged"
+    if not standing.has_records:
+        return section("unjudged", title, paragraphs("No record has come since the baseline."))
+    number, unknown = int(counts["n_records"]), int(counts["n_not_judged"])
+    n_days = (days.index[-1] - days.index[0]).days + 1
+    text = f"All of {counted(number, 'record')} were judged."
+    if unknown:
+        text = (
+            f"Of {counted(number, 'record')} in service, {unknown:,} ({share_text(unknown / number)}) were not judged. "
+            "They count neither as healthy nor as alarms: nothing is known of them."
+        )
+    silent = n_days - len(days)
+    without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
+    is_unknown = judged["state"] == NOT_JUDGED
+    since = f"since {moment(judged.index[0])}" if len(judged) else ""
+    parts = [paragraphs(text, without)]
+    caption = f"Why records were not judged: those that are kept, {since}."
+    parts.append(_reasons(caption, judged.loc[is_unknown, "reason"].replace("", "no reason given")))
+    remarks = judged.loc[~is_unknown, "reason"]
+    parts.append(_reasons(f"Remarks on records that were judged all the same, {since}.", remarks[remarks != ""]))
+    names = {
+        "n_repeated": "that came again, and were counted once",
+        "n_late": "that came late, and were judged all the same",
+        "n_too_late": "that came too late to be judged",
+        "n_implausible": "(single values) that no sensor measures, and were taken as missing",
+    }
+    rows = [[f"Records {text}", f"{int(counts[name]):,}"] for name, text in names.items() if counts.get(name)]
+    parts.append(table("What else was noticed.", ["What", "Number"], rows) if rows else Html())
+    return section("unjudged", title, *(part for part in parts if part))
+
+
+def _reasons(caption: str, reasons: pd.Series) -> Html:
+    """A table of reasons with their numbers, the most frequent first; nothing without any."""
+    found = reasons.value_counts()
+    rows = [[reason, f"{number:,}"] for reason, number in found.head(MOST_REASONS).items()]
+    rest = found.iloc[MOST_REASONS:]
+    rows += [[f"{len(rest):,} other reasons", f"{int(rest.sum()):,}"]] if len(rest) else []
+    return table(caption, ["Reason", "Records"], rows) if rows else Html()
+
+
+def _settings(monitor: Any) -> Html:
+    """Parameters of the monitor, of its detector and of the model."""
+    detector = monitor.detector_
+    parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
+    rows = [[f"monitor: {name}", v] for name, v in parameters(monitor) if name not in ("detector", "fem")]
+    rows += [[f"{part}: {name}", v] for part, one in parts.items() for name, v in parameters(one)]
+    rows += [] if monitor.fem is None else [[f"model: {name}", v] for name, v in parameters(monitor.fem)]
+    targets = [str(name) for name in monitor.targets_]
+    others = [str(name) for name in monitor.baseline_.columns if name not in set(monitor.targets_)]
+    rows += [["natural frequencies", element("code", ", ".join(targets))]]
+    rows += [["temperatures", element("code", ", ".join(others) or "none")]]
+    return settings("For the engineer who looks after this monitor.", "Settings of the monitor and its parts.", rows)

@@ -1,0 +1,171 @@
+"""How a structure stands by its monitor, at the time at which a page is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._formatting import SPACE, counted, duration_text
+
+ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
+LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
+ALARM, HEALTHY, NOT_JUDGED = "alarm", "healthy", "not judged"
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A monitor, and the time at which its page is written, in the time zone of the records."""
+
+    monitor: Any
+    now: pd.Timestamp
+
+    @classmethod
+    def of(cls, monitor: Any, now: Any = None) -> Standing:
+        """Now is by the clock where no time is given."""
+        zone = monitor.last_.tz
+        try:
+            time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
+        except (TypeError, ValueError):
+            time = pd.NaT
+        if pd.isna(time) or (time.tz is not None and zone is None):
+            raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
+        if zone is not None:
+            time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
+        return cls(monitor, time)
+
+    @cached_property
+    def events(self) -> pd.DataFrame:
+        """All events."""
+        return self.monitor.events_
+
+    @cached_property
+    def judged(self) -> pd.DataFrame:
+        """Judgements of the records that are kept."""
+        return self.monitor.judged_
+
+    @cached_property
+    def step(self) -> pd.Timedelta:
+        """Usual time between records."""
+        stamps = self.monitor.baseline_.index.append(self.judged.index)
+        return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else ONE_DAY
+
+    @property
+    def has_records(self) -> bool:
+        """Whether any record has come since the baseline."""
+        return len(self.monitor.days_) > 0
+
+    @property
+    def last(self) -> pd.Timestamp:
+        """Stamp of the newest record."""
+        return self.monitor.last_
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether a new record has been missed for days."""
+        return self.now - self.last > self.step + LATE
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether the newest record is of a time to come."""
+        return self.last - self.now > ONE_DAY
+
+    @property
+    def state(self) -> str:
+        """An alarm lasts until its event has ended; without new records nothing is healthy."""
+        said = self.monitor.state()
+        if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records):
+            return NOT_JUDGED
+        return said
+
+    def headline(self) -> str:
+        """The state in one line."""
+        if self.state == ALARM:
+            opened = self.opened("damage")
+            since = opened["start"].min() if len(opened) else self.last
+            return f"Alarm since {moment(since)}"
+        if self.state == HEALTHY:
+            return "Healthy: no alarm"
+        if not self.has_records:
+            return "Not judged: no record since the baseline"
+        if self.is_ahead:
+            return "Not judged: the dates of the records are wrong"
+        if self.is_silent:
+            return f"Not judged: no record since {moment(self.last)}"
+        return f"Not judged since {moment(self.unjudged_since)}"
+
+    def explanation(self) -> str:
+        """What the headline means, and why."""
+        if self.state == ALARM:
+            text = (
+                "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
+                "an engineer should look at the structure and at the records."
+            )
+            silence = f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
+            return text + (silence if self.is_silent else "")
+        if self.state == HEALTHY:
+            return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
+        if not self.has_records:
+            return f"The baseline ends on {moment(self.last)}; whether the structure is healthy now is not known."
+        if self.is_ahead:
+            return (
+                f"The newest record is of {moment(self.last)}, and this page was written on {moment(self.now)}. As "
+                "long as the clocks do not agree, it is not known whether new records are missing."
+            )
+        if self.is_silent:
+            return (
+                f"A record usually comes every {self.step_text}; the newest is {duration_text(self.now - self.last)} "
+                "old. Whether the structure is healthy now is not known."
+            )
+        reason = str(self.judged["reason"].iloc[-1]) if len(self.judged) else ""
+        return f"Because: {reason or 'no reason is given'}. Whether the structure is healthy now is not known."
+
+    @property
+    def step_text(self) -> str:
+        """Usual time between records, as in "every day"."""
+        return {"24 hours": "day"}.get(text := duration_text(self.step), text.removeprefix("1 "))
+
+    @property
+    def unjudged_since(self) -> pd.Timestamp:
+        """First record after the last one that was judged."""
+        known = self.judged.index[self.judged["state"] != NOT_JUDGED]
+        after = self.judged.index[self.judged.index > known[-1]] if len(known) else self.judged.index
+        days = self.monitor.days_
+        first_day = days.index[0] if not (days["n_judged"] > 0).any() else None
+        return first_day if first_day is not None else after[0] if len(after) else self.last
+
+    def opened(self, kind: str) -> pd.DataFrame:
+        """Events of a kind that have not ended."""
+        return self.events[self.events["end"].isna() & (self.events["kind"] == kind)]
+
+    @cached_property
+    def failed(self) -> pd.DataFrame:
+        """Faults of sensors that last."""
+        faults = self.monitor.faults_
+        return faults[faults["until"].isna()]
+
+    @property
+    def years(self) -> float:
+        """Years in service, up to the newest record."""
+        return (self.last - self.monitor.days_.index[0]) / YEAR if self.has_records else 0.0
+
+    def recent(self) -> str:
+        """How many records of the last month were judged."""
+        days = self.monitor.days_
+        days = days[days.index > self.last - MONTH]
+        number, judged = int(days["n_records"].sum()), int(days["n_judged"].sum())
+        which = f"{judged:,}" if judged < number else "all"
+        return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
+
+
+def moment(time: Any, *, is_short: bool = False) -> str:
+    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
+    if pd.isna(time):
+        return ""
+    stamp = pd.Timestamp(time)
+    month = stamp.month_name()[: 3 if is_short else None]
+    day = SPACE.join([str(stamp.day), month, str(stamp.year)])
+    return day if stamp == stamp.normalize() else f"{day}, {stamp:%H:%M}"

@@ -1,0 +1,84 @@
+"""A monitor whose judgements are given, with the attributes of a fitted one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+
+NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "told", "until", "detail"])
+
+
+def event_row(start, end, kind="damage", modes="f1", acknowledged=False, harmless=False, note=""):
+    """One event, as `FakeMonitor` takes them."""
+    return {
+        "kind": kind,
+        "start": pd.Timestamp(start),
+        "end": pd.NaT if end is None else pd.Timestamp(end),
+        "peak": 7.5,
+        "peak_time": pd.Timestamp(start),
+        "modes": modes,
+        "n_alarms": 3,
+        "acknowledged": acknowledged,
+        "harmless": harmless,
+        "note": note,
+    }
+
+
+class FakeMonitor:
+    """Records of 2025 to its July, or of so many days; the last ones not judged (None: all)."""
+
+    def __init__(
+        self,
+        *,
+        freq="1D",
+        n_days=180,
+        n_unjudged=0,
+        reason="",
+        events=(),
+        drift=None,
+        faults=NO_FAULTS,
+        sensors=True,
+        zone=None,
+        false_alarms_per_year=1.0,
+    ):
+        self.false_alarms_per_year, self.sensors, self.direction, self.fem = (
+            false_alarms_per_year,
+            sensors,
+            "both",
+            None,
+        )
+        stamps = pd.date_range("2025-01-01", periods=n_days, freq=freq, tz=zone)
+        index = 1 + np.abs(np.sin(np.arange(len(stamps))))
+        index[len(index) - n_unjudged if n_unjudged is not None else 0 :] = np.nan
+        known = ~np.isnan(index)
+        judged = {"state": np.where(known, "healthy", "not judged"), "index": index, "threshold": 3.0}
+        judged = pd.DataFrame(judged, stamps).assign(reason=np.where(known, "", reason), modes="", event=0)
+        columns = ["kind", "start", "end", "peak", "peak_time", "modes", "n_alarms", "acknowledged", "harmless", "note"]
+        self.events_ = pd.DataFrame(list(events), range(1, len(events) + 1), columns)
+        for name in ("start", "end", "peak_time"):
+            self.events_[name] = pd.to_datetime(self.events_[name]).dt.tz_localize(zone)
+        groups = pd.Series(index, stamps.normalize()).groupby(level=0)
+        self.days_ = pd.DataFrame({"n_records": groups.size(), "n_judged": groups.count(), "n_alarms": 0})
+        self.days_ = self.days_.assign(index_median=groups.median(), index_max=groups.max())
+        for group in () if drift is None else drift.index:
+            self.days_[f"drift {group}"] = np.linspace(0, drift["change"][group], len(self.days_))
+        self.judged_ = judged[judged.index > stamps[-1] - pd.Timedelta("400D")]
+        self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
+        self.targets_, self.threshold_, self.release_ = ["f1", "f2"], 3.0, 2.0
+        self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
+        self.counts_ = {"n_records": len(stamps), "n_not_judged": int((~known).sum()), "n_repeated": 2}
+        rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
+        self.promise_ = SimpleNamespace(
+            rule=rule, expected=false_alarms_per_year, lowest=0, highest=3, n_years=2.0, method="by hand", unseen=""
+        )
+        self.detector_ = SimpleNamespace()
+
+    def state(self):
+        is_open = self.events_["end"].isna() & (self.events_["kind"] == "damage")
+        return "alarm" if is_open.any() else str(self.judged_["state"].iloc[-1])
+
+    def update(self, new):
+        raise NotImplementedError
+
+    def acknowledge(self, event, **said):
+        raise NotImplementedError

@@ -1,0 +1,271 @@
+"""The page on a monitor: it never calls healthy what nobody has judged, and says what the monitor says."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo._formatting import share_text
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring import Monitor
+from skthermo.reporting import owner_report
+from skthermo.reporting.service._changes import drift, drift_sentences, sensors
+from skthermo.reporting.service._events import events, promise
+from skthermo.reporting.service._sections import unjudged
+from skthermo.reporting.service._standing import Standing
+from skthermo.reporting.service._today import today
+from tests.reporting.monitors import FakeMonitor, event_row
+from tests.reporting.pages import HOSTILE, QUOTED, Page
+
+plt = pytest.importorskip("matplotlib.pyplot")
+plt.switch_backend("Agg")
+
+SECTIONS = ["today", "events", "index", "drift", "sensors", "unjudged", "promise", "settings"]
+SPACE = "\xa0"
+
+
+def standing_of(monitor, now=None):
+    """A monitor five hours after its newest record, unless another time is given."""
+    return Standing.of(monitor, monitor.last_ + pd.Timedelta("5h") if now is None else now)
+
+
+def today_of(monitor, now=None):
+    return Page(today(standing_of(monitor, now), limit=0.1))
+
+
+def headline(page):
+    """The large line of the first section."""
+    return page.paragraphs[0]
+
+
+def state_of(page):
+    (names,) = [a["class"].split() for a in page.all("div") if a.get("class", "").startswith("state ")]
+    return names[1]
+
+
+@pytest.fixture(scope="module")
+def real():
+    """Two years of the truss, one in service, with gaps in the records and damage at the end."""
+    healthy, damaged = (
+        make_truss_campaign(3, noise=0.003, damage=damage, random_state=0) for damage in (None, {"bottom": 0.15})
+    )
+    records, later = (year.temperatures.join(year.frequencies) for year in (healthy, damaged))
+    compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
+    monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
+    fitted_only = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
+    new = records[730:800].copy()
+    new.iloc[30:34] = np.nan
+    with pytest.warns(UserWarning, match="4 "):
+        monitor.update(pd.concat([new.drop(new.index[40:44]), later[800:810]]))
+    return monitor, fitted_only
+
+
+@pytest.fixture(scope="module")
+def page(real, tmp_path_factory):
+    path, now = tmp_path_factory.mktemp("page") / "a.html", real[0].last_ + pd.Timedelta("5h")
+    return Page(owner_report(real[0], path, title=HOSTILE, now=now).read_text(encoding="utf-8"))
+
+
+def test_it_is_one_sound_page_without_network_or_script(page):
+    assert [tag["id"] for tag in page.all("section")] == SECTIONS
+    assert [link[1:] for link in page.values("href")] == SECTIONS
+    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "iframe", "object", "form")]
+    assert len(page.drawings()) == 2  # the last month and the last year
+    assert all(len(image["alt"]) > 20 for image in page.all("img"))
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert max(np.diff(levels)) <= 1
+    assert HOSTILE in page.text
+
+
+def test_it_says_what_the_real_monitor_says(page, real):
+    monitor, _ = real
+    assert monitor.state() == state_of(page) == "alarm"
+    event = monitor.events_.iloc[-1]
+    start = event["start"]
+    assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"
+    assert f"modes that drive it: {event['modes']}." in page.text
+    assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not judged." in page.text
+    assert f"There was no record on 4 of 80{SPACE}days." in page.text
+    assert "Slow drift is not followed" in page.text
+    numbers = [head for head in page.heads if head.isdigit()]
+    assert numbers == [str(number) for number in monitor.events_.index[::-1]]
+
+
+def test_a_monitor_that_has_judged_nothing_is_not_called_healthy(real, tmp_path):
+    file = owner_report(real[1], tmp_path / "a.html", now=real[1].last_)
+    page = Page(file.read_text(encoding="utf-8"))
+    assert state_of(page) == "not-judged"
+    assert "Not judged: no record since the baseline" in page.text
+    assert "Check the data logger" in page.text
+    assert not page.all("img")
+
+
+def test_healthy_only_as_long_as_records_come():
+    monitor = FakeMonitor()
+    last = monitor.last_
+    for wait, state in {"1h": "healthy", "2D": "healthy", "73h": "not-judged", "40D": "not-judged"}.items():
+        page = today_of(monitor, last + pd.Timedelta(wait))
+        assert state_of(page) == state
+        assert ("Healthy" in headline(page)) == (state == "healthy")
+    assert f"no record since {last.day}{SPACE}{last.month_name()}" in page.text
+    assert "the newest is 40 days old" in page.text
+
+
+def test_hourly_records_are_missed_after_two_days():
+    monitor = FakeMonitor(freq="1h")
+    states = [state_of(today_of(monitor, monitor.last_ + pd.Timedelta(h, "h"))) for h in (48, 50)]
+    assert states == ["healthy", "not-judged"]
+
+
+def test_an_alarm_stays_one_without_records_and_says_so():
+    monitor = FakeMonitor(events=[event_row("2025-06-10", None, modes="f2, f1")])
+    page = today_of(monitor, monitor.last_ + pd.Timedelta("40D"))
+    assert state_of(page) == "alarm"
+    assert f"Alarm since 10{SPACE}June{SPACE}2025" in page.text
+    assert "so that nothing is known of the days since" in page.text
+
+
+def test_records_of_a_time_to_come_make_no_structure_healthy():
+    monitor = FakeMonitor()
+    page = today_of(monitor, monitor.last_ - pd.Timedelta("3D"))
+    assert state_of(page) == "not-judged"
+    assert "the dates of the records are wrong" in page.text
+
+
+@pytest.mark.parametrize("n_unjudged", [3, None], ids=["some", "all"])
+def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
+    reason = f"all of {QUOTED} are missing"
+    monitor = FakeMonitor(n_unjudged=n_unjudged, reason=reason)
+    page = today_of(monitor)
+    assert state_of(page) == "not-judged"
+    since = monitor.judged_.index[-n_unjudged if n_unjudged else 0]
+    assert headline(page) == f"Not judged since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    assert f"Because: {reason}." in page.text
+    number = int(monitor.counts_["n_not_judged"])
+    page = Page(unjudged(standing_of(monitor)))
+    assert f"{number:,} ({share_text(number / 180)}) were not judged" in page.text
+    assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
+    assert page.cells == [str(number), "2"]
+
+
+def test_stiffening_is_reported_and_is_no_alarm():
+    monitor = FakeMonitor(events=[event_row("2025-06-10", None, kind="stiffening")])
+    page = today_of(monitor)
+    assert state_of(page) == "healthy"
+    assert f"Event 1 (stiffening) has been open since 10{SPACE}June{SPACE}2025" in page.text
+    assert "No damage event is open." in page.text
+
+
+def test_events_that_nobody_has_explained_are_named():
+    ended = [event_row(f"2025-0{month}-01", f"2025-0{month}-03") for month in (3, 4)]
+    known = event_row("2025-05-01", "2025-05-04", acknowledged=True, harmless=True, note=HOSTILE)
+    monitor = FakeMonitor(events=[*ended, known])
+    said = f"2{SPACE}events: 1 and 2 have ended, and nobody has said yet what they were."
+    assert said in today_of(monitor).text
+    page = Page(events(standing_of(monitor)))
+    assert [cell for cell in page.cells if cell in ("yes, harmless", "not yet")] == [
+        "yes, harmless",
+        "not yet",
+        "not yet",
+    ]
+    assert HOSTILE in page.text
+    page = Page(events(standing_of(FakeMonitor(events=[ended[0]] * 40))))
+    assert "the newest 30; 10 older ones" in page.text
+    assert [head for head in page.heads if head.isdigit()] == [str(number) for number in range(40, 10, -1)]
+
+
+def test_drift_says_how_fast_and_when_a_limit_is_reached():
+    found = pd.DataFrame(
+        {
+            "change": [-0.02, 0.001],
+            "standard_error": [0.002, 0.002],
+            "per_year": [-0.01, 0.0],
+            "per_year_error": [0.001, 0.002],
+            "significant": [True, False],
+        },
+        ["deck", "piers"],
+    )
+    standing = standing_of(FakeMonitor(drift=found))
+    (said,) = drift_sentences(standing, 0.1)
+    loss = f"deck has lost 2.0{SPACE}% (± 0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
+    assert said.startswith(loss)
+    years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
+    reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
+    assert said.endswith(f"{reached} {years[0.008]}).")
+    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing, 0.015)[0]
+    page = Page(drift(standing, 0.1))
+    assert said in page.text
+    assert len(page.drawings()) == 1
+    assert page.cells[2::3] == ["yes", "no"]
+
+    def sentence(**changed):
+        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))), 0.1)[0]
+
+    assert sentence(per_year_error=0.01).endswith("at the earliest).")
+    assert sentence(significant=False) == "No drift beyond its error."
+    assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
+    assert "reached" not in sentence(per_year=0.01)
+    assert "more than 100 years" in sentence(per_year=-1e-4)
+
+
+def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
+    faults = pd.DataFrame(
+        {
+            "column": ["T1", "f2"],
+            "kind": ["stuck", "swapped"],
+            "since": pd.to_datetime(["2025-03-01", "2025-04-01"]),
+            "told": pd.to_datetime(["2025-03-05", "2025-04-02"]),
+            "until": pd.to_datetime([None, "2025-05-01"]),
+            "detail": ["repeats 7", ""],
+        }
+    )
+    page = Page(sensors(standing_of(FakeMonitor(faults=faults))))
+    assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
+    assert "Mode f2" not in page.text
+    assert "is swapped with another" in page.cells
+    assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text
+    assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
+
+
+def test_the_promise_counts_damage_events_beside_false_alarms_that_were_to_be_expected():
+    seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="stiffening")]
+    monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
+    text = Page(promise(standing_of(monitor))).text
+    assert "gives 2 false alarms a year on average" in text
+    assert f"there was 1{SPACE}damage event, 0 of them said to be harmless." in text
+    years = (monitor.last_ - monitor.days_.index[0]) / pd.Timedelta(days=365.25)
+    assert float(re.search(r"About ([\d.]+) false alarms were", text)[1]) == pytest.approx(2 * years, rel=0.05)
+
+
+def test_time_zones_and_the_clock():
+    monitor = FakeMonitor(zone="Europe/Brussels", events=[event_row("2025-06-10", None)])
+    assert state_of(today_of(monitor)) == "alarm"
+    utc = (monitor.last_ + pd.Timedelta("5h")).tz_convert("UTC")
+    assert state_of(today_of(monitor, utc)) == "alarm"
+    assert state_of(Page(today(Standing.of(monitor), 0.1))) == "alarm"  # by the clock, long after
+    with pytest.raises(ValueError, match="expected a time without a time zone"):
+        today_of(FakeMonitor(), utc)
+    with pytest.raises(ValueError, match="now is 'soon'; expected a time"):
+        today_of(monitor, "soon")
+
+
+def test_ten_years_of_service_are_a_small_page(tmp_path):
+    monitor = FakeMonitor(n_days=3650)
+    file = owner_report(monitor, tmp_path / "a.html", now=monitor.last_)
+    assert len(Page(file.read_text(encoding="utf-8")).drawings()) == 3
+    assert file.stat().st_size < 600_000
+
+
+def test_what_belongs_to_studies_or_is_not_fitted_is_refused(real, tmp_path):
+    with pytest.raises(ValueError, match="detector given for a Monitor; expected only for a DetectabilityStudy"):
+        owner_report(real[0], tmp_path / "a.html", detector="raw")
+    with pytest.raises(NotFittedError, match="the monitor is not fitted yet"):
+        owner_report(Monitor(MahalanobisDetector()), tmp_path / "a.html")
+    with pytest.raises(ValueError, match="drift_limit is 10; expected a loss of stiffness between 0 and 1"):
+        owner_report(real[0], tmp_path / "a.html", drift_limit=10)
