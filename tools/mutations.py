@@ -28,6 +28,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
+    ("monitoring/sensors/_changes.py", "monitoring/sensors/test_changes.py"): [
+        ("weather that the baseline does not have", "1 / BEYOND**2", "1e12"),
+        ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
+    ],
+    ("monitoring/sensors/_modes.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("damage taken for exchanged modes", "if is_far and is_near", "if is_near"),
+    ],
+    ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
+    ],
     ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
