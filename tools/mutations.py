@@ -22,6 +22,17 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/retraining/_harvest.py", "monitoring/test_retraining.py"): [
+        ("records of an event train", "kept &= ~inside", "kept &= True"),
+        ("records before an event train", "event.start - margin", "event.start"),
+    ],
+    ("monitoring/retraining/_shift.py", "monitoring/test_retraining.py"): [
+        ("a change that is never real", "self.is_real and self.size > MATTERS", "self.is_real and self.size > 100"),
+    ],
+    ("monitoring/retraining/_new_level.py", "monitoring/test_retraining.py"): [
+        ("the wrong way to the new level", "(1 + self.table", "(1 - self.table"),
+        ("old weeks that never fade", "moved[kept]", "moved"),
+    ],
     ("fem/modal/_tracking.py", "fem/test_tracking.py"): [
         ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
