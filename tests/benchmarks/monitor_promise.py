@@ -52,7 +52,12 @@ def truss(n_years):
     """Temperatures, and noise-free frequencies by severity, of daily records."""
     campaigns = {s: make_truss_campaign(n_years, damage={TRUSS_GROUP: s}, random_state=1) for s in STATES}
     T = campaigns[0.0].temperatures
-    return T, {s: c.clean_frequencies.to_numpy() for s, c in campaigns.items()}, TRUSS_NOISE, np.zeros((len(T), 6), bool)
+    return (
+        T,
+        {s: c.clean_frequencies.to_numpy() for s, c in campaigns.items()},
+        TRUSS_NOISE,
+        np.zeros((len(T), 6), bool),
+    )
 
 
 @cache
@@ -84,7 +89,9 @@ STRUCTURES = {"truss": (truss, 1), "kw51": (kw51, 24 // KW51_HOURS)}
 
 def detectors(per_day, targets):
     """Detectors by name, with the time that an event has to be quiet to close."""
-    regressor = TemperatureMapper() if per_day == 1 else make_pipeline(LagFeatures([0, 1, 6], freq="4h"), TemperatureMapper())
+    regressor = (
+        TemperatureMapper() if per_day == 1 else make_pipeline(LagFeatures([0, 1, 6], freq="4h"), TemperatureMapper())
+    )
     compensator = TemperatureCompensator(regressor, targets=targets, scale="global")
     lasts = {"records": MahalanobisDetector(), "7 days": WindowedAlarm("7D")}
     if per_day > 1:
@@ -155,7 +162,9 @@ def measure(name, correlation, n_years):
     T, clean, noise, gone = make(n_years)
     targets = [f"f{mode + 1}" for mode in range(6)]
     measured = {
-        s: pd.DataFrame(np.where(gone, np.nan, add_noise(F, noise, correlation=correlation, random_state=7)), T.index, targets)
+        s: pd.DataFrame(
+            np.where(gone, np.nan, add_noise(F, noise, correlation=correlation, random_state=7)), T.index, targets
+        )
         for s, F in clean.items()
     }
     measured = {s: T.join(F) for s, F in measured.items()}
@@ -190,7 +199,12 @@ def measure(name, correlation, n_years):
                     for s, series in damaged.items():
                         events = [find_events(d.to_numpy(), d.index, rule) for d in series]
                         row |= detection(s, [e["start"] for e in events], series, per_day)
-                        row[f"n {s:.0%}"] = np.mean([(e["start"] >= d.index[N_BEFORE * per_day]).sum() for e, d in zip(events, series, strict=True)])
+                        row[f"n {s:.0%}"] = np.mean(
+                            [
+                                (e["start"] >= d.index[N_BEFORE * per_day]).sum()
+                                for e, d in zip(events, series, strict=True)
+                            ]
+                        )
                     row["closes"] = closing(damaged[SEVERITIES[-1]], healthy, rule, per_day)
                     found.append(row)
             step = "7D" if detector_name == "7 days" else "1D"
@@ -226,16 +240,22 @@ def closing(damaged, healthy, rule, per_day):
 def report(name, correlation, table):
     """Prints what was found; whether the library's own rules keep their promise."""
     kept = True
-    print(f"{name}, correlation of neighbours {correlation:g}: {len(table.groupby('detector').get_group('records')) // 5} "
-          f"baselines, {N_JUDGED} years each; false events a year (asked {ASKED:g}): mean, deviation over baselines, 5 to 95 %")
-    print(f"  {'detector':9}{'hold':>5} {'rule':10}{'mean':>6}{'dev':>6}{'5 to 95 %':>12}{'inside':>8}   median days to 5, 10, 20 % (share in {N_DAYS} days); events of 20 %; days to close")
+    print(
+        f"{name}, correlation of neighbours {correlation:g}: {len(table.groupby('detector').get_group('records')) // 5} "
+        f"baselines, {N_JUDGED} years each; false events a year (asked {ASKED:g}): mean, deviation over baselines, 5 to 95 %"
+    )
+    print(
+        f"  {'detector':9}{'hold':>5} {'rule':10}{'mean':>6}{'dev':>6}{'5 to 95 %':>12}{'inside':>8}   median days to 5, 10, 20 % (share in {N_DAYS} days); events of 20 %; days to close"
+    )
     for (detector, hold, rule), group in table.groupby(["detector", "hold", "rule"], sort=False):
         events = group["events"]
         low, high = np.quantile(events, [0.05, 0.95])
         days = [np.concatenate(group[f"days {s:.0%}"].tolist()) for s in SEVERITIES]
         times = ", ".join(f"{np.median(d):5.1f} ({np.isfinite(d).mean():.0%})" for d in days)
         extra = "" if rule == "e-values" else f"; {group['n 20%'].mean():.1f}; {group['closes'].median():.1f}"
-        print(f"  {detector:9}{hold:5d} {rule:10}{events.mean():6.2f}{events.std():6.2f}{low:6.1f}{high:6.1f}{group.get('inside').mean():8.2f}   {times}{extra}")
+        print(
+            f"  {detector:9}{hold:5d} {rule:10}{events.mean():6.2f}{events.std():6.2f}{low:6.1f}{high:6.1f}{group.get('inside').mean():8.2f}   {times}{extra}"
+        )
         kept &= rule != "library" or LEAST <= events.mean() <= MOST
     return kept
 

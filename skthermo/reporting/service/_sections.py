@@ -20,7 +20,7 @@ MOST_REASONS = 12  # largest number of reasons in a table
 
 def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, tuple[str, Html]]]:
     """What stands above the sections, and these with their titles."""
-    standing = Standing.of(monitor, now)
+    standing = Standing.of(monitor, now, limit)
     first, last = (moment(time) for time in monitor.baseline_.index[[0, -1]])
     n_records = int(monitor.counts_["n_records"])
     introduction = (
@@ -28,10 +28,10 @@ def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, 
         f"{counted(n_records, 'record')} {'has' if n_records == 1 else 'have'} come since."
     )
     return paragraphs(introduction), {
-        "today": ("Today", today(standing, limit)),
+        "today": ("Today", today(standing)),
         "events": ("Events", events(standing)),
         "index": ("Damage index", _index(standing)),
-        "drift": ("Slow change", drift(standing, limit)),
+        "drift": ("Slow change", drift(standing)),
         "sensors": ("Sensors", sensors(standing)),
         "unjudged": ("What was not judged", unjudged(standing)),
         "promise": ("The promise", promise(standing)),
