@@ -151,7 +151,7 @@ class Course(SavesFrames):
         new = days_of(answers)
         if stages.drift is not None:
             by_day = dict(zip(days, states, strict=True))
-            shares = pd.DataFrame({day: stages.drifts(by_day[day])["change"] for day in new.index}).T
+            shares = pd.DataFrame({day: stages.drifts(by_day[day])["taken_out"] for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
         before = self.days.iloc[: self.days.index.searchsorted(days[0])]
         return pd.concat([before, new]) if len(before) else new

@@ -98,14 +98,6 @@ def _inner(part: Any) -> Iterator[Any]:
                     yield inner
 
 
-def longest_window(detector: Any, stamps: pd.DatetimeIndex) -> pd.Timedelta:
-    """Time of the longest window in a fitted detector, at the usual distance of records."""
-    step = pd.Series(stamps).diff().median()
-    windows = [part.window for part in _walk(detector, set()) if isinstance(part, WindowedAlarm)]
-    times = [pd.Timedelta(window) if isinstance(window, str) else window * step for window in windows]
-    return max(times, default=pd.Timedelta(0))
-
-
 def _walk(part: Any, seen: set[int]) -> Iterator[Any]:
     """A part and all within it, each once."""
     if id(part) not in seen:

@@ -33,8 +33,8 @@ from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
-from skthermo.monitoring._memory import Memory, longest_window
-from skthermo.monitoring._promise import promised_rule
+from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._promise import promised_rule, release_level
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
 
@@ -246,18 +246,22 @@ class Monitor(SavesFrames, Estimator):
         judge = Judge.of(self.detector_, self.memory_, columns, self.targets_, cleaned)
         judge.check_memory(cleaned)
         index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
-        hold = max(ONE_DAY, longest_window(self.detector_, baseline.index))
+        hold = ONE_DAY
         direction, by_kind = None, {"damage": index}
         if self.direction == "softening":
             direction = Direction.of(self.detector_, cleaned[columns], self.targets_)
             stiffer = direction.of_rows(cleaned[columns]) < 0
             by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
             by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        promises = {kind: promised_rule(one, self.false_alarms_per_year, hold=hold) for kind, one in by_kind.items()}
+        level = release_level(index, hold)
+        promises = {
+            kind: promised_rule(one, self.false_alarms_per_year, hold=hold, release=level)
+            for kind, one in by_kind.items()
+        }
         rules = {kind: promise.rule for kind, promise in promises.items()}
         self.promise_, rule = promises["damage"], rules["damage"]
         self.threshold_, self.release_ = rule.threshold, rule.release
-        stages = Stages.of(cleaned, self.targets_, sensors=self.sensors)
+        stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
         release = min(one.release for one in rules.values())
         self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)

@@ -147,12 +147,24 @@ class Tail:
         return lowest, highest
 
 
-def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Timedelta = "1D") -> Promise:
+def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D") -> float:
+    """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
+    hold, known = pd.Timedelta(hold), index.dropna()
+    stamps = known.index.as_unit("ns").asi8
+    whole = stamps - stamps[:1] >= hold.value
+    highest = known.rolling(hold, closed="both").max().to_numpy()
+    return float(np.median(highest[whole] if whole.any() else highest))
+
+
+def promised_rule(
+    index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Timedelta = "1D", release: float | None = None
+) -> Promise:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
     An excursion lasts from the first record above the release level until all records of ``hold`` have stayed within
     it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
-    it, and the threshold comes from the `Tail` of the squared peaks.
+    it, and the threshold comes from the `Tail` of the squared peaks. Where only departures of one kind count and
+    others have an index of 0, ``release`` should be the `release_level` of all.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     n_years = _years(known.index, hold)
@@ -161,7 +173,7 @@ def promised_rule(index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Tim
             f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
             "expected at least 2, all of them finite"
         )
-    release = _release(known, hold)
+    release = release_level(known, hold) if release is None else release
     excursions = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))
     excursions = excursions.sort_values("peak", ascending=False)
     squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
@@ -212,14 +224,6 @@ def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:
 def _largest_share(k: int) -> float:
     """Share that the largest of k exponential excesses has of their sum once in so many baselines (Fisher, Cochran)."""
     return 1.0 - (DOUBTFUL / k) ** (1 / (k - 1)) if k > 1 else 1.0
-
-
-def _release(known: pd.Series, hold: pd.Timedelta) -> float:
-    """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
-    stamps = known.index.as_unit("ns").asi8
-    whole = stamps - stamps[0] >= hold.value
-    highest = known.rolling(hold, closed="both").max().to_numpy()
-    return float(np.median(highest[whole] if whole.any() else highest))
 
 
 def _unseen_season(stamps: pd.DatetimeIndex) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import SensorWatch
 
 
@@ -28,10 +29,12 @@ class Stages:
     drift: Any = None
 
     @classmethod
-    def of(cls, baseline: pd.DataFrame, targets: list[Any], *, sensors: bool) -> Stages:
-        """Learned from the baseline that the detector was fitted on."""
+    def of(cls, baseline: pd.DataFrame, targets: list[Any], *, fem: Any = None, sensors: bool = True) -> Stages:
+        """Learned from the baseline that the detector was fitted on; drift is followed where there is a chain."""
         T, F = baseline.drop(columns=targets), baseline[targets]
-        return cls(list(T.columns), list(targets), SensorWatch.of(T, F) if sensors else None)
+        watch = SensorWatch.of(T, F) if sensors else None
+        follower = None if fem is None else DriftFollower.of(fem, T, F)
+        return cls(list(T.columns), list(targets), watch, follower)
 
     def start(self) -> StageState:
         """The states after the baseline."""

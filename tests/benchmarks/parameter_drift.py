@@ -1,0 +1,186 @@
+"""Stiffness followed over four years in which one group loses some of it, by `track_parameters` and by simpler ways.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py --bridges KW51 --seeds 4
+
+Groups take turns over the seeds. A chain learns from the first year; then all four years are followed. The simpler
+ways:
+
+- M1 - M2: parameters that M1 finds in the measured frequencies less those of M2, daily means smoothed over 60 days,
+  with the standard error of those means as a band; a drift is found where a straight line has a slope at 1 % divided by
+  the number of groups.
+- regression: trends of the residuals of a regression on temperature that learned from the first year, turned into
+  changes of all groups by least squares with the Jacobian; a drift is found where the trends of the modes together are
+  beyond chance at 1 %.
+
+Printed are, in percent: drifts found; right groups named first, by themselves or in a set that cannot be told apart;
+end values within two standard errors, of the group that drifts and of all; end values whose error is below half a
+percent of the stiffness; days on which the band of 95 % holds the truth, over all groups; twice the standard error and
+the error of the end value of the group that drifts. The exit code is 1 if `track_parameters` misses a target.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+
+import numpy as np
+import pandas as pd
+from ageing_bridges import BRIDGES
+from scipy import stats
+
+from skthermo.detection import TemperatureCompensator
+from skthermo.monitoring.drift import track_parameters
+from skthermo.monitoring.drift._filter import GroupEffects
+from skthermo.preprocessing import residual_trend
+from skthermo.surrogate import TemperatureMapper
+
+YEARS, SMOOTHED, LEVEL, BAND = 4, 60, 0.01, 1.96
+SMALL = 0.005  # error of an end value that is of no matter, in shares of the stiffness
+WAYS = ("tracked", "M1 - M2", "regression")
+
+
+def truth(times, rate, first):
+    """Stiffness that is left, relative to that of a time."""
+    years = (times - first) / pd.Timedelta(days=365.25)
+    return 1 - rate * np.asarray(years)
+
+
+def tracked(fem, T, F):
+    """Daily estimates and errors of ln stiffness by group, whether a drift is found, and which groups come first."""
+    history = track_parameters(fem, T, F, random_state=0)
+    table, names, found = history.table, history.effects.names, history.explanations
+    estimates = np.log(table.xs("estimate", axis=1, level=1)[names])
+    errors = np.log(table.xs("upper", axis=1, level=1)[names]).sub(estimates) / BAND
+    first = {names[group] for member in found.sets[0] for group in found.instead(member)}
+    return estimates, errors, history.has_drift, first, estimates.index[0]
+
+
+def parameters_apart(fem, T, F):
+    """M1's parameters less M2's. A group is the parameter that bears its name or, in KW51's model, its modulus."""
+    apart = np.log(fem.estimate_parameters(F)) - np.log(fem.predict_parameters(T))
+    daily = apart.groupby(apart.index.floor("D")).mean().dropna()
+    short = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
+    daily = daily.rename(columns=short)
+    usual = daily.rolling(f"{SMOOTHED}D", min_periods=10)
+    estimates, errors = usual.mean(), usual.std() / np.sqrt(usual.count())
+    year = daily.index < daily.index[0] + pd.Timedelta(days=365)
+    days = (daily.index - daily.index[0]).days
+    chances = {group: stats.linregress(days, daily[group]).pvalue for group in daily}
+    found = min(chances.values()) <= LEVEL / len(chances)
+    return estimates - daily[year].mean(), errors, found, {min(chances, key=chances.get)}, daily.index[year].mean()
+
+
+def regression(fem, T, F):
+    """Trends of residuals of daily means, turned into changes of groups."""
+    days = F.index.floor("D")
+    both = pd.concat([T, F], axis=1).groupby(days).mean().dropna()
+    year = both.index < both.index[0] + pd.Timedelta(days=365)
+    compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F))
+    residuals = np.vstack([compensator.fit_transform(both[year]), compensator.transform(both[~year])])
+    trends = residual_trend(pd.DataFrame(residuals, both.index, F.columns))
+    usual = both[F.columns].mean()
+    change, errors = trends["change"] / usual, trends["standard_error"] / usual
+    found = stats.chi2.sf(((change / errors) ** 2).sum(), len(change)) <= LEVEL
+    effects = GroupEffects.of(fem, T, F, None)
+    weighted = effects.slopes / errors.to_numpy()[:, np.newaxis]
+    inverse = np.linalg.pinv(weighted, rcond=1e-6)
+    at_end, deviations = inverse @ (change / errors).to_numpy(), np.sqrt((inverse**2).sum(axis=1))
+    share = np.linspace(0, 1, len(both))[:, np.newaxis]
+    frames = (pd.DataFrame(share * row, both.index, effects.names) for row in (at_end, deviations))
+    first = effects.names[int(np.argmax(np.abs(at_end) / deviations))]
+    return *frames, found, {first}, both.index[0]
+
+
+def judged(rate, group, result):
+    """One run's figures."""
+    estimates, errors, found, first, zero = result
+    known = estimates.notna().all(axis=1) & errors.notna().all(axis=1)
+    estimates, errors = estimates[known], errors[known]
+    true = pd.DataFrame(0.0, estimates.index, estimates.columns)
+    if group not in true:
+        return {"found": found, "right group": False}
+    true[group] = np.log(truth(true.index, rate, zero))
+    off = (estimates - true).abs()
+    inside = off.iloc[-1] <= 2 * errors.iloc[-1]
+    return {
+        "found": found,
+        "right group": group in first,
+        "end within 2 errors": inside[group],
+        "all ends": inside.mean(),
+        "error small": off.iloc[-1][group] <= SMALL,
+        "in band": (off <= BAND * errors).to_numpy().mean(),
+        "error, %": 100 * (estimates - true).iloc[-1][group],
+        "2 errors, %": 200 * errors.iloc[-1][group],
+    }
+
+
+def run(bridge, rate, seed, options):
+    """All ways on one campaign."""
+    group = bridge.groups[seed % len(bridge.groups)]
+    campaign = bridge.campaign(YEARS, seed, options.correlation, drift={group: rate})
+    T, F, n_first = bridge.records(campaign)
+    fem = bridge.chain(options.wrong).fit(T[:n_first], F[:n_first])
+    rows = []
+    for name, way in zip(WAYS, (tracked, parameters_apart, regression), strict=True):
+        if name in options.ways:
+            start = time.perf_counter()
+            result = way(fem, T, F)
+            figures = judged(rate, group, result) | {"seconds": time.perf_counter() - start}
+            rows.append(
+                {"bridge": bridge.name, "rate, %": 100 * rate, "way": name, "group": group, "seed": seed} | figures
+            )
+    return rows
+
+
+def misses(table):
+    """Targets that `track_parameters` does not reach, as sentences."""
+    own = table[table["way"] == "tracked"]
+    for bridge, part in own.groupby("bridge"):
+        still, ageing = part[part["rate, %"] == 0], part[part["rate, %"] == 1]
+        band = 100 * part["in band"].mean()
+        if len(still) and still["found"].sum() > max(len(still) / 20, 1):
+            yield f"{bridge}: {still['found'].sum()} of {len(still)} without drift are found to drift; at most 1 of 20"
+        for what in ("end within 2 errors", "right group"):
+            if len(ageing) and ageing[what].mean() < 0.9:
+                yield f"{bridge}, 1 % a year: {what} {100 * ageing[what].mean():.0f} %; at least 90"
+        if not 90 <= band <= 97:
+            yield f"{bridge}: bands hold the truth on {band:.1f} % of days; 90 to 97"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bridges", nargs="+", choices=list(BRIDGES), default=["truss"])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--rates", type=float, nargs="+", default=[0.0, 0.005, 0.01, 0.02], help="lost a year")
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
+    parser.add_argument("--correlation", type=float, default=0.0, help="of the noise of neighbouring records")
+    parser.add_argument("--wrong", action="store_true", help="a model whose stiffnesses are 5 % off")
+    parser.add_argument("--each", action="store_true", help="print every run")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    rows = []
+    for name in options.bridges:
+        bridge = BRIDGES[name]()
+        for rate in options.rates:
+            for seed in range(options.seeds):
+                rows += run(bridge, rate, seed, options)
+                if options.each:
+                    print(rows[-len(options.ways)], flush=True)
+    table = pd.DataFrame(rows)
+    figures = table.drop(columns=["group", "seed"]).copy()
+    for what in ("found", "right group", "end within 2 errors", "all ends", "error small", "in band"):
+        figures[what] = 100 * figures[what].astype(float)
+    figures["rms error, %"] = figures.pop("error, %") ** 2
+    means = figures.groupby(["bridge", "way", "rate, %"], sort=False).mean()
+    means["rms error, %"] **= 0.5
+    model = ", wrong model" if options.wrong else ""
+    print(f"\n{options.seeds} seeds, noise correlated by {options.correlation}{model}; in percent\n")
+    print(means.round(2).to_string())
+    missed = list(misses(table))
+    print("\n" + ("\n".join(f"missed: {line}" for line in missed) or "all targets reached"))
+    sys.exit(1 if missed else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""Drift that is followed in service is taken out of the frequencies; what changes at once is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.monitoring.drift import DriftFollower
+from skthermo.monitoring.drift._daily import DailyMeans
+from skthermo.monitoring.drift._follower import DELAY
+from skthermo.preprocessing import LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+NOISE, PER_YEAR, FIRST = 0.002, 365, 365
+
+
+@pytest.fixture(scope="module")
+def steady():
+    return make_truss_campaign(2, noise=NOISE, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def chain(steady):
+    fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.01), random_state=0)
+    return fem.fit(steady.temperatures[:FIRST], steady.frequencies[:FIRST])
+
+
+@pytest.fixture(scope="module")
+def follower(chain, steady):
+    return DriftFollower.of(chain, steady.temperatures[:FIRST], steady.frequencies[:FIRST])
+
+
+@pytest.fixture(scope="module")
+def second_year(follower, steady):
+    """Daily means of the year after the baseline."""
+    T, F = steady.temperatures, steady.frequencies[FIRST:]
+    return follower.filter.records.means(T, F, F.index)
+
+
+def followed(follower, daily, changes):
+    """States of the follower day by day, where ln stiffness of the diagonals changes by so much."""
+    state, slopes = follower.start(), follower.filter.effects.slopes[:, 2]
+    for row, change in enumerate(changes):
+        day = slice(row, row + 1)
+        shifted = daily.values[day] + change * slopes
+        state = follower._with_day(state, DailyMeans(daily.days[day], shifted, daily.counts[day], daily.basis[day]))
+        yield state
+
+
+def with_drift(follower, lost, error):
+    """A state in which one group has lost a share of its stiffness, known to an error, and the others nothing."""
+    start = follower.start()
+    mean, covariance = np.zeros_like(start.known.mean), np.zeros_like(start.known.covariance)
+    mean[0], covariance[0, 0] = np.log1p(-lost), error**2
+    return replace(start, known=replace(start.known, mean=mean, covariance=covariance))
+
+
+def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
+    T, F = steady.temperatures[-5:], steady.frequencies[-5:]
+    clear, doubtful = (with_drift(follower, 0.03, error) for error in (1e-5, 0.03))
+    shift = follower.filter.effects.slopes[:, 0] * np.log(0.97)
+    pd.testing.assert_frame_equal(follower.corrected(clear, T, F), F * np.exp(-shift), rtol=1e-9)
+    pd.testing.assert_frame_equal(follower.corrected(doubtful, T, F), F)
+    swapped = F.iloc[:, ::-1]
+    pd.testing.assert_frame_equal(follower.corrected(clear, T, swapped), (F * np.exp(-shift)).iloc[:, ::-1], rtol=1e-9)
+    errors = np.geomspace(1e-4, 0.1, 50)
+    shares = [follower.share(with_drift(follower, 0.03, error)) for error in errors]
+    assert (np.diff(shares) <= 0).all()
+    assert shares[0] > 0.99
+    assert shares[-1] == 0
+
+
+def test_report_says_what_is_taken_out(follower):
+    clear, doubtful = (follower.report(with_drift(follower, 0.06, error)) for error in (1e-5, 0.06))
+    assert clear["change"].tolist() == pytest.approx([-0.06, 0, 0, 0])
+    assert clear["taken_out"].tolist() == pytest.approx([-0.06, 0, 0, 0], abs=1e-6)
+    assert clear["significant"].tolist() == clear["beyond_limit"].tolist() == [True, False, False, False]
+    assert doubtful["change"].tolist() == pytest.approx([-0.06, 0, 0, 0])
+    assert not doubtful[["taken_out", "significant", "beyond_limit"]].any(axis=None)
+
+
+def test_slow_drift_is_followed(follower, second_year):
+    """Also one that begins after the baseline, which the follower has not seen before."""
+    changes = -0.02 * np.arange(PER_YEAR) / PER_YEAR
+    states = list(followed(follower, second_year, changes))
+    report = follower.report(states[-1])
+    assert report["significant"].tolist() == [False, False, True, False]
+    assert changes[-1] < report["taken_out"]["diagonal"] < changes[-1] / 2
+    assert not any(state.sudden.any() for state in states)
+
+
+def test_sudden_damage_is_not_learned_as_drift(follower, second_year):
+    onset = 150
+    states = list(followed(follower, second_year, np.where(np.arange(PER_YEAR) < onset, 0.0, np.log(0.88))))
+    assert states[onset + 7].sudden.all()
+    assert states[-1].n_left_out >= PER_YEAR - onset - DELAY
+    before, later = (follower.report(states[day])["change"]["diagonal"] for day in (onset - 1, onset + 120))
+    assert abs(later - before) < 0.03 * 0.12
+
+
+def test_drift_goes_on_after_a_passing_change(follower, second_year):
+    days = np.arange(4 * DELAY)
+    passing = np.where((days >= 10) & (days < 15), 0.2, 0.0)
+    (*_, state), (*_, expected) = (followed(follower, second_year, changes) for changes in (passing, 0 * passing))
+    assert not state.sudden.any()
+    assert state.n_left_out == 0
+    found, errors = (follower.report(state)[what] for what in ("change", "standard_error"))
+    assert (np.abs(found - follower.report(expected)["change"]) < errors).all()
+
+
+def test_days_without_records_pass(follower, steady):
+    T, F = steady.temperatures, steady.frequencies
+    start = follower.start()
+    assert follower.advance(start, T[:0], F[:0]) is start
+    assert follower.advance(start, T[FIRST - 1 : FIRST], F[FIRST - 1 : FIRST]) is start  # the baseline's last day
+    later = follower.advance(start, T[FIRST + 9 : FIRST + 10], F[FIRST + 9 : FIRST + 10])
+    assert later.day == T.index[FIRST + 9]
+    assert np.isnan(later.waiting.values[:-1]).all()
+    assert not np.isnan(later.waiting.values[-1]).any()
+    rows = slice(FIRST + 10, FIRST + 11)
+    unknown = follower.advance(later, T[rows], F[rows] * np.nan)
+    assert np.isnan(unknown.waiting.values[-1]).all()
+    assert unknown.day == T.index[FIRST + 10]
+
+
+def test_lags_see_the_days_before():
+    hourly = make_truss_campaign(
+        1, samples_per_year=4 * 50, samples_per_day=4, noise=NOISE, correlation=0.5, random_state=0
+    )
+    T, F = hourly.temperatures.tz_localize("Europe/Brussels"), hourly.frequencies.tz_localize("Europe/Brussels")
+    mapper = make_pipeline(LagFeatures(5, freq="6h"), TemperatureMapper())
+    fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.01), mapper=mapper, random_state=0)
+    n_first = 4 * 40
+    fem.fit(T[:n_first], F[:n_first])
+    follower = DriftFollower.of(fem, T[:n_first], F[:n_first])
+    state = follower.start()
+    for _, day in F[n_first:].groupby(F.index[n_first:].normalize()):
+        state = follower.advance(state, T.loc[day.index], day)
+    apart = (np.log(F) - np.log(fem.predict(T)))[n_first:]
+    expected = apart.groupby(apart.index.normalize()).mean()
+    np.testing.assert_allclose(state.waiting.values, expected, rtol=1e-9)
+    assert state.day == expected.index[-1]
