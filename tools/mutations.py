@@ -329,6 +329,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("measured rates outside their bands", '(rows["inside"] == 0)', '(rows["inside"] == 2)'),
         ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
     ],
+    ("reporting/service/_standing.py", "reporting/test_service.py"): [
+        ("silence called healthy", "return self.now - self.last > self.step + LATE", "return False"),
+        ("much lost stiffness called healthy", "return ATTENTION if said == HEALTHY and self.worn else", "return"),
+    ],
+    ("plotting/_monitor.py", "plotting/test_monitor.py"): [
+        (
+            "days without records that nobody sees",
+            'pd.date_range(days.index[0], days.index[-1], freq="D")',
+            "days.index",
+        ),
+    ],
     ("reporting/_choice.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],

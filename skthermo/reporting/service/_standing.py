@@ -76,7 +76,7 @@ class Standing:
 
     @property
     def state(self) -> str:
-        """An alarm lasts until its event has ended; without new records, or with much stiffness lost, none is healthy."""
+        """An alarm lasts until its event ends; nothing is healthy without new records, or with much stiffness lost."""
         said = self.monitor.state()
         if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records):
             return NOT_JUDGED
