@@ -1,6 +1,7 @@
 """State of objects that hold pandas' frames and times, as arrays, lists and numbers, which skops can save."""
 
 import json
+import operator
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,7 +63,8 @@ def to_saved(value: Any) -> Any:
     A time, or a length of time, becomes a number.
     """
     if isinstance(value, tuple) and type(value) is tuple:
-        return tuple(to_saved(part) for part in value)
+        parts = tuple(to_saved(part) for part in value)
+        return value if all(map(operator.is_, parts, value)) else parts  # what is shared is saved once
     if isinstance(value, pd.Timestamp | pd.Timedelta):
         return _to_time(value)
     if not isinstance(value, pd.DataFrame | pd.Series) or value.attrs:
@@ -94,7 +96,8 @@ def from_saved(value: Any) -> Any:
         return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
     if isinstance(value.values, list):
         columns = dict(enumerate(map(from_saved, value.values)))
-        return pd.DataFrame(columns, index).set_axis(_from_labels(value.columns), axis=1)
+        table = pd.DataFrame(columns, pd.RangeIndex(len(index)))
+        return table.set_axis(index, axis=0).set_axis(_from_labels(value.columns), axis=1)
     return pd.DataFrame(value.values, index, _from_labels(value.columns))
 
 
@@ -118,7 +121,8 @@ def _from_time(saved: SavedTime) -> Any:
 
 def _of_columns(frame: pd.DataFrame, axes: list[Any]) -> Any:
     """A frame with columns of several types as a table of tables, or unchanged."""
-    columns = [to_saved(frame.iloc[:, place]) for place in range(frame.shape[1])]
+    numbered = frame.set_axis(pd.RangeIndex(len(frame)), axis=0)  # the index is saved once
+    columns = [to_saved(numbered.iloc[:, place]) for place in range(frame.shape[1])]
     return SavedTable(columns, *axes) if all(isinstance(column, SavedTable) for column in columns) else frame
 
 

@@ -2,5 +2,6 @@
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring.retraining import Retraining
 
-__all__ = ["Monitor", "load_monitor"]
+__all__ = ["Monitor", "Retraining", "load_monitor"]

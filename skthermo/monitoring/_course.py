@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +17,7 @@ from skthermo.monitoring._days import days_of
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import EventLog
 from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._promise import EventRule
 from skthermo.monitoring._records import Plausible, RecordStore, stamps_of
 from skthermo.monitoring._stages import Stages, StageState
 
@@ -132,6 +133,22 @@ class Course(SavesFrames):
             self._with_days(bench.stages, days, states, answers),
         )
         return course, self._news(answers.iloc[len(told) :], fresh.index)
+
+    def handed_over(
+        self, bench: Bench, store: RecordStore, rules: dict[str, EventRule], end: int | None = None
+    ) -> Course:
+        """The course with another detector, which judges the records of the newest day anew.
+
+        With an ``end``, events that are open have ended then, and sensors are watched from new.
+        """
+        points = tuple(replace(one, log=one.log.under(rules, end)) for one in self.checkpoints)
+        if end is not None:
+            points = tuple(replace(one, stages=bench.stages.start()) for one in points)
+        day = points[-1].day
+        before = self.judged[self.judged.index < day]
+        course = replace(self, checkpoints=points, log=self.log.under(rules, end), judged=before)
+        today = store.kept[store.kept.index >= day]
+        return course.advanced(bench, today, store)[0] if len(today) else course
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
         """The answers to new records, and those to others that have changed."""

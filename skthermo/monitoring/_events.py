@@ -57,6 +57,13 @@ class EventLog:
                 events[n] = _grown(events[n], index, times, modes, inside, end_time)
         return numbers, replace(self, states=states, events=tuple(events))
 
+    def under(self, rules: dict[str, EventRule], end: int | None = None) -> EventLog:
+        """The log under other rules; with an ``end``, open events ended then, or at their start if that is later."""
+        if end is None:
+            return replace(self, rules=rules)
+        events = tuple(e if e.end is not None else replace(e, end=max(e.start, end)) for e in self.events)
+        return EventLog(rules, {}, events)
+
     def _openings(self, is_open: dict[str, NDArray[np.bool_]]) -> list[tuple[int, str]]:
         """Record and kind of each event that opens, in order of time."""
         found = []

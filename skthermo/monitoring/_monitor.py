@@ -6,7 +6,7 @@ import os
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,14 +34,25 @@ from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import promised_rule, release_level
+from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
+from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
 MOST_EVENTS = 5  # in a summary
 MOST_CAUSES = 3  # in a warning
+
+
+class Charge(NamedTuple):
+    """A fitted detector and all by which it judges."""
+
+    detector: Any
+    memory: Memory
+    promise: Promise
+    rules: dict[str, EventRule]
+    bench: Bench
 
 
 class Monitor(SavesFrames, Estimator):
@@ -108,6 +119,10 @@ class Monitor(SavesFrames, Estimator):
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
+    trained_ : DataFrame
+        What the detector in charge was fitted on: the baseline, or what `refit` or `begin_again` made of it.
+    prior_, since_ : DataFrame and Timestamp, or None
+        After `begin_again`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
     bench_, store_, course_, said_ : object
@@ -239,35 +254,14 @@ class Monitor(SavesFrames, Estimator):
                 "are taken as missing; expected NaN there",
                 "markers",
             )
-        self.detector_ = detector.fit(cleaned[columns])
-        self.memory_ = (
-            Memory.of(self.detector_) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
-        )
-        judge = Judge.of(self.detector_, self.memory_, columns, self.targets_, cleaned)
-        judge.check_memory(cleaned)
-        index = pd.Series(last_step(self.detector_).baseline_index_, baseline.index)
-        hold = ONE_DAY
-        direction, by_kind = None, {"damage": index}
-        if self.direction == "softening":
-            direction = Direction.of(self.detector_, cleaned[columns], self.targets_)
-            stiffer = direction.of_rows(cleaned[columns]) < 0
-            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
-            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        level = release_level(index, hold)
-        promises = {
-            kind: promised_rule(one, self.false_alarms_per_year, hold=hold, release=level)
-            for kind, one in by_kind.items()
-        }
-        rules = {kind: promise.rule for kind, promise in promises.items()}
-        self.promise_, rule = promises["damage"], rules["damage"]
-        self.threshold_, self.release_ = rule.threshold, rule.release
         stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
-        release = min(one.release for one in rules.values())
-        self.bench_ = Bench(Plausible.of(cleaned, self.targets_), stages, judge, direction, rule.threshold, release)
+        charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
+        charge.bench.judge.check_memory(cleaned)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.course_ = Course.of(self.bench_, baseline, EventLog(rules))
+        self._put_in_charge(charge, cleaned, Course.of(charge.bench, baseline, EventLog(charge.rules)))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
+        self.prior_, self.since_ = None, None
         self.versions_ = versions()
         return self
 
@@ -352,6 +346,136 @@ class Monitor(SavesFrames, Estimator):
             events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
         )
         self.said_ = (*self.said_, said)
+
+    def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
+        """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
+
+        Parameters
+        ----------
+        records : DataFrame, optional
+            Records since the baseline in the columns of `fit`; by default those that are kept, as the detector saw
+            them: without the values of faulty sensors, and without drift that was reported.
+        until : str or Timestamp, optional
+            The last moment whose records may train; by default all may.
+        force : bool, default=False
+            Whether the new detector takes over whatever speaks against it.
+
+        Returns
+        -------
+        Retraining
+            Whether it took over, why not, how both compare, and what was left out. If refused, nothing has changed.
+
+        Raises
+        ------
+        ValueError
+            If records lack columns.
+
+        Notes
+        -----
+        Records never train of events that were not acknowledged as harmless, from a week before their start (or the
+        detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
+        Values of faulty sensors do not train, nor do records that came too late.
+
+        The new detector is refused if the new records differ from the baseline, weather apart, from some day on or
+        steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
+        record's standard deviation: a detector that learned them would not see that change any more. It is refused if
+        more of the new records are above its threshold, each judged by the others, than above the old one; if it finds
+        only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
+        """
+        check_is_fitted(self)
+        retraining = retrained(self, records, until=until, force=check_flag(force, "force"), limit=self._limit)
+        if retraining.accepted:
+            self._take_over(retraining)
+        return retraining
+
+    def begin_again(self, since: Any, *, until: Any = None) -> Retraining:
+        """Begin a new baseline after an intervention that has changed the structure, such as a repair.
+
+        Parameters
+        ----------
+        since : str or Timestamp
+            When the intervention was complete. Records from then on are those of the structure as it is now.
+        until : str or Timestamp, optional
+            The last moment whose records may train; by default all may.
+
+        Returns
+        -------
+        Retraining
+            The change of each mode's level, and how large a change the new detector finds beside the old one.
+
+        Raises
+        ------
+        ValueError
+            If no record of the baseline is from before ``since``.
+
+        Notes
+        -----
+        The call says that the records since are healthy. Open events end.
+
+        The records of the baseline stand in for the weather that has not come since: each mode is moved to its new
+        level, which is the mean of what the old regression on the weather leaves of the new records. As few days tell
+        a level only roughly, each week of old records is moved besides by what another stretch of the old baseline, as
+        long as the new one, misses its level by: the threshold allows for that. Old weeks drop out when new records
+        cover their time of the year. Call again as days come; `refit` goes on in the same way.
+        """
+        check_is_fitted(self)
+        retraining = begun_again(self, since, until=until, limit=self._limit)
+        if retraining.accepted:
+            self._take_over(retraining)
+        return retraining
+
+    def _charge_of(self, detector: Any, trained: pd.DataFrame, columns: list[Any], stages: Stages) -> Charge:
+        """All by which a detector judges that was fitted on some records."""
+        memory = Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
+        index = pd.Series(last_step(detector).baseline_index_, trained.index)
+        direction, by_kind = None, {"damage": index}
+        if self.direction == "softening":
+            direction = Direction.of(detector, trained[columns], self.targets_)
+            stiffer = direction.of_rows(trained[columns]) < 0
+            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
+            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
+        level = release_level(index, ONE_DAY)
+        promises = {
+            kind: promised_rule(one, self.false_alarms_per_year, hold=ONE_DAY, release=level)
+            for kind, one in by_kind.items()
+        }
+        rules = {kind: promise.rule for kind, promise in promises.items()}
+        judge = Judge.of(detector, memory, columns, self.targets_, trained)
+        release = min(one.release for one in rules.values())
+        threshold = rules["damage"].threshold
+        bench = Bench(Plausible.of(trained, self.targets_), stages, judge, direction, threshold, release)
+        return Charge(detector, memory, promises["damage"], rules, bench)
+
+    def _put_in_charge(self, charge: Charge, trained: pd.DataFrame, course: Course) -> None:
+        self.detector_, self.memory_, self.promise_, self.bench_ = (
+            charge.detector,
+            charge.memory,
+            charge.promise,
+            charge.bench,
+        )
+        self.threshold_, self.release_ = charge.promise.rule.threshold, charge.promise.rule.release
+        self.trained_, self.course_ = trained, course
+
+    def _limit(self, detector: Any, trained: pd.DataFrame) -> float:
+        """The promised threshold of a detector that was fitted on some records."""
+        return self._charge_of(detector, trained, self.bench_.judge.columns, self.bench_.stages).promise.rule.threshold
+
+    def _renewed_chain(self, trained: pd.DataFrame) -> Any:
+        """The chain of the structure after an intervention, from which drift is followed; None without one."""
+        if self.fem is None:
+            return None
+        return clone(self.fem).fit(trained.drop(columns=self.targets_), trained[self.targets_])
+
+    def _take_over(self, retraining: Retraining) -> None:
+        """Put a retrained detector in charge, from the newest day on."""
+        trained, end, stages = retraining.baseline, None, self.bench_.stages
+        if retraining.kind == "new baseline":
+            end = retraining.since.as_unit("ns").value
+            stages = Stages.of(trained, self.targets_, fem=self._renewed_chain(trained), sensors=self.sensors)
+        charge = self._charge_of(retraining.detector, trained, self.bench_.judge.columns, stages)
+        course = self.course_.handed_over(charge.bench, self.store_, charge.rules, end)
+        self._put_in_charge(charge, trained, course)
+        self.prior_, self.since_ = retraining.prior, retraining.since
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.

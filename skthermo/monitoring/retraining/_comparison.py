@@ -1,0 +1,185 @@
+"""What two detectors say of the same healthy records, and what each would find."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator
+
+from skthermo._arrays import Array
+from skthermo._warnings import without_warnings
+from skthermo._weather import BEYOND, TrainingRange
+from skthermo.monitoring.retraining._blocks import block_mean, blocks_of
+
+MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
+STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
+CLEAR = 2.0  # standard errors from which a difference is one
+WORSE = np.log(1.1)  # of the smallest change found, from which it counts
+FALSE, SMALLEST = "records above the threshold", "smallest change found"  # rows that decide
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fitted detector, the threshold of its monitor, and the damage indices of its baseline, each from others."""
+
+    detector: BaseEstimator
+    threshold: float
+    baseline: pd.DataFrame
+    index: pd.Series
+
+    def ratio(self, records: pd.DataFrame) -> Array:
+        """Damage index over threshold."""
+        with without_warnings():
+            scores = self.detector.score_samples(records[list(self.detector.feature_names_in_)])
+        return -np.asarray(scores) / self.threshold
+
+    def own_ratio(self, times: pd.DatetimeIndex) -> Array:
+        """The same of records of its baseline, each judged by the others."""
+        return (self.index / self.threshold).reindex(times).to_numpy()
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The old detector and the one that may follow it, on the records that the old one has not learned from.
+
+    ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its
+    ``standard_error`` from blocks of time, and ``worse``: whether the new one is clearly worse in it.
+    """
+
+    table: pd.DataFrame
+
+    @classmethod
+    def of(
+        cls,
+        old: Judged,
+        new: Judged,
+        overlap: pd.DataFrame,
+        targets: list[Any],
+        spread: pd.Series,
+        events: dict[Any, pd.DataFrame],
+    ) -> Comparison:
+        """On the overlap: false alarms, scatter, the smallest changes found, weather, and records of past events.
+
+        ``spread`` holds standard deviations of the frequencies, weather taken out, in Hz.
+        """
+        blocks = blocks_of(overlap.index)
+        rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
+        rows = {
+            FALSE: _compared(*(_above(one) for one in rates), blocks),
+            "median index over threshold": _medians(*rates),
+            **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
+            "records in unknown weather": _unknown(old, new, overlap, targets),
+            **dict(_found(old, new, events)),
+        }
+        table = pd.DataFrame(rows, index=["old", "new", "difference", "standard_error", "worse"]).T
+        return cls(table.astype(dict.fromkeys(table.columns[:4], float) | {"worse": bool}))
+
+    @property
+    def fewer_false(self) -> bool:
+        """Whether the new detector has clearly fewer records above its threshold."""
+        row = self.table.loc[FALSE]
+        return bool(row["difference"] < -CLEAR * row["standard_error"])
+
+    def worse(self) -> list[str]:
+        """Measures in which the new detector is clearly worse, and which count."""
+        found = list(self.table.index[self.table["worse"]])
+        # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
+        return [name for name in found if not (name == SMALLEST and self.fewer_false)]
+
+
+def _above(ratio: Array) -> Array:
+    return np.where(np.isnan(ratio), np.nan, (ratio > 1).astype(float))
+
+
+def _compared(old: Array, new: Array, blocks: Array) -> list[Any]:
+    """Means of both, of their difference where both judge, and whether it is clearly positive."""
+    difference, error = block_mean(new - old, blocks)
+    return [np.nanmean(old), np.nanmean(new), difference, error, bool(difference > CLEAR * error)]
+
+
+def _medians(old: Array, new: Array) -> list[Any]:
+    medians = [float(np.nanmedian(one)) for one in (old, new)]
+    return [*medians, medians[1] - medians[0], np.nan, False]
+
+
+def _weeks(records: pd.DataFrame) -> pd.DataFrame:
+    """Whole weeks, evenly spread, of at most some number of records."""
+    if len(records) <= MOST_PROBED:
+        return records
+    blocks = blocks_of(records.index)
+    n_blocks = blocks.max() + 1
+    chosen = np.unique(np.linspace(0, n_blocks - 1, max(n_blocks * MOST_PROBED // len(records), 1)).astype(int))
+    return records[np.isin(blocks, chosen)]
+
+
+def smallest_changes(judged: Judged, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
+    """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
+
+    For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
+    """
+    records = _weeks(records)
+    blocks = blocks_of(records.index)
+    found, start = np.full((len(targets), blocks.max() + 2), np.nan), judged.ratio(records)
+    for mode, target in enumerate(targets):
+        steps = spread[target] / records[target].mean() * np.array(STEPS)
+        ratios = [judged.ratio(records.assign(**{target: records[target] * (1 - step)})) for step in steps[1:]]
+        curve = np.array([start, *ratios])
+        found[mode, -1] = _crossing(steps, curve)
+        for block in range(blocks.max() + 1):
+            found[mode, block] = _crossing(steps, curve[:, blocks == block])
+    return found
+
+
+def _rows_of_changes(old: Array, new: Array, targets: list[Any]) -> Iterator[tuple[str, list[Any]]]:
+    """A row for their geometric mean over the modes, which decides, and one for each mode."""
+    logs = np.log(np.array([old, new]))
+    known = np.isfinite(logs).all(axis=0)
+    together = np.where(known, logs, 0.0).sum(axis=1) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    for name, values in [(SMALLEST, together), *zip(targets, logs.transpose(1, 0, 2), strict=True)]:
+        change = values[1] - values[0]
+        error = block_mean(change[:-1], np.arange(len(change) - 1))[1]
+        row = [*np.exp(values[:, -1]), change[-1], error]
+        if name == SMALLEST:
+            yield name, [*row, bool(change[-1] - CLEAR * error > WORSE)]
+        else:
+            yield f"{SMALLEST}, {name}", [*row, False]
+
+
+def _crossing(steps: Array, curve: Array) -> float:
+    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any.
+
+    Squared indices grow with squared steps, nearly on straight lines.
+    """
+    curve = curve[:, ~np.isnan(curve).any(axis=0)]
+    if not curve.size:
+        return np.nan
+    squares = np.median(curve, axis=1) ** 2
+    above = np.flatnonzero(squares > 1)
+    if len(above) and above[0] == 0:
+        return np.nan
+    after = above[0] if len(above) else len(steps) - 1
+    slope = (squares[after] - squares[after - 1]) / (steps[after] ** 2 - steps[after - 1] ** 2)
+    return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
+
+
+def _unknown(old: Judged, new: Judged, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
+    """Shares of records outside the weather of each baseline."""
+    weather = [name for name in overlap.columns if name not in targets]
+    if not weather:
+        return [0.0, 0.0, 0.0, np.nan, False]
+    shares = []
+    for judged in (old, new):
+        known = TrainingRange.of(judged.baseline[weather], np.ones(len(judged.baseline), dtype=bool))
+        shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
+    return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
+
+
+def _found(old: Judged, new: Judged, events: dict[Any, pd.DataFrame]) -> Iterator[tuple[str, list[Any]]]:
+    """Peaks of past events over the threshold: what was found has to be found again."""
+    for number, records in events.items():
+        peaks = [float(np.nanmax(judged.ratio(records), initial=0.0)) for judged in (old, new)]
+        yield f"event {number}, peak over threshold", [*peaks, peaks[1] - peaks[0], np.nan, peaks[1] <= 1 < peaks[0]]

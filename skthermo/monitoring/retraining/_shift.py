@@ -1,0 +1,211 @@
+"""Whether new records are those of the baseline's structure: changes of frequencies with the weather taken out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import f as f_law
+from sklearn.base import BaseEstimator, clone
+
+from skthermo._arrays import Array
+from skthermo._formatting import probability_text
+from skthermo._gaussian import Gaussian
+from skthermo._times import correlation_time
+from skthermo._warnings import without_warnings
+from skthermo.detection import TemperatureCompensator
+from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
+from skthermo.surrogate import TemperatureMapper
+
+CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
+MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
+HIDDEN = 0.5  # the same of a standard error, from which a change may hide behind weather that is new
+FEWEST_MORE = 3  # independent blocks than modes, from which there is a test
+N_STEPS = 8  # days of the new period at which a change may have begun
+
+
+@dataclass(frozen=True)
+class WeatherFree:
+    """Relative residuals of a baseline's frequencies, each record predicted by others from its weather."""
+
+    residuals: pd.DataFrame
+    level: pd.Series
+    compensator: TemperatureCompensator | None
+    block: pd.Timedelta
+
+    @classmethod
+    def of(cls, detector: BaseEstimator, records: pd.DataFrame, targets: list[Any]) -> WeatherFree:
+        """By the regression within a detector, by broken lines if it has none, by the mean if there is no weather."""
+        level = records[targets].mean()
+        if len(records.columns) == len(targets):
+            return cls(records[targets] / level - 1, level, None, WEEK)
+        within = [one for one in detector.get_params().values() if isinstance(one, TemperatureCompensator)]
+        plain = clone(within[0]).set_params(scale=None) if within else _broken_lines(targets)
+        with without_warnings():
+            left = np.asarray(plain.fit_transform(records))
+        named = pd.DataFrame(left, records.index, list(plain.get_feature_names_out()))[targets]
+        block = plain.block_ if isinstance(plain.block_, np.timedelta64) else WEEK
+        return cls(_relative(records[targets], named), level, plain, max(pd.Timedelta(block), WEEK))
+
+    def of_new(self, records: pd.DataFrame) -> pd.DataFrame:
+        """Relative residuals of other records."""
+        targets = list(self.residuals.columns)
+        if self.compensator is None:
+            return records[targets] / self.level - 1
+        with without_warnings():
+            left = np.asarray(self.compensator.transform(records))
+        named = pd.DataFrame(left, records.index, list(self.compensator.get_feature_names_out()))
+        return _relative(records[targets], named[targets])
+
+
+def _relative(measured: pd.DataFrame, residuals: pd.DataFrame) -> pd.DataFrame:
+    return residuals / (measured - residuals)
+
+
+def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
+    return TemperatureCompensator(TemperatureMapper(), targets=targets)
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A change of frequencies along a course in time, from 0 to 1, that weather does not explain.
+
+    ``change`` and ``standard_error`` are relative, by mode; ``size`` is the length of the change in standard deviations
+    of single records, ``p_value`` the probability of one as large if nothing has changed (NaN with too few weeks).
+    """
+
+    what: str
+    change: pd.Series
+    standard_error: pd.Series
+    scatter: pd.Series
+    size: float
+    p_value: float
+
+    @property
+    def is_real(self) -> bool:
+        """Whether it is more than chance."""
+        return self.p_value < CHANCE
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is more than chance, and large enough to move the rates of a detector."""
+        return self.is_real and self.size > MATTERS
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the weather of the new records is so new that a change could hardly be told from it."""
+        return bool((self.standard_error / self.scatter).median() > HIDDEN)
+
+    @classmethod
+    def along(cls, courses: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[Shift]:
+        """The change along each course, beside what the weather explains of it and of the frequencies.
+
+        Residuals are regressed on what weather does not tell of the course, so that a season that only one period has
+        is not taken for a change. Standard errors are those of blocks of time, which may depend within.
+        """
+        left = _beside(weather, courses)
+        return [cls._of(what, one, free) for what, one in zip(courses, left.T, strict=True)]
+
+    @classmethod
+    def _of(cls, what: str, left: Array, free: WeatherFree) -> Shift:
+        values = free.residuals.to_numpy()
+        known = ~np.isnan(values) & ~np.isnan(left)[:, np.newaxis]
+        counts = np.maximum(known.sum(axis=0), 1)
+        x, y = (np.where(known, part, 0.0) for part in (left[:, np.newaxis], values))
+        x, y = (np.where(known, part - part.sum(axis=0) / counts, 0.0) for part in (x, y))
+        weight = np.maximum((x**2).sum(axis=0), 1e-300)
+        change = (x * y).sum(axis=0) / weight
+        rest = np.where(known, y - x * change, np.nan)
+        blocks = blocks_of(free.residuals.index, free.block)
+        covariance, n_independent = _of_means(rest, x / weight, blocks)
+        scatter = Gaussian.of(rest).covariance
+        size = float(Gaussian(np.zeros(len(change)), scatter).distances(change[np.newaxis])[0])
+        of_mode = (
+            pd.Series(one, free.residuals.columns)
+            for one in (change, np.sqrt(np.diag(covariance)), np.sqrt(np.diag(scatter)))
+        )
+        return cls(what, *of_mode, size, _p_value(change, covariance, n_independent))
+
+    def sentence(self) -> str:
+        """The change in words."""
+        worst = (self.change / self.standard_error).abs().idxmax()
+        return (
+            f"{self.what}, weather apart, {worst} changes by {100 * self.change[worst]:+.2g} +- "
+            f"{100 * self.standard_error[worst]:.1g} %, all modes together by {self.size:.2g} standard deviations of a "
+            f"record (probability by chance {probability_text(self.p_value)})"
+        )
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What weather does not explain: between the baseline and new records, from some day on, or steadily."""
+
+    tried: tuple[Shift, ...]
+
+    @classmethod
+    def of(cls, free: WeatherFree, weather: pd.DataFrame, since: pd.Timestamp) -> Changes:
+        """Steps at some days of the new period, which begins at ``since``, and steady changes in it and over all."""
+        times = weather.index
+        new = times[times >= since]
+        days = new[np.unique(np.linspace(0, 0.85 * (len(new) - 1), N_STEPS).astype(int))]
+        courses = {f"from {day:%Y-%m-%d} on": (times >= day).astype(float) for day in days}
+        for what, first in (("steadily over the new records", since), ("steadily over all records", times[0])):
+            course = np.asarray((times - first) / (times[-1] - first), dtype=float)
+            courses[what] = np.maximum(course, 0.0)
+        return cls(tuple(Shift.along(courses, free, weather)))
+
+    @property
+    def step(self) -> Shift:
+        """The change from the baseline to all new records."""
+        return self.tried[0]
+
+    @property
+    def trend(self) -> Shift:
+        """The steady change over all records."""
+        return self.tried[-1]
+
+    @property
+    def clearest(self) -> Shift:
+        """The least likely of all, by its probability among so many."""
+        best = min(self.tried, key=lambda one: np.nan_to_num(one.p_value, nan=1.0))
+        return replace(best, p_value=min(best.p_value * len(self.tried), 1.0))
+
+
+def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Array, float]:
+    """Covariance of weighted sums of residuals, and as how many independent blocks of time they count.
+
+    All blocks tell how much their mean residuals scatter, and for how long they stay alike: a change of late is told by
+    few blocks, whose own scatter would say little.
+    """
+    n_blocks, n_modes = int(blocks.max()) + 1, rest.shape[1]
+    counts, sums, weight = (np.zeros((n_blocks, n_modes)) for _ in range(3))
+    for total, values in ((counts, ~np.isnan(rest)), (sums, np.nan_to_num(rest)), (weight, weights)):
+        np.add.at(total, blocks, values)
+    means = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+    if n_blocks < n_modes + 3 or np.isnan(means).all(axis=0).any():
+        return np.full((n_modes, n_modes), np.nan), 0.0
+    lasting = max(float(np.mean([correlation_time(column) for column in means.T])), 1.0)
+    together = Gaussian.of(means).covariance * n_blocks / (n_blocks - 1)
+    return together * np.sqrt(np.outer(*2 * [(weight**2).sum(axis=0)])) * lasting, n_blocks / lasting
+
+
+def _p_value(change: Array, covariance: Array, n_independent: float) -> float:
+    """Of a change in all modes, by Hotelling's law."""
+    n_modes = len(change)
+    freedom = n_independent - n_modes
+    if freedom < FEWEST_MORE:
+        return np.nan
+    squared = float(Gaussian(np.zeros(n_modes), covariance).distances(change[np.newaxis])[0]) ** 2
+    return float(f_law.sf(squared * freedom / (n_modes * (n_independent - 1)), n_modes, freedom))
+
+
+def _beside(weather: pd.DataFrame, courses: dict[str, Array]) -> Array:
+    """What weather does not tell of courses in time, each record predicted by others, (n_records, n_courses)."""
+    together = pd.DataFrame(courses, weather.index)
+    if not len(weather.columns):
+        return (together - together.mean()).to_numpy()
+    with without_warnings():
+        return np.asarray(_broken_lines(list(courses)).fit_transform(weather.join(1 + together)))

@@ -1,0 +1,210 @@
+"""Laws of retraining: what may train, when a new detector takes over, and a new baseline after an intervention."""
+
+import warnings
+from copy import deepcopy
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.monitoring import Monitor
+from skthermo.monitoring.retraining._harvest import Harvest, margin_of
+
+YEAR = 365
+STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.03}, "repaired": {"diagonal": -0.15}}
+SAME = {"check_freq": False, "check_index_type": False}
+WEEK = pd.Timedelta("7D")
+
+
+def joined(campaign):
+    return campaign.temperatures.join(campaign.frequencies)
+
+
+def quietly(call, *args, **settings):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what a year tells of one alarm a year
+        return call(*args, **settings)
+
+
+def put_into_service(healthy, last=None):
+    targets = [name for name in healthy if name.startswith("f")]
+    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
+    detector = make_pipeline(compensator, last or MahalanobisDetector())
+    return quietly(Monitor(detector, sensors=False, random_state=0).fit, healthy[:YEAR])
+
+
+def decisions(monitor, new):
+    return quietly(deepcopy(monitor).update, new)
+
+
+@pytest.fixture(scope="module")
+def records():
+    """Three years of the truss in some states, with the same weather and noise."""
+    return {name: joined(make_truss_campaign(3, damage=damage, random_state=0)) for name, damage in STATES.items()}
+
+
+@pytest.fixture(scope="module")
+def fitted(records):
+    return put_into_service(records["healthy"])
+
+
+@pytest.fixture
+def monitor(fitted):
+    return deepcopy(fitted)
+
+
+@pytest.fixture(scope="module")
+def with_event(fitted, records):
+    """A monitor after a year with seven weeks of damage."""
+    healthy, monitor = records["healthy"], deepcopy(fitted)
+    quietly(monitor.update, pd.concat([healthy[YEAR:450], records["damaged"][450:500], healthy[500 : 2 * YEAR]]))
+    return monitor
+
+
+@pytest.fixture(scope="module")
+def renewed(fitted, records):
+    """A monitor with a new baseline three weeks after an intervention, one of whose records comes later."""
+    monitor, new = deepcopy(fitted), records["repaired"][YEAR : YEAR + 21]
+    quietly(monitor.update, new.drop(new.index[17]))
+    return monitor, quietly(monitor.begin_again, new.index[0])
+
+
+def test_a_healthy_year_joins_the_baseline(monitor, records):
+    healthy = records["healthy"]
+    quietly(monitor.update, healthy[YEAR : 2 * YEAR])
+    found = quietly(monitor.refit)
+    assert found.accepted
+    assert not found.reasons
+    assert len(found.excluded) == 0
+    pd.testing.assert_frame_equal(monitor.trained_, healthy[: 2 * YEAR], **SAME)
+    assert (found.table.loc["smallest change found", ["old", "new"]] > 0).all()
+    assert found.summary().startswith("Refit: accepted")
+
+
+def test_nothing_new_changes_nothing(monitor, records):
+    detector = monitor.detector_
+    found = monitor.refit()
+    assert not found.accepted
+    assert "no records" in found.reasons[0]
+    quietly(monitor.update, records["healthy"][YEAR : YEAR + 10])
+    assert "weeks" in monitor.refit().reasons[0]
+    assert monitor.detector_ is detector
+
+
+def test_rows_of_an_event_never_train(with_event):
+    monitor = deepcopy(with_event)
+    event = monitor.events_.loc[1]
+    found = quietly(monitor.refit)
+    assert not found.baseline.index.to_series().between(event["start"] - WEEK, event["end"]).any()
+    left_out = found.excluded.iloc[0]
+    assert left_out["n_records"] >= 57
+    assert "not acknowledged" in left_out["reason"]
+    assert found.table.loc["event 1, peak over threshold", "new"] > 1
+
+
+@pytest.mark.parametrize("harmless", [False, True])
+def test_rows_of_a_harmless_event_train(with_event, harmless):
+    monitor = deepcopy(with_event)
+    monitor.acknowledge(1, harmless=harmless)
+    event = monitor.events_.loc[1]
+    found = Harvest.of(monitor.corrected_, monitor.events_, None)
+    inside = found.records.index.to_series().between(event["start"], event["end"])
+    assert inside.sum() == (monitor.corrected_.loc[event["start"] : event["end"]].shape[0] if harmless else 0)
+    assert found.excluded["reason"].str.contains("not as harmless").sum() == (not harmless)
+
+
+def test_nothing_trains_after_an_open_event(with_event):
+    events = with_event.events_.assign(end=pd.NaT)
+    found = Harvest.of(with_event.corrected_, events, None)
+    assert found.records.index[-1] < events["start"].iloc[0] - WEEK
+    assert "still open" in found.excluded["reason"][0]
+
+
+def test_the_margin_before_an_event_holds_a_window(records):
+    healthy = records["healthy"]
+    assert margin_of(make_pipeline(MahalanobisDetector()), healthy) == WEEK
+    assert margin_of(make_pipeline(WindowedAlarm("12D")), healthy) == pd.Timedelta("12D")
+    assert margin_of(make_pipeline(WindowedAlarm(20)), healthy) == pd.Timedelta("20D")
+
+
+def test_values_of_a_faulty_sensor_do_not_train(fitted, records):
+    healthy = records["healthy"][:100]
+    faults = pd.DataFrame(
+        {
+            "column": ["T1", "T2"],
+            "kind": ["stuck", "disagree"],
+            "since": healthy.index[[20, 0]],
+            "until": [healthy.index[40], pd.NaT],
+        }
+    )
+    found = Harvest.of(healthy, fitted.events_, faults)
+    assert found.records["T1"].isna().to_numpy().nonzero()[0].tolist() == list(range(20, 40))
+    pd.testing.assert_frame_equal(found.records.drop(columns="T1"), healthy.drop(columns="T1"))
+    assert found.excluded[["columns", "n_records"]].to_numpy().tolist() == [["T1", 20]]
+
+
+def test_a_change_without_an_alarm_is_not_learned(monitor, records):
+    changed = records["small"]
+    quietly(monitor.update, pd.concat([records["healthy"][YEAR:500], changed[500:720]]))
+    assert not len(monitor.events_)
+    before, detector = decisions(monitor, changed[720:]), monitor.detector_
+    found = quietly(monitor.refit)
+    assert not found.accepted
+    assert "would not see that change" in found.reasons[0]
+    assert monitor.detector_ is detector
+    pd.testing.assert_frame_equal(decisions(monitor, changed[720:]), before, check_exact=True)
+    assert (found.shift["change"] < 0).all()
+    assert quietly(monitor.refit, until=changed.index[495], force=True).baseline.index[-1] == changed.index[495]
+
+
+def test_given_records_need_all_columns(monitor, records):
+    with pytest.raises(ValueError, match=r"lack the columns \['f1'\]"):
+        monitor.refit(records["healthy"].drop(columns="f1"))
+
+
+def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
+    monitor, found = renewed
+    assert found.accepted
+    assert monitor.state() == "healthy"
+    assert monitor.events_["end"].notna().all()
+    later = slice(YEAR + 21, 2 * YEAR)
+    fresh, old = decisions(monitor, records["repaired"][later]), decisions(fitted, records["healthy"][later])
+    ratios = [float((one["index"] / one["threshold"]).median()) for one in (fresh, old)]
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.1)
+    assert (fresh["state"] == "alarm").mean() < 0.03
+    change, truth = found.table["change"], records["repaired"].mean() / records["healthy"].mean() - 1
+    assert (np.abs(change - truth[change.index]) < 4 * found.table["standard_error"]).all()
+
+
+def test_late_records_after_a_new_baseline(renewed, records):
+    monitor, late = deepcopy(renewed[0]), records["repaired"].iloc[[YEAR + 17]]
+    assert set(quietly(monitor.update, late)["state"]) == {"healthy"}
+    assert monitor.state() == "healthy"
+
+
+def test_a_refit_goes_on_with_a_new_baseline_and_old_weeks_fade(renewed, records):
+    monitor, start = deepcopy(renewed[0]), renewed[1].since
+    counts = [renewed[1].baseline.index]
+    for first, stop in ((YEAR + 21, YEAR + 120), (YEAR + 120, 2 * YEAR + 5)):
+        quietly(monitor.update, records["repaired"][first:stop])
+        counts.append(quietly(monitor.refit, force=True).baseline.index)
+    old = [int((index < start).sum()) for index in counts]
+    assert [int((index >= start).sum()) for index in counts] == [20, 119, YEAR + 4]
+    assert 320 < old[0] < YEAR - 14
+    assert 200 < old[1] < 280
+    assert old[2] == 0
+    assert monitor.prior_ is None
+
+
+def test_a_new_baseline_needs_every_mode_and_something_before(monitor, records):
+    repaired = records["repaired"][YEAR : YEAR + 20].assign(f3=np.nan)
+    quietly(monitor.update, repaired)
+    found = quietly(monitor.begin_again, repaired.index[0])
+    assert not found.accepted
+    assert "f3" in found.reasons[0]
+    with pytest.raises(ValueError, match="expected a later time"):
+        monitor.begin_again("2020-01-01")
