@@ -1,9 +1,11 @@
 """Wrappers of scikit-learn's private functions, which are imported only here, and types of its public ones; FE models,
-seeds and default parts inside estimators; stages of a fit."""
+seeds and default parts inside estimators; stages of a fit; packages that may be missing."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from numbers import Integral
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 import numpy as np
@@ -273,3 +275,25 @@ def routes_weights(estimator: Any) -> bool | None:
     router = get_routing_for_object(estimator)
     names = router._get_param_names(method="fit", return_alias=True, ignore_self_request=False)
     return "sample_weight" in names
+
+
+def import_optional(module: str, *, extra: str) -> ModuleType:
+    """Import ``module``; if it is missing, the error names the extra of skthermo that installs it.
+
+    Raises
+    ------
+    ImportError
+        If the module is not installed.
+
+    Examples
+    --------
+    >>> import_optional("no_such_plotter", extra="plot")
+    Traceback (most recent call last):
+    ...
+    ImportError: 'no_such_plotter' is not installed; get it with: pip install ".[plot]" in a copy of the repository
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        command = f'pip install ".[{extra}]"'
+        raise ImportError(f"{module!r} is not installed; get it with: {command} in a copy of the repository") from error

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import skthermo
-from skthermo._optional import import_optional
+from skthermo._validation import import_optional
 
 PACKAGE = Path(skthermo.__file__).parent
 HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"

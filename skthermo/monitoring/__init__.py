@@ -2,6 +2,7 @@
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring.drift import ParameterHistory, track_parameters
 from skthermo.monitoring.retraining import Retraining
 
-__all__ = ["Monitor", "Retraining", "load_monitor"]
+__all__ = ["Monitor", "ParameterHistory", "Retraining", "load_monitor", "track_parameters"]

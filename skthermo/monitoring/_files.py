@@ -18,7 +18,7 @@ from sklearn.utils.validation import check_is_fitted
 import skthermo
 from skthermo._arguments import check_path
 from skthermo._io import write_when_complete
-from skthermo._optional import import_optional
+from skthermo._validation import import_optional
 from skthermo._warnings import warn_user
 
 ENDINGS = (".joblib", ".skops")

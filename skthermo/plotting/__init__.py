@@ -6,6 +6,7 @@ from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
 from skthermo.plotting._history import HistoryDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
 from skthermo.plotting._monitor import MonitorDisplay
+from skthermo.plotting._parameter_history import ParameterHistoryDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
@@ -22,6 +23,7 @@ __all__ = [
     "ModeShapesDisplay",
     "MonitorDisplay",
     "PODCurveDisplay",
+    "ParameterHistoryDisplay",
     "PredictionDisplay",
     "ROCDisplay",
     "RankingDisplay",

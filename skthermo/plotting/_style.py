@@ -5,7 +5,7 @@ from collections.abc import Hashable
 from types import ModuleType
 
 from skthermo._formatting import printable
-from skthermo._optional import import_optional
+from skthermo._validation import import_optional
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
 BLACK, GREY, LIGHT = "#000000", "#555555", "#BBBBBB"

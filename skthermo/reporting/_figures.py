@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._arrays import as_floats
 from skthermo._formatting import counted, percent, printable, share_text, significant
-from skthermo._optional import import_optional
+from skthermo._validation import import_optional
 from skthermo.plotting import (
     DamageIndexDisplay,
     FrequencyTemperatureDisplay,

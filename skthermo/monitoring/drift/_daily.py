@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array
 from skthermo._weather import weather_coordinates
 
 MOST_COORDINATES = 3  # of the weather
@@ -116,10 +116,3 @@ def calendar(times: pd.DatetimeIndex, freq: Any) -> pd.DatetimeIndex:
     """Beginnings of the days from the first record to the last."""
     first = times.min().floor("D") if pd.Timedelta(freq) >= pd.Timedelta("1D") else times.min().floor(freq)
     return pd.date_range(first, times.max(), freq=freq, name=times.name)
-
-
-def log_ratios(fem: Any, F: Any, predicted: Any) -> Array:
-    """The logarithm of measured over predicted frequencies; NaN where either is missing."""
-    measured = as_floats(F)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log(np.where(measured > 0, measured, np.nan) / as_floats(predicted))

@@ -22,6 +22,7 @@ PRIOR = {1: 0.8, 2: 0.2}
 AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not told apart: a factor of 20
 NOTABLE = 0.05  # change of a group over the records that should be seen, and told from that of others
 DRAWS = 999
+TINY = 1e-14  # variance of what cannot change
 
 
 @dataclass(frozen=True)
@@ -41,24 +42,41 @@ class ModeTrends:
         """Number of groups."""
         return self.slopes.shape[1]
 
+    @property
+    def n_shapes(self) -> int:
+        """Number of shapes of time."""
+        return len(self.mean) // len(self.slopes)
+
+    def variances(self, rate: float, walk: float) -> Array:
+        """Prior variances of the coefficients of a group's drift, by the deviations of its rate and random walk."""
+        waves = (np.arange(1, self.n_shapes) - 0.5) * np.pi
+        return np.append((rate * self.years) ** 2, walk**2 * self.years / waves**2)
+
     def explained_by(self, groups: Sequence[int], walk: float) -> Array:
         """Covariance of the coefficients that drift of some groups gives, beside that of their errors."""
-        number = len(self.mean) // len(self.slopes)
-        waves = (np.arange(1, number) - 0.5) * np.pi
-        variances = np.append((RATE * self.years) ** 2, walk**2 * self.years / waves**2)
         effects = self.slopes[:, list(groups)]
-        return np.kron(effects @ effects.T, np.diag(variances))
+        return np.kron(effects @ effects.T, np.diag(self.variances(RATE, walk)))
+
+    def misfit(self, groups: Sequence[int]) -> tuple[float, int]:
+        """Squared distance of the trends from those that drift of some groups explains, and its degrees of freedom."""
+        root = np.linalg.cholesky(self.covariance)
+        columns = np.linalg.solve(root, np.kron(self.slopes[:, list(groups)], np.eye(self.n_shapes)))
+        target = np.linalg.solve(root, self.mean)
+        rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+        return float(rest @ rest), len(target) - int(np.linalg.matrix_rank(columns))
 
     def widening(self, groups: Sequence[int]) -> float:
         """How many times larger a covariance would make the misfit of some groups' drift likely; at least 1."""
-        number = len(self.mean) // len(self.slopes)
-        design = np.kron(self.slopes[:, list(groups)], np.eye(number))
-        root = np.linalg.cholesky(self.covariance)
-        columns, target = np.linalg.solve(root, design), np.linalg.solve(root, self.mean)
-        rank = int(np.linalg.matrix_rank(columns))
-        rest = len(target) - rank
-        misfit = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-        return max(float(misfit @ misfit) / rest, 1.0) if rest > 0 else 1.0
+        misfit, freedom = self.misfit(groups)
+        return max(misfit / freedom, 1.0) if freedom > 0 else 1.0
+
+    def coefficients(self, groups: Sequence[int], walk: float, rate: float) -> tuple[Array, Array]:
+        """Coefficients of the drift of some groups if no others drift, group by group, and their covariance."""
+        design = np.kron(self.slopes[:, list(groups)], np.eye(self.n_shapes))
+        prior = np.tile(np.maximum(self.variances(rate, walk), TINY), len(groups))
+        weighted = np.linalg.solve(self.covariance, design)
+        covariance = np.linalg.inv(design.T @ weighted + np.diag(1 / prior))
+        return covariance @ (weighted.T @ self.mean), covariance
 
     def widened(self, factor: float) -> ModeTrends:
         """The same trends with a larger covariance."""
@@ -66,8 +84,7 @@ class ModeTrends:
 
     def information(self) -> Array:
         """Information of the linear trend of each group and pair of them, (n_groups, n_groups)."""
-        number = len(self.mean) // len(self.slopes)
-        design = np.kron(self.slopes, np.eye(number)[:, :1])
+        design = np.kron(self.slopes, np.eye(self.n_shapes)[:, :1])
         return design.T @ np.linalg.solve(self.covariance, design)
 
 
@@ -77,7 +94,8 @@ class Explanations:
 
     ``evidence`` is the logarithm of how many times likelier the trends are with each than without any drift, and
     ``walk`` the standard deviation of each set's random walk in a year. ``p_value`` is the probability that trends
-    without drift give one group as much evidence.
+    without drift give one group as much evidence. ``lookalikes`` are the groups of which a drift would give as good an
+    account of a notable drift of a group.
     """
 
     sets: list[tuple[int, ...]]
@@ -85,14 +103,14 @@ class Explanations:
     walk: Array
     p_value: float
     widening: float
-    confused: list[tuple[int, ...]]
-    unseen: NDArray[np.intp]
+    lookalikes: dict[int, list[int]]
+    unseen: NDArray[np.bool_]
 
     @classmethod
     def of(cls, trends: ModeTrends, freedom: float, random: np.random.RandomState) -> Explanations:
         """Weigh all sets of one or two groups; draws give the probability by chance."""
         unseen = _structure(trends)[1]
-        seen = [group for group in range(trends.n_groups) if group not in unseen] or list(range(trends.n_groups))
+        seen = np.flatnonzero(~unseen).tolist() or list(range(trends.n_groups))
         singles = [(group,) for group in seen]
         first = max(singles, key=lambda one: max(_evidences(trends, one)))
         widening = trends.widening(first)
@@ -105,14 +123,13 @@ class Explanations:
         sizes = np.array([len(one) for one in sets])
         prior = np.array([np.log(PRIOR[size] / (sizes == size).sum()) for size in sizes])
         evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(WALKS))
-        weights = np.exp(table - table.max(axis=1, keepdims=True))
-        walk = np.sqrt((weights * WALKS**2).sum(axis=1) / weights.sum(axis=1))
+        walk = WALKS[table.argmax(axis=1)]
         order = np.argsort(-(evidence + prior), kind="stable")
         observed = table[: len(singles)].max()
         p_value = _chance(trends, singles, observed, freedom, random)
-        confused, unseen = _structure(trends)
+        lookalikes, unseen = _structure(trends)
         found = evidence + prior
-        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, confused, unseen)
+        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, lookalikes, unseen)
 
     @property
     def probabilities(self) -> Array:
@@ -168,21 +185,12 @@ def _chance(
     return float((1 + (largest >= observed).sum()) / (1 + DRAWS))
 
 
-def _structure(trends: ModeTrends) -> tuple[list[tuple[int, ...]], NDArray[np.intp]]:
-    """Sets of groups of which a notable drift in one looks like drift of another, and groups that are not seen."""
+def _structure(trends: ModeTrends) -> tuple[dict[int, list[int]], NDArray[np.bool_]]:
+    """Groups of which a notable drift looks like drift of others, with these, and groups that are not seen."""
     information = trends.information()
     own = np.diag(information)
     seen = own * NOTABLE**2 >= 4.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = NOTABLE**2 * (own[:, np.newaxis] - information**2 / own) < 4.0
-    alike = (apart | apart.T) & seen & seen[:, np.newaxis]
-    left, sets = set(np.flatnonzero(seen).tolist()), []
-    while left:
-        found, new = set(), {min(left)}
-        while new:
-            found |= new
-            new = set(np.flatnonzero(alike[sorted(new)].any(axis=0)).tolist()) - found
-        left -= found
-        if len(found) > 1:
-            sets.append(tuple(sorted(found)))
-    return sets, np.flatnonzero(~seen)
+        left = NOTABLE**2 * (own[:, np.newaxis] - information**2 / own)
+    alike = (left < 4.0) & seen & seen[:, np.newaxis] & ~np.eye(len(own), dtype=bool)
+    return {int(one): np.flatnonzero(alike[one]).tolist() for one in np.flatnonzero(alike.any(axis=1))}, ~seen

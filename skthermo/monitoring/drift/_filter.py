@@ -9,19 +9,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import check_same_rows
-from skthermo._frequency_effects import FrequencyEffects, read_groups
+from skthermo._frequency_effects import FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._times import has_stamps
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warnings_once
-from skthermo.monitoring.drift._daily import DailyMeans, WeatherBasis, calendar, log_ratios
+from skthermo.monitoring.drift._daily import DailyMeans, WeatherBasis, calendar
 from skthermo.monitoring.drift._kalman import DailySteps, Observation, State, absorb
 from skthermo.monitoring.drift._noise import DailyNoise
 
 YEAR = pd.Timedelta(days=365.25)
 RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
+SMALL = 0.003  # change of ln stiffness whose effect counts as linear
+ACCURATE = 2e-5  # error of ln frequencies up to which a quadratic function of the parameters takes the model's place
 MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has mislearned, for each function of weather
 
 
@@ -52,22 +54,72 @@ class ParameterState:
 
 
 @dataclass(frozen=True)
+class ResponseSurface:
+    """Ln frequencies as quadratic functions of ln parameters, where these lie within what they were fitted to.
+
+    ``coefficients`` are empty where the functions are not accurate enough, and all rows are solved by the model.
+    """
+
+    fem: Any
+    ends: Array
+    coefficients: Array
+
+    @classmethod
+    def of(cls, fem: Any, theta: Array) -> ResponseSurface:
+        """Fit to some of the rows of theta, and try it on others."""
+        known = theta[~np.isnan(theta).any(axis=1)]
+        ends, none = np.array([known.min(axis=0), known.max(axis=0)]), np.empty((0, 0))
+        exact = cls(fem, ends, none)
+        n_terms = (theta.shape[1] + 1) * (theta.shape[1] + 2) // 2
+        if len(known) <= 10 * n_terms:
+            return exact
+        rows = known[spread_evenly(np.arange(len(known)), 8 * n_terms)]
+        values = exact(rows)
+        tried = np.arange(len(rows)) % 4 == 3
+        coefficients = np.linalg.lstsq(exact.terms(rows[~tried]), values[~tried])[0]
+        errors = np.abs(exact.terms(rows[tried]) @ coefficients - values[tried])
+        return replace(exact, coefficients=coefficients) if errors.max() <= ACCURATE else exact
+
+    def terms(self, theta: Array) -> Array:
+        """Constant, linear and quadratic terms of each row."""
+        lowest, highest = np.log(self.ends)
+        width = np.where(highest > lowest, highest - lowest, 1.0)
+        places = 2 * (np.log(theta) - lowest) / width - 1
+        first, second = np.triu_indices(places.shape[1])
+        return np.hstack([np.ones((len(places), 1)), places, places[:, first] * places[:, second]])
+
+    def __call__(self, theta: Array) -> Array:
+        """Ln frequencies in the measured domain, (n_rows, n_modes)."""
+        values = np.full((len(theta), len(self.fem.mode_names_)), np.nan)
+        margin = 0.05 * (self.ends[1] - self.ends[0])
+        inside = ((theta >= self.ends[0] - margin) & (theta <= self.ends[1] + margin)).all(axis=1)
+        inside &= bool(self.coefficients.size)
+        if inside.any():
+            values[inside] = self.terms(theta[inside]) @ self.coefficients
+        others = ~inside & ~np.isnan(theta).any(axis=1)
+        if others.any():
+            values[others] = np.log(healthy_frequencies(self.fem, theta[others]))
+        return values
+
+
+@dataclass(frozen=True)
 class DailyRecords:
-    """How daily means are made of records, for a chain: its predictions, weather and groups."""
+    """How daily means are made of records, for a chain: its predictions, and the weather."""
 
     fem: Any
     basis: WeatherBasis
+    surface: ResponseSurface
     freq: str
 
     @classmethod
     def of(cls, fem: Any, T: Any, freq: str) -> DailyRecords:
-        return cls(fem, WeatherBasis.of(filled(fem, T)), freq)
+        """Learn the weather, and the frequencies in it."""
+        return cls(fem, WeatherBasis.of(filled(fem, T)), ResponseSurface.of(fem, parameters(fem, T)), freq)
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
-        with warnings_once():
-            predicted = as_floats(self.fem.predict(T))[-len(F) :]
-        ratios = log_ratios(self.fem, F, predicted)
+        predicted = self.surface(parameters(self.fem, T)[-len(F) :])
+        ratios = np.log(as_floats(F)) - predicted
         return DailyMeans.of(ratios, filled(self.fem, T)[-len(F) :], F.index, self.basis, days, before)
 
 
@@ -76,16 +128,24 @@ def filled(fem: Any, T: Any) -> Array:
     return fem.sensors_.fill(T)[0]
 
 
+def parameters(fem: Any, T: Any) -> Array:
+    """Parameters that a chain gives for temperatures, with each kind of warning once."""
+    with warnings_once():
+        return as_floats(fem.predict_parameters(T))
+
+
 @dataclass(frozen=True)
 class GroupEffects:
     """Relative change of each mode's frequency per relative change of the stiffness of each group.
 
     ``slopes`` are (n_modes, n_groups), averaged over the weather of some records; ``members`` are the model's groups
-    behind each.
+    behind each, and ``incidence``, (n_of_model, n_groups), says which are.
     """
 
     slopes: Array
     members: Mapping[str, Sequence[str]]
+    frequencies: FrequencyEffects = field(repr=False)
+    incidence: Array = field(repr=False)
 
     @property
     def names(self) -> list[str]:
@@ -94,14 +154,21 @@ class GroupEffects:
 
     @classmethod
     def of(cls, fem: Any, T: Any, F: Any, groups: Any) -> GroupEffects:
-        """Effects at the parameters that the chain gives for records."""
+        """Effects at the parameters that the chain gives for records, for small changes."""
         members = read_groups(fem.model, groups)
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        with warnings_once():
-            theta = as_floats(fem.predict_parameters(T))
-        _, slopes = FrequencyEffects.of(fem, theta, as_floats(F), of_model)(np.zeros(len(of_model)))
+        frequencies = FrequencyEffects.of(fem, parameters(fem, T), as_floats(F), of_model)
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])
-        return cls(-slopes @ incidence, members)
+        _, slopes = frequencies(np.zeros(len(of_model)))
+        return cls(-slopes @ incidence, members, frequencies, incidence)
+
+    def of_changes(self, changes: Mapping[int, float]) -> Array:
+        """The slopes, but of some groups those of the chord to a larger change of their ln stiffness."""
+        slopes = self.slopes.copy()
+        for group, change in changes.items():
+            if abs(change) > SMALL:
+                slopes[:, group] = self.frequencies(-np.expm1(change * self.incidence[:, group]))[0] / change
+        return slopes
 
 
 @dataclass(frozen=True)
@@ -114,8 +181,10 @@ class ParameterFilter:
     ----------
     records : DailyRecords
         How daily means are made of records.
-    effects : GroupEffects
-        What the groups do to the frequencies.
+    members : mapping of str to list of str
+        The model's groups behind each group.
+    slopes : ndarray of shape (n_modes, n_groups)
+        Relative change of frequencies per relative change of stiffness.
     noise : DailyNoise
         How daily means scatter.
     start_ : ParameterState
@@ -123,7 +192,8 @@ class ParameterFilter:
     """
 
     records: DailyRecords
-    effects: GroupEffects
+    members: Mapping[str, Sequence[str]]
+    slopes: Array
     noise: DailyNoise
     start_: ParameterState = field(repr=False)
 
@@ -152,7 +222,13 @@ class ParameterFilter:
         covariance[levels, slopes] = covariance[slopes, levels] = -(RATE**2) * span / 2
         covariance[-n_modes:, -n_modes:] = noise.stationary
         before = daily.days[0] - pd.tseries.frequencies.to_offset(freq)
-        found = cls(records, effects, noise, ParameterState(before, np.zeros(len(covariance)), covariance))
+        found = cls(
+            records,
+            effects.members,
+            effects.slopes,
+            noise,
+            ParameterState(before, np.zeros(len(covariance)), covariance),
+        )
         return replace(found, start_=found.advanced(found.start_, daily))
 
     def start(self) -> ParameterState:
@@ -174,7 +250,7 @@ class ParameterFilter:
         for number, day in enumerate(daily.days):
             known = daily.basis[number, :, 1][daily.known[number]]
             weather = float(known[0]) if len(known) else np.nan
-            observed = observation(daily, number, self.noise, self.effects.slopes)
+            observed = observation(daily, number, self.noise, self.slopes)
             state = self._step(replace(state, day=day, weather=weather), observed, absorb)
         return state
 
@@ -187,7 +263,7 @@ class ParameterFilter:
             One row a group: ``change``, ``standard_error``, ``per_year`` and ``per_year_error``, as natural logarithms
             of the relative stiffness.
         """
-        n = len(self.effects.names)
+        n = len(self.members)
         errors = np.sqrt(np.diag(state.covariance)[: 2 * n])
         columns = {
             "change": state.mean[:n],
@@ -195,20 +271,20 @@ class ParameterFilter:
             "per_year": state.mean[n : 2 * n],
             "per_year_error": errors[n:],
         }
-        return pd.DataFrame(columns, index=pd.Index(self.effects.names, name="group"))
+        return pd.DataFrame(columns, index=pd.Index(list(self.members), name="group"))
 
     def frequency_drift(self, state: ParameterState) -> Array:
         """Shift of ln frequency of each mode that the followed drift causes, (n_modes,)."""
-        return self.effects.slopes @ state.mean[: len(self.effects.names)]
+        return self.slopes @ state.mean[: len(self.members)]
 
     def frequency_covariance(self, state: ParameterState) -> Array:
         """Covariance of `frequency_drift`, (n_modes, n_modes)."""
-        n = len(self.effects.names)
-        return self.effects.slopes @ state.covariance[:n, :n] @ self.effects.slopes.T
+        n = len(self.members)
+        return self.slopes @ state.covariance[:n, :n] @ self.slopes.T
 
     def _step(self, state: ParameterState, day: Observation | None, learns: bool) -> ParameterState:
         """One day further; what is not learned from has no effect but on the distance."""
-        n = len(self.effects.names)
+        n = len(self.members)
         length = length_of(self.records.freq)
         steps = DailySteps(length, WALK**2 * length * np.eye(n), self.noise.memory, self.noise.renewal)
         predicted = steps.predict(State(state.mean, state.covariance))
@@ -228,6 +304,9 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
         if not has_stamps(table):
             raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
     check_same_rows(T, F, ("temperatures", "frequencies"))
+    if (as_floats(F) <= 0).any():
+        row = np.flatnonzero((as_floats(F) <= 0).any(axis=1))[0]
+        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
 

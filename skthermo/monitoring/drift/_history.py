@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from skthermo._arrays import Array
+from skthermo._arrays import Array, as_floats, is_real
+from skthermo._formatting import SPACE, listed, percent, probability_text, significant
+from skthermo._frames import frame_like
+from skthermo._times import has_stamps
 
-N_ERRORS = 1.96
+CONFIDENCE = 0.95  # of the bands
+YEAR = pd.Timedelta(days=365.25)
+N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
+DRAWS = 4000
+FARTHEST = 100.0  # years ahead for which a date is told
+SHORT = 1.5  # years of records below which season and drift are hardly told apart
 
 
-class Followed(NamedTuple):
-    """Levels of some groups through all days, their covariances, and levels and rates at the end."""
+class Course(NamedTuple):
+    """Ln stiffness of a group on each day, its standard deviation, and its random walk's in a year.
 
-    groups: tuple[int, ...]
-    means: Array
-    covariances: Array
+    ``end`` and ``end_covariance`` are of the level on the last day and the steady rate a year.
+    """
+
+    mean: Array
+    deviation: Array
     end: Array
     end_covariance: Array
     walk: float
@@ -26,37 +38,304 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ParameterHistory:
-    """History."""
+    """Stiffness of groups over years, with bands.
 
-    daily: Any
-    effects: Any
-    trends: Any
-    explanations: Any
-    followed: Any
+    It is returned by `track_parameters`.
+
+    Parameters
+    ----------
+    days : DatetimeIndex
+        Beginning of each day.
+    courses : mapping of str to Course
+        Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0
+        on the first day.
+    years : float
+        Length of the records in years.
+    p_value : float
+        Probability that records without any drift give one group as much evidence.
+    significance : float
+        Largest ``p_value`` that counts as a drift.
+    explanations : DataFrame
+        Sets of one or two groups that may drift, the best first: ``groups``; ``probability``, if any of the sets
+        drifts; ``log_evidence`` against no drift.
+    sets : list of tuple of str
+        Groups that cannot be told apart: in the drift that was found, or by their effects on the modes.
+    rivals : mapping of str to list of str
+        Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
+    lookalikes : mapping of str to list of str
+        Groups of which a drift of 5 % would look like a drift of others, with these.
+    unseen : list of str
+        Groups of which a loss of 5 % over the records would not be seen.
+    noticed_from : Series
+        Change a year, by group, from which a steady drift is found in 9 of 10 cases.
+    modes : DataFrame
+        One row a mode: relative shift over the records, ``measured`` (apart from the weather) and ``explained`` by the
+        drift, and ``standard_error`` of the measured one.
+    misfit_p_value : float
+        Probability of trends that differ so much from what the best explanation gives, before errors were widened.
+    widening : float
+        Factor of the variances because of that difference (Birge's ratio squared).
+    shifts : DataFrame
+        Shift of ln frequency of each mode by day that the drift causes; 0 without drift.
+    seed : int
+        Of the draws of `reaches`.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.monitoring import track_parameters
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> years = make_truss_campaign(3, drift={"bottom": 0.02}, random_state=0)
+    >>> T, F = years.temperatures, years.frequencies
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(T[:365], F[:365])
+    >>> history = track_parameters(fem, T, F, freq="7D", random_state=0)
+    >>> history.has_drift, history.explanations["groups"].iloc[0]
+    (True, ('bottom',))
+    >>> history.table["bottom"].columns.tolist()
+    ['estimate', 'lower', 'upper']
+    """
+
+    days: pd.DatetimeIndex
+    courses: Mapping[str, Course] = field(repr=False)
+    years: float
+    p_value: float
     significance: float
-
-    @property
-    def p_value(self) -> float:
-        return self.explanations.p_value
+    explanations: pd.DataFrame = field(repr=False)
+    sets: list[tuple[str, ...]]
+    rivals: Mapping[str, list[str]]
+    lookalikes: Mapping[str, list[str]]
+    unseen: list[str]
+    noticed_from: pd.Series = field(repr=False)
+    modes: pd.DataFrame = field(repr=False)
+    misfit_p_value: float
+    widening: float
+    shifts: pd.DataFrame = field(repr=False)
+    seed: int = field(repr=False)
 
     @property
     def has_drift(self) -> bool:
-        return self.p_value <= self.significance
-
-    def _of(self, group):
-        for f in self.followed.values():
-            if group in f.groups:
-                k = f.groups.index(group)
-                return f.means[:, k], np.sqrt(f.covariances[:, k, k])
+        """Whether there is a drift: chance alone would hardly give one group so much evidence."""
+        return bool(self.p_value <= self.significance)
 
     @property
-    def table(self):
-        cols = {}
-        for g, name in enumerate(self.effects.names):
-            m, s = self._of(g)
-            cols[name, "estimate"], cols[name, "lower"], cols[name, "upper"] = (
-                np.exp(m),
-                np.exp(m - N_ERRORS * s),
-                np.exp(m + N_ERRORS * s),
+    def groups(self) -> list[str]:
+        """Names of the groups."""
+        return list(self.noticed_from.index)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "lower" | "upper"), bands of 95 %."""
+        columns = {}
+        for name, course in self.courses.items():
+            for what, side in (("estimate", 0.0), ("lower", -N_ERRORS), ("upper", N_ERRORS)):
+                columns[name, what] = np.exp(course.mean + side * course.deviation)
+        return pd.DataFrame(columns, index=self.days)
+
+    @property
+    def rates(self) -> pd.DataFrame:
+        """Change of each group and of each set that changes alike.
+
+        ``change`` over the records, relative, and ``change_error``; ``per_year`` and ``standard_error``; ``p_value`` of
+        no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
+        another one of its set), "no sign", or "not seen"; ``noticed_from``.
+        """
+        change = np.array([np.expm1(course.mean[-1]) for course in self.courses.values()])
+        errors = np.array([np.exp(course.mean[-1]) * course.deviation[-1] for course in self.courses.values()])
+        levels = np.array([course.mean[-1] for course in self.courses.values()])
+        deviations = np.array([course.deviation[-1] for course in self.courses.values()])
+        names = list(self.courses)
+        weights = self.explanations
+        shares = [
+            weights.loc[[name in groups for groups in weights["groups"]], "probability"].sum()
+            if name in self.groups
+            else np.nan
+            for name in names
+        ]
+        columns = {
+            "change": change,
+            "change_error": errors,
+            "per_year": change / self.years,
+            "standard_error": errors / self.years,
+            "p_value": 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, np.finfo(float).tiny)),
+            "probability": shares,
+            "drifts": [self._drifts(name) for name in names],
+            "noticed_from": self.noticed_from.reindex(names).to_numpy(),
+        }
+        return pd.DataFrame(columns, index=pd.Index(names, name="group"))
+
+    def reaches(self, limit: float = -0.1) -> pd.DataFrame:
+        """When the stiffness of each group reaches a limit, if its drift goes on.
+
+        Parameters
+        ----------
+        limit : float, default=-0.1
+            Relative change since the first day: -0.1 is a loss of 10 %.
+
+        Returns
+        -------
+        DataFrame
+            One row a group or set: ``date``, before which it is reached with probability one half; ``earliest`` and
+            ``latest``, between which it is reached with 95 %; ``probability`` that it is reached within 10 years of the
+            last day. NaT where that takes more than 100 years, and for groups that are not seen.
+
+        Raises
+        ------
+        ValueError
+            If the limit is not between -1 and 1, or 0.
+        """
+        if not is_real(limit) or not -1 < limit < 1 or limit == 0:
+            raise ValueError(f"limit is {limit!r}; expected a relative change, such as -0.1 for a loss of 10 %")
+        random, rows = np.random.RandomState(self.seed), {}
+        for name, course in self.courses.items():
+            years = self._first_passages(course, float(np.log1p(limit)), random)
+            if name in self.unseen:
+                rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
+                continue
+            dates = [self._date(years, share) for share in (0.5, (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)]
+            rows[name] = [*dates, float((years <= 10).mean())]
+        index = pd.Index(list(rows), name="group")
+        return pd.DataFrame(list(rows.values()), index, ["date", "earliest", "latest", "probability"])
+
+    def remove_drift(self, F: pd.DataFrame) -> pd.DataFrame:
+        """Frequencies as they would be without the drift since the first day; unchanged where there is none.
+
+        Parameters
+        ----------
+        F : DataFrame of shape (n_samples, n_modes)
+            Measured frequencies in Hz on a ``DatetimeIndex``. Records before the first day or after the last count as
+            taken on these.
+
+        Returns
+        -------
+        DataFrame of shape (n_samples, n_modes)
+            In Hz. A chain that is fitted to them learns the weather's effect free of the drift.
+
+        Raises
+        ------
+        ValueError
+            If F is no frame with times, or has other modes.
+        """
+        if not has_stamps(F) or list(F.columns) != list(self.shifts.columns):
+            raise ValueError(
+                f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
+                f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
-        return pd.DataFrame(cols, index=self.daily.days)
+        of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
+        return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
+
+    def answer(self) -> list[str]:
+        """Whether there is a drift, where, how much a year, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences. The first says whether there is a drift, and with which probability it would be chance.
+        """
+        return list(self._answer())
+
+    def limits(self) -> list[str]:
+        """What cannot be said.
+
+        Returns
+        -------
+        list of str
+            Sentences.
+        """
+        return list(self._limits())
+
+    def summary(self) -> str:
+        """What was found, and what cannot be said.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        return "\n".join([*self.answer(), *self.limits()]).replace(SPACE, " ")
+
+    def __repr__(self) -> str:
+        rates = self.rates
+        found = ", ".join(
+            f"{name} {row['per_year']:+.2%} ± {2 * row['standard_error']:.2%} a year"
+            for name, row in rates[rates["drifts"].isin(["yes", "perhaps"])].iterrows()
+        )
+        return f"ParameterHistory({found or 'no drift'})"
+
+    def _drifts(self, name: str) -> str:
+        if name in self.unseen:
+            return "not seen"
+        members = [others for others in self.rivals.values() if name in others]
+        if members:
+            return "yes" if len(members[0]) == 1 else "perhaps"
+        is_set = any(" and ".join(others) == name for others in self.rivals.values())
+        return "perhaps" if is_set else "no sign"
+
+    def _first_passages(self, course: Course, level: float, random: np.random.RandomState) -> Array:
+        """Years after the last day at which ln stiffness first reaches a level, in draws; infinite if it never does."""
+        beyond = course.mean <= level if level < 0 else course.mean >= level
+        if beyond[-1]:
+            return np.full(DRAWS, (self.days[beyond.argmax()] - self.days[-1]) / YEAR)
+        start, rate = random.multivariate_normal(course.end, course.end_covariance, DRAWS, check_valid="ignore").T
+        ahead, towards = np.abs(level - start), np.sign(level) * rate
+        ahead = np.where(np.sign(level) * (level - start) > 0, ahead, 0.0)
+        speed = np.maximum(towards, 1e-6)
+        if course.walk > 0:  # the first passage of a walk with a rate has an inverse Gaussian law
+            years = random.wald(np.maximum(ahead, 1e-12) / speed, np.maximum(ahead, 1e-12) ** 2 / course.walk**2)
+        else:
+            years = ahead / speed
+        return np.where((towards <= 0) & (ahead > 0), np.inf, years)
+
+    def _date(self, years: Array, share: float) -> pd.Timestamp | Any:
+        ahead = float(np.quantile(years, share, method="nearest"))
+        return self.days[-1] + round(365.25 * ahead) * pd.Timedelta(days=1) if ahead <= FARTHEST else pd.NaT
+
+    def _answer(self) -> Iterator[str]:
+        chance, rates = probability_text(self.p_value), self.rates
+        first, last = f"{self.days[0]:%Y-%m-%d}", f"{self.days[-1]:%Y-%m-%d}"
+        if not self.has_drift:
+            yield f"No drift of stiffness is seen from {first} to {last} (probability by chance {chance})."
+            return
+        yield f"The structure drifts (probability by chance {chance})."
+        for group, others in self.rivals.items():
+            rate = rates.loc[group]
+            verb = "loses" if rate["per_year"] < 0 else "gains"
+            yield (
+                f"{group} {verb} {_yearly(rate)} of its stiffness a year: {percent(rate['change'], '+.2g')} from "
+                f"{first} to {last}."
+            )
+            others = [other for other in others if other != group]
+            if others:
+                each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
+                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot tell them apart."
+
+    def _limits(self) -> Iterator[str]:
+        known = [one for one in self.groups if one not in self.unseen]
+        if not self.has_drift and known:
+            each = ", ".join(f"{group} {_share(self.noticed_from[group])}" for group in known)
+            yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
+        if self.unseen:
+            yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
+        for group, others in self.lookalikes.items():
+            if group not in self.rivals:
+                yield f"A drift of {group} would look like one of {' or '.join(others)}."
+        if self.years < SHORT:
+            yield (
+                f"The records are {self.years:.1f} years long: season and drift are hardly told apart, and "
+                "the bands are wide."
+            )
+        if self.misfit_p_value < self.significance:
+            yield (
+                "The frequencies also change in a way that no one or two groups explain, as by added mass; the errors "
+                f"are {significant(np.sqrt(self.widening))} times as wide for that."
+            )
+        missing = self.modes.index[self.modes["measured"].isna()]
+        if len(missing):
+            yield f"Measured on too few days to be used: {listed(list(missing))}."
+
+
+def _share(value: float) -> str:
+    return f"{significant(100 * abs(float(value)))}{SPACE}%"
+
+
+def _yearly(rate: Any) -> str:
+    return f"{_share(rate['per_year'])} (±{SPACE}{_share(2 * rate['standard_error'])})"

@@ -28,13 +28,15 @@ class Observation(NamedTuple):
 
 
 class Update(NamedTuple):
-    """What a day changed: innovations, (n,), over their covariance, its inverse, and the gain, (n_states, n)."""
+    """What a day changed: innovations, (n,), over their covariance, its inverse, and the gain, (n_states, n).
+
+    ``distance`` is the squared Mahalanobis distance of the innovations.
+    """
 
     weighted: Array
     precision: Array
     gain: Array
-    log_likelihood: float
-    distance: float  # Mahalanobis distance of the innovations, squared
+    distance: float
 
 
 @dataclass(frozen=True)
@@ -77,17 +79,15 @@ class DailySteps:
         vector[-fading:] = (self.memory * vector[-fading:].T).T
         return vector
 
-    def filtered(self, start: State, days: Sequence[Observation]) -> tuple[State, float]:
-        """The state after all days, and the log likelihood of their values."""
-        state, total = start, 0.0
+    def filtered(self, start: State, days: Sequence[Observation]) -> State:
+        """The state after all days; the first of them begins with the state that is given."""
+        state = start
         for number, day in enumerate(days):
-            state = self.predict(state) if number else state
-            state, update = absorb(state, day)
-            total += update.log_likelihood
-        return state, total
+            state = absorb(self.predict(state) if number else state, day)[0]
+        return state
 
-    def smoothed(self, start: State, days: Sequence[Observation]) -> tuple[Array, Array]:
-        """Levels of each day given all days, (n_days, n_levels), and their covariances.
+    def smoothed(self, start: State, days: Sequence[Observation]) -> tuple[Array, Array, State]:
+        """Levels of each day given all days, (n_days, n_levels), their covariances, and the state after all days.
 
         By the backward recursion of Bryson and Frazier, which needs no inverse of a state's covariance.
         """
@@ -97,6 +97,7 @@ class DailySteps:
             before = (state.mean[:n], state.covariance[:n])
             state, update = absorb(state, day)
             passed.append((*before, update))
+        end = state
         means, covariances = np.empty((len(days), n)), np.empty((len(days), n, n))
         score, information = np.zeros(len(start.mean)), np.zeros_like(start.covariance)
         for number in range(len(days) - 1, -1, -1):
@@ -112,23 +113,18 @@ class DailySteps:
                 information -= design.T @ (turned.T - (turned.T @ update.gain) @ design - update.precision @ design)
             means[number] = mean + rows @ score
             covariances[number] = rows[:, :n] - rows @ information @ rows.T
-        return means, covariances
+        return means, covariances, end
 
 
 def absorb(state: State, day: Observation) -> tuple[State, Update]:
     """The state once a day is known, and what the day changed."""
     if not len(day.values):
-        return state, Update(np.empty(0), np.empty((0, 0)), np.empty((len(state.mean), 0)), 0.0, 0.0)
+        return state, Update(np.empty(0), np.empty((0, 0)), np.empty((len(state.mean), 0)), 0.0)
     shown = state.covariance @ day.design.T
     spread = day.design @ shown + day.noise
-    factor = cho_factor(spread, lower=True)
-    precision = cho_solve(factor, np.eye(len(spread)))
-    gain = shown @ precision
+    precision = cho_solve(cho_factor(spread, lower=True), np.eye(len(spread)))
     innovation = day.values - day.design @ state.mean
-    weighted = precision @ innovation
-    distance = float(innovation @ weighted)
-    logarithm = -np.log(np.diag(factor[0])).sum() - (distance + len(spread) * np.log(2 * np.pi)) / 2
+    weighted, gain = precision @ innovation, shown @ precision
     covariance = state.covariance - gain @ shown.T
-    return State(state.mean + shown @ weighted, (covariance + covariance.T) / 2), Update(
-        weighted, precision, gain, float(logarithm), distance
-    )
+    found = State(state.mean + shown @ weighted, (covariance + covariance.T) / 2)
+    return found, Update(weighted, precision, gain, float(innovation @ weighted))

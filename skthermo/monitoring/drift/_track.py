@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from skthermo._arrays import Array, as_random_state
+from skthermo._arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, Explanations, ModeTrends
 from skthermo.monitoring.drift._filter import (
@@ -19,14 +20,16 @@ from skthermo.monitoring.drift._filter import (
     check_records,
     length_of,
     observation,
+    shapes_of_time,
     with_time,
 )
-from skthermo.monitoring.drift._history import Followed, ParameterHistory
+from skthermo.monitoring.drift._history import Course, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailySteps, State
 from skthermo.monitoring.drift._noise import DailyNoise
 
 ANY_TREND = 0.3  # prior standard deviation of a trend of ln frequency over the records
 ANY_RATE = 0.1  # prior standard deviation of the yearly change of ln stiffness of a group that is followed
+FEWEST = 3  # days with a mode for each coefficient that it needs, below which the mode is left out
 
 
 def track_parameters(
@@ -39,25 +42,101 @@ def track_parameters(
     significance: float = 0.01,
     random_state: int | np.random.RandomState | None = None,
 ) -> ParameterHistory:
-    """Follow."""
+    """Stiffness of damage groups over years, told from weather and noise.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted to records of this structure, also to some of these; its model can be damaged.
+    T : DataFrame of shape (n_samples, n_sensors)
+        Temperatures in degrees Celsius on a ``DatetimeIndex``.
+    F : DataFrame of shape (n_samples, n_modes)
+        Measured frequencies in Hz on the same index; NaN is allowed.
+    groups : sequence of str, or mapping of str to sequence of str, optional
+        Damage groups of the model; a mapping joins several under a new name, with one change. By default all groups of
+        the model, without those that other groups make up.
+    freq : str, default="1D"
+        Period over which records are averaged: a day or some days, such as "7D".
+    significance : float, default=0.01
+        Probability with which a structure that does not age is said to drift.
+    random_state : int, RandomState or None, default=None
+        Seed of the draws behind ``p_value`` and `ParameterHistory.reaches`.
+
+    Returns
+    -------
+    ParameterHistory
+        Relative stiffness of each group by day with bands, rates a year, groups that cannot be told apart, and when a
+        limit is reached.
+
+    Raises
+    ------
+    ValueError
+        If fem is not a fitted chain or its model cannot be damaged, T and F are no frames with times, differ in rows or
+        have other columns than in fit, a group is unknown, the period is not a day or some days, or no mode was
+        measured on enough days.
+
+    See Also
+    --------
+    Monitor : Follows drift day by day.
+    skthermo.studies.identify_damage : Which damage explains a sudden shift.
+
+    Notes
+    -----
+    Daily means of ln(measured / predicted frequency) are the sum of four parts. The drift is the product of the
+    Jacobian d ln f / d ln stiffness, averaged over the weather, and the change of ln stiffness of the groups: a steady
+    rate and a random walk, both 0 on the first day. What the chain has mislearned depends on the weather: a constant,
+    principal coordinates of the temperatures, their squares, hinges in cold and heat, and the day before, with unknown
+    coefficients for each mode, so that one year's weather is not taken for ageing and a chain that was trained on
+    drifting records does not hide the drift. A disturbance of each mode fades from day to day, and the rest is new with
+    each record. The variances are those of greatest restricted likelihood; modes are correlated.
+
+    Each mode's trend is estimated first. Sets of one or two groups then explain these trends, weighed by their
+    evidence: most structures age in few places, and changes in all groups at once are hardly ever determined. If no
+    set explains the trends within their errors, all errors are widened by Birge's ratio. The ``p_value`` of the drift
+    compares the evidence of the best group with that in draws of trends without drift. The best set is followed by a
+    Kalman smoother, with the effects of changes as large as theirs. Each other group is followed as one that changes
+    beside it, and a group that explains the trends about as well as one of the set in the place of that: the two are
+    named as a set.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.monitoring import track_parameters
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> years = make_truss_campaign(3, drift={"bottom": 0.02}, random_state=0)
+    >>> T, F = years.temperatures, years.frequencies
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(T[:365], F[:365])
+    >>> history = track_parameters(fem, T, F, freq="7D", random_state=0)
+    >>> history.has_drift, history.rates["per_year"].idxmin()
+    (True, 'bottom')
+    """
     check_records(fem, T, F)
+    if not is_real(significance) or not 0 < significance < 1:
+        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
     random = as_random_state(random_state)
     records = DailyRecords.of(fem, T, freq)
-    daily = records.means(T, F, calendar(F.index, freq))
+    daily = with_enough_days(records.means(T, F, calendar(F.index, freq)), fem.mode_names_)
     effects = GroupEffects.of(fem, T, F, groups)
     noise = DailyNoise.of(daily.values, with_time(daily, N_SHAPES), daily.counts)
     trends = mode_trends(daily, noise, effects.slopes, freq)
     found = Explanations.of(trends, noise.freedom, random)
-    smoother = Smoother(daily, noise.widened(found.widening), effects.slopes, length_of(freq))
-    best, walk = found.sets[0], float(found.walk[0])
-    followed = {}
-    for group in range(len(effects.names)):
-        rivals = [one for one in best if group in found.instead(one)]
-        beside = tuple(one for one in best if one not in rivals) if rivals else best
-        chosen = best if group in best else (*beside, group)
-        if chosen not in followed:
-            followed[chosen] = smoother.follow(chosen, walk)
-    return ParameterHistory(daily, effects, trends, found, followed, significance)
+    followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length_of(freq))
+    changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
+    slopes = effects.of_changes(changes if found.p_value <= significance else {})
+    followed = replace(followed, trends=replace(followed.trends, slopes=slopes))
+    return history_of(fem, effects, followed, significance, random)
+
+
+def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
+    """Daily means without modes that were measured on too few days."""
+    needed = FEWEST * (daily.basis.shape[2] + N_SHAPES)
+    n_days = daily.known.sum(axis=0)
+    if (n_days < needed).all():
+        counts = ", ".join(f"{mode} {number}" for mode, number in zip(modes, n_days, strict=True))
+        raise ValueError(
+            f"modes were measured, with temperatures, on too few days: {counts}; expected {needed} or more"
+        )
+    return replace(daily, values=np.where(n_days < needed, np.nan, daily.values))
 
 
 def mode_trends(daily: DailyMeans, noise: DailyNoise, slopes: Array, freq: str) -> ModeTrends:
@@ -70,31 +149,121 @@ def mode_trends(daily: DailyMeans, noise: DailyNoise, slopes: Array, freq: str) 
     covariance[-n_modes:, -n_modes:] = noise.stationary
     days = [observation(wide, number, noise, none) for number in range(len(daily.days))]
     steps = DailySteps(length_of(freq), np.zeros((0, 0)), noise.memory, noise.renewal)
-    state, _ = steps.filtered(State(np.zeros(len(covariance)), covariance), days)
+    state = steps.filtered(State(np.zeros(len(covariance)), covariance), days)
     places = (np.arange(n_modes)[:, np.newaxis] * (size + N_SHAPES) + size + np.arange(N_SHAPES)).ravel()
     years = (len(daily.days) - 1) * length_of(freq)
     return ModeTrends(state.mean[places], state.covariance[np.ix_(places, places)], slopes, years)
 
 
 @dataclass(frozen=True)
-class Smoother:
-    """Follows the levels of some groups through all days."""
+class Followed:
+    """Daily means, their noise and trends, and what explains these; follows groups through all days.
+
+    ``length`` is the number of years between two means.
+    """
 
     daily: DailyMeans
     noise: DailyNoise
-    slopes: Array
+    trends: ModeTrends
+    found: Explanations
     length: float
 
-    def follow(self, groups: Sequence[int], walk: float) -> Followed:
-        """Levels of some groups, 0 on the first day, each with its steady rate and a random walk."""
-        slopes, n = self.slopes[:, list(groups)], len(groups)
+    def best(self) -> list[Course]:
+        """The groups of the best set, by a Kalman smoother."""
+        groups, walk = self.found.sets[0], float(self.found.walk[0])
+        slopes, n = self.trends.slopes[:, list(groups)], len(groups)
         n_modes, size = len(slopes), self.daily.basis.shape[2]
-        variances = [0.0, ANY_RATE**2, MISLEARNED**2, 0.0]
-        covariance = np.diag(np.repeat(variances, [n, n, n_modes * size, n_modes]))
+        covariance = np.diag(np.repeat([0.0, ANY_RATE**2, MISLEARNED**2, 0.0], [n, n, n_modes * size, n_modes]))
         covariance[-n_modes:, -n_modes:] = self.noise.stationary
         days = [observation(self.daily, number, self.noise, slopes) for number in range(len(self.daily.days))]
         steps = DailySteps(self.length, walk**2 * self.length * np.eye(n), self.noise.memory, self.noise.renewal)
-        start = State(np.zeros(len(covariance)), covariance)
-        means, covariances = steps.smoothed(start, days)
-        end, _ = steps.filtered(start, days)
-        return Followed(tuple(groups), means, covariances, end.mean[: 2 * n], end.covariance[: 2 * n, : 2 * n], walk)
+        means, covariances, end = steps.smoothed(State(np.zeros(len(covariance)), covariance), days)
+        deviations = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+        return [
+            Course(
+                means[:, place],
+                deviations[:, place],
+                end.mean[[place, n + place]],
+                end.covariance[np.ix_([place, n + place], [place, n + place])],
+                walk,
+            )
+            for place in range(n)
+        ]
+
+    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> Course:
+        """Groups that all change alike, if only some others change beside them; from the trends of the modes."""
+        trends, n = self.trends, self.trends.n_shapes
+        both = replace(
+            trends, slopes=np.column_stack([trends.slopes[:, list(joined)].sum(axis=1), trends.slopes[:, list(others)]])
+        )
+        means, covariance = both.coefficients(range(1 + len(others)), walk, ANY_RATE)
+        mean, covariance = means[:n], covariance[:n, :n]
+        shapes = shapes_of_time(len(self.daily.days), n)
+        at_end = np.array([shapes[-1], np.append(1 / trends.years, np.zeros(n - 1))])
+        deviations = np.sqrt(np.einsum("ti,ij,tj->t", shapes, covariance, shapes))
+        return Course(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
+
+
+def history_of(
+    fem: Any, effects: GroupEffects, followed: Followed, significance: float, random: np.random.RandomState
+) -> ParameterHistory:
+    """What was found, by the names of groups and modes."""
+    found, names = followed.found, effects.names
+    best, has_drift = found.sets[0], found.p_value <= significance
+    rivals = {group: found.instead(group) for group in best} if has_drift else {}
+    courses = dict(zip(best, followed.best(), strict=True)) if has_drift else {}
+    for group in range(len(names)):
+        if group not in courses:
+            replaced = {member for member, others in rivals.items() if group in others}
+            others = [member for member in best if member not in replaced] if has_drift else []
+            courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
+    sets = [tuple(others) for others in rivals.values() if len(others) > 1]
+    for group, others in found.lookalikes.items():
+        alike = tuple(sorted([group, *(one for one in others if group in found.lookalikes.get(one, []))]))
+        if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
+            sets.append(alike)
+    named = {names[group]: courses[group] for group in range(len(names))}
+    for one in sets:
+        others = [member for member in best if member not in one] if has_drift else []
+        label = " and ".join(names[group] for group in one)
+        named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
+    information = np.diag(followed.trends.information())
+    with np.errstate(divide="ignore"):
+        alone = 1 / np.sqrt(information) / followed.trends.years
+    shifts = sum((np.outer(courses[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
+    trends, n_shapes = followed.trends, followed.trends.n_shapes
+    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.days), n_shapes)[-1:])
+    misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
+    modes = pd.DataFrame(
+        {
+            "measured": at_end @ trends.mean,
+            "explained": shifts[-1] if has_drift else np.zeros(len(trends.slopes)),
+            "standard_error": np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T)),
+        },
+        index=pd.Index(fem.mode_names_, name="mode"),
+    )
+    modes.loc[~followed.daily.known.any(axis=0)] = np.nan
+    return ParameterHistory(
+        days=followed.daily.days,
+        courses=named,
+        years=trends.years,
+        p_value=found.p_value,
+        significance=significance,
+        explanations=pd.DataFrame(
+            {
+                "groups": [tuple(names[group] for group in one) for one in found.sets],
+                "probability": found.probabilities,
+                "log_evidence": found.evidence,
+            }
+        ),
+        sets=[tuple(names[group] for group in one) for one in sets],
+        rivals={names[group]: [names[other] for other in others] for group, others in rivals.items()},
+        lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
+        unseen=[names[group] for group in np.flatnonzero(found.unseen)],
+        noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
+        modes=modes,
+        misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
+        widening=found.widening,
+        shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, followed.daily.days, fem.mode_names_),
+        seed=int(random.randint(2**31 - 1)),
+    )

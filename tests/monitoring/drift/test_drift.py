@@ -1,0 +1,316 @@
+"""Drift of groups: the filter and smoother are exact, what is there is found, and what is not there is not claimed."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.monitoring import track_parameters
+from skthermo.monitoring.drift import ParameterFilter
+from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
+from skthermo.monitoring.drift._filter import shapes_of_time
+from skthermo.monitoring.drift._kalman import DailySteps, Observation, State
+from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.plotting import ParameterHistoryDisplay
+from skthermo.surrogate import DataInformedFEM
+
+GROUPS = ["bottom", "top", "diagonal"]
+WEEK = "7D"
+
+
+def trained(campaign, n_days=365):
+    T, F = campaign.temperatures, campaign.frequencies
+    return DataInformedFEM(make_truss(), random_state=0).fit(T[:n_days], F[:n_days])
+
+
+@pytest.fixture(scope="module")
+def ageing():
+    """Three years of a truss that loses 2 % of its bottom chord a year, and a chain of the first year."""
+    campaign = make_truss_campaign(3, drift={"bottom": 0.02}, random_state=0)
+    return campaign, trained(campaign)
+
+
+@pytest.fixture(scope="module")
+def history(ageing):
+    campaign, fem = ageing
+    return track_parameters(fem, campaign.temperatures, campaign.frequencies, GROUPS, WEEK, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    campaign = make_truss_campaign(2, random_state=1)
+    return campaign, trained(campaign)
+
+
+def small_case(n_days=12, seed=0):
+    """Two levels with slopes, two constants and two disturbances, seen by two modes with gaps."""
+    random = np.random.RandomState(seed)
+    memory, renewal = np.array([0.8, 0.3]), np.array([[0.5, 0.1], [0.1, 0.4]])
+    steps = DailySteps(0.1, np.diag([0.2, 0.05]), memory, renewal)
+    root = random.standard_normal((8, 8))
+    start = State(random.standard_normal(8), root @ root.T / 8)
+    days = []
+    for day in range(n_days):
+        present = [[], [0], [1], [0, 1]][random.randint(4) if day else 3]
+        design = random.standard_normal((2, 8))[present]
+        days.append(Observation(random.standard_normal(len(present)), design, 0.3 * np.eye(len(present))))
+    return steps, start, days
+
+
+def dense(steps, start, days):
+    """Mean and covariance of the states of all days, given all values, by one Gaussian conditional."""
+    n, n_days = len(start.mean), len(days)
+    transition = np.eye(n)
+    transition[:2, 2:4] = steps.length * np.eye(2)
+    transition[-2:, -2:] = np.diag(steps.memory)
+    added = np.zeros((n, n))
+    added[:2, :2], added[-2:, -2:] = steps.walk, steps.renewal
+    powers = [np.linalg.matrix_power(transition, k) for k in range(n_days)]
+    mean = np.concatenate([power @ start.mean for power in powers])
+    covariance = np.zeros((n * n_days, n * n_days))
+    for i in range(n_days):
+        for j in range(n_days):
+            block = powers[i] @ start.covariance @ powers[j].T
+            block = block + sum(powers[i - k] @ added @ powers[j - k].T for k in range(1, min(i, j) + 1))
+            covariance[n * i : n * (i + 1), n * j : n * (j + 1)] = block
+    design = np.zeros((sum(len(day.values) for day in days), n * n_days))
+    noise, row = np.zeros((len(design), len(design))), 0
+    for place, day in enumerate(days):
+        rows = slice(row, row + len(day.values))
+        design[rows, n * place : n * (place + 1)], noise[rows, rows] = day.design, day.noise
+        row = rows.stop
+    values = np.concatenate([day.values for day in days])
+    gain = np.linalg.solve(design @ covariance @ design.T + noise, design @ covariance).T
+    return mean + gain @ (values - design @ mean), covariance - gain @ design @ covariance
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_smoother_and_filter_equal_the_dense_conditional(seed):
+    steps, start, days = small_case(seed=seed)
+    mean, covariance = dense(steps, start, days)
+    means, covariances, end = steps.smoothed(start, days)
+    n = len(start.mean)
+    for day in range(len(days)):
+        place = slice(n * day, n * day + 2)
+        assert_allclose(means[day], mean[place], atol=1e-9)
+        assert_allclose(covariances[day], covariance[place, place], atol=1e-9)
+    for state in (end, steps.filtered(start, days)):
+        assert_allclose(state.mean, mean[-n:], atol=1e-9)
+        assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
+
+
+def test_memory_and_variances_of_noise_are_recovered():
+    random = np.random.RandomState(0)
+    n_days, memory, fading, fresh = 3000, 0.85, 0.02, 0.01
+    states = np.zeros((n_days, 2))
+    for day in range(1, n_days):
+        states[day] = memory * states[day - 1] + fading * np.sqrt(1 - memory**2) * random.standard_normal(2)
+    values = states + fresh * random.standard_normal((n_days, 2))
+    values[random.uniform(size=values.shape) < 0.2] = np.nan
+    noise = DailyNoise.of(values, np.ones((n_days, 2, 1)), (~np.isnan(values)).astype(float))
+    assert_allclose(noise.memory, memory, atol=0.11)
+    assert_allclose(noise.fading, fading, rtol=0.2)
+    assert_allclose(noise.fresh, fresh, rtol=0.3)
+    assert abs(noise.correlation[0, 1]) < 0.1
+
+
+def test_a_known_drift_is_recovered(history):
+    truth = 1 - 0.02 * 7 * np.arange(len(history.days)) / 365
+    table, rate = history.table["bottom"], history.rates.loc["bottom"]
+    assert history.has_drift
+    assert history.explanations["groups"].iloc[0] == ("bottom",)
+    assert abs(table["estimate"].iloc[-1] - truth[-1]) < 2.5 * rate["change_error"]
+    assert ((table["lower"] <= truth) & (truth <= table["upper"])).mean() > 0.9
+    assert history.rates["drifts"].to_dict() == {"bottom": "yes", "top": "no sign", "diagonal": "no sign"}
+    assert "bottom loses" in history.summary()
+    assert "bottom" in repr(history)
+    assert_allclose(history.modes["measured"], history.modes["explained"], atol=0.02)
+
+
+def test_without_drift_none_is_claimed(healthy):
+    campaign, fem = healthy
+    found = track_parameters(fem, campaign.temperatures, campaign.frequencies, GROUPS, WEEK, random_state=0)
+    assert not found.has_drift
+    assert set(found.rates["drifts"]) == {"no sign"}
+    assert (found.noticed_from > 0).all()
+    assert found.summary().startswith("No drift")
+    pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
+    bands = found.table.iloc[-1].unstack()
+    assert ((bands["lower"] < 1) & (bands["upper"] > 1)).all()
+
+
+def test_one_year_is_told_with_wide_bands(ageing):
+    campaign, fem = ageing
+    T, F = campaign.temperatures[:365], campaign.frequencies[:365]
+    found = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
+    bottom = found.table["bottom"].iloc[-1]
+    assert bottom["lower"] < 0.98 < bottom["upper"]
+    assert "1.0 years long" in found.summary()
+
+
+def test_removed_drift_leaves_the_weather(ageing, history):
+    campaign, _ = ageing
+    steady = make_truss_campaign(3, random_state=0).clean_frequencies
+    removed = history.remove_drift(campaign.clean_frequencies)
+    before = np.abs(campaign.clean_frequencies / steady - 1).to_numpy()[-1].max()
+    assert np.abs(removed / steady - 1).to_numpy()[-1].max() < 0.25 * before
+
+
+def test_a_limit_is_reached_when_the_rate_says(history):
+    reached = history.reaches(-0.2).loc["bottom"]
+    assert reached["earliest"] < reached["date"] < reached["latest"]
+    expected = history.days[0] + pd.Timedelta(days=365 * 10)
+    assert reached["earliest"] < expected < reached["latest"]
+    past = history.reaches(-0.03).loc["bottom", "date"]
+    assert abs(past - (history.days[0] + pd.Timedelta(days=547))) < pd.Timedelta(days=120)
+    with pytest.raises(ValueError, match="limit is 0"):
+        history.reaches(0)
+
+
+def test_order_of_groups_and_unit_of_frequencies_do_not_matter(ageing, history):
+    campaign, fem = ageing
+    T, F = campaign.temperatures, campaign.frequencies
+    other = track_parameters(fem, T, F, GROUPS[::-1], WEEK, random_state=0)
+    assert_allclose(other.table["bottom"], history.table["bottom"], atol=1e-8)
+    assert other.p_value == history.p_value
+    half = DataInformedFEM(Scaled(make_truss()), random_state=0).fit(T[:365], 2 * F[:365])
+    scaled = track_parameters(half, T, 2 * F, GROUPS, WEEK, random_state=0)
+    assert_allclose(scaled.table["bottom"].iloc[-1], history.table["bottom"].iloc[-1], atol=2e-3)
+
+
+class Scaled:
+    """A model whose frequencies are in another unit: twice as many."""
+
+    def __init__(self, model):
+        self._model, self.n_modes, self.parameter_names = model, model.n_modes, model.parameter_names
+        self.groups = model.groups
+
+    def frequencies(self, theta):
+        return 2 * self._model.frequencies(theta)
+
+    def damaged(self, damage):
+        return Scaled(self._model.damaged(damage))
+
+
+def test_days_and_modes_may_be_missing(ageing, history):
+    campaign, fem = ageing
+    F = campaign.frequencies.copy()
+    F.iloc[400:600] = np.nan
+    F.iloc[::2, 0] = np.nan
+    kept = np.r_[0:700, 720 : len(F)]
+    found = track_parameters(fem, campaign.temperatures.iloc[kept], F.iloc[kept], GROUPS, WEEK, random_state=0)
+    assert len(found.days) == len(history.days)
+    table = found.table["bottom"]
+    assert found.has_drift
+    assert found.explanations["groups"].iloc[0] == ("bottom",)
+    assert table["lower"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["upper"].iloc[-1]
+
+
+def trends_of(change, slopes, error=1e-3, years=4.0):
+    n_modes, n_shapes = len(slopes), 5
+    mean = np.kron(slopes @ np.asarray(change, dtype=float), np.eye(n_shapes)[0])
+    return ModeTrends(mean, error**2 * np.eye(n_modes * n_shapes), slopes, years)
+
+
+def test_groups_with_like_effects_are_named_together():
+    slopes = np.array([[0.3, 0.3, 0.0], [0.1, 0.1001, 0.3], [0.2, 0.2, -0.1], [0.0, 0.0, 0.2]])
+    found = Explanations.of(trends_of([-0.04, 0, 0], slopes), 100.0, np.random.RandomState(0))
+    assert found.p_value < 0.01
+    assert found.instead(found.sets[0][0]) == [0, 1]
+    assert found.lookalikes == {0: [1], 1: [0]}
+    apart = Explanations.of(trends_of([0, 0, -0.04], slopes), 100.0, np.random.RandomState(0))
+    assert apart.sets[0] == (2,)
+    assert apart.instead(2) == [2]
+
+
+def test_two_groups_that_drift_are_both_found():
+    slopes = np.random.RandomState(0).uniform(0, 0.4, size=(6, 4))
+    found = Explanations.of(trends_of([-0.05, 0, 0.04, 0], slopes), 100.0, np.random.RandomState(0))
+    assert found.sets[0] == (0, 2)
+
+
+def test_p_values_without_drift_are_uniform():
+    random, slopes = np.random.RandomState(0), np.random.RandomState(1).uniform(0, 0.4, size=(4, 2))
+    p_values = []
+    for _ in range(40):
+        trends = trends_of([0, 0], slopes)
+        noisy = ModeTrends(1e-3 * random.standard_normal(len(trends.mean)), trends.covariance, slopes, 4.0)
+        p_values.append(Explanations.of(noisy, 1000.0, random).p_value)
+    assert np.mean(np.array(p_values) < 0.2) < 0.35
+    assert 0.35 < np.mean(p_values) < 0.75
+
+
+def test_one_day_after_the_other_equals_all_at_once(healthy):
+    campaign, fem = healthy
+    T, F = campaign.temperatures, campaign.frequencies
+    follower = ParameterFilter.of(fem, T[:365], F[:365], GROUPS)
+    at_once = follower.advance(follower.start(), T[365:380], F[365:380])
+    state = follower.start()
+    for day in range(365, 380):
+        state = follower.advance(state, T[day : day + 1], F[day : day + 1])
+    assert_allclose(state.mean, at_once.mean, atol=1e-12)
+    assert state.day == at_once.day
+    assert state.n_modes == 6
+    kept = follower.advance(state, T[380:381], 1.2 * F[380:381], absorb=False)
+    assert kept.distance > 100
+    assert np.array_equal(kept.mean[3:6], state.mean[3:6])
+    empty = follower.advance(state, T[:0], F[:0])
+    assert empty.day == T.index[380]
+    assert np.isnan(empty.distance)
+    assert_allclose(pickle.loads(pickle.dumps(state)).covariance, state.covariance)
+    with pytest.raises(ValueError, match="expected times after the day"):
+        follower.advance(state, T[370:371], F[370:371])
+
+
+def test_the_filter_follows_a_drift(ageing):
+    campaign, fem = ageing
+    T, F = campaign.temperatures, campaign.frequencies
+    follower = ParameterFilter.of(fem, T[:365], F[:365], GROUPS)
+    state = follower.advance(follower.start(), T[365:], F[365:])
+    found = follower.estimate(state).loc["bottom"]
+    truth = np.log(1 - 0.02 * 3) - np.log(1 - 0.02 * 0.5)
+    assert abs(found["change"] - truth) < 3 * found["standard_error"]
+    drift, error = follower.frequency_drift(state), np.sqrt(np.diag(follower.frequency_covariance(state)))
+    middle = make_truss_campaign(3, random_state=0).clean_frequencies
+    shift = np.log(campaign.clean_frequencies / middle).to_numpy()
+    assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * error).all()
+
+
+def test_shapes_of_time_are_those_of_a_random_walk():
+    shapes = shapes_of_time(200, 40)[:, 1:] / (np.pi * (np.arange(1, 40) - 0.5))
+    share = np.arange(200) / 199
+    assert_allclose(shapes @ shapes.T, np.minimum(share[:, np.newaxis], share), atol=0.02)
+
+
+def test_wrong_input_is_refused(healthy):
+    campaign, fem = healthy
+    T, F = campaign.temperatures, campaign.frequencies
+    with pytest.raises(ValueError, match="expected a DataFrame with a DatetimeIndex"):
+        track_parameters(fem, T.to_numpy(), F.to_numpy())
+    with pytest.raises(ValueError, match="expected a fitted DataInformedFEM"):
+        track_parameters(make_truss(), T, F)
+    with pytest.raises(ValueError, match="too few days"):
+        track_parameters(fem, T[:20], F[:20])
+    with pytest.raises(ValueError, match="unknown damage groups"):
+        track_parameters(fem, T, F, ["deck"])
+    with pytest.raises(ValueError, match="significance is 2"):
+        track_parameters(fem, T, F, significance=2)
+
+
+def test_the_display_shows_each_group_its_band_and_a_limit(history):
+    import matplotlib.pyplot as plt
+
+    display = ParameterHistoryDisplay.from_history(history, limit=-0.1)
+    assert list(display.lines_) == GROUPS
+    drawn = display.lines_["bottom"].get_ydata()
+    assert_allclose(drawn, 100 * (history.table["bottom"]["estimate"] - 1))
+    assert [line.get_ydata()[0] for line in display.axes_[0].lines][-1] == pytest.approx(-10)
+    assert display.axes_[0].get_title(loc="right") == "drifts: yes"
+    with pytest.raises(ValueError, match="expected some of"):
+        ParameterHistoryDisplay.from_history(history, groups=["deck"])
+    with pytest.raises(ValueError, match="expected a ParameterHistory"):
+        ParameterHistoryDisplay.from_history(None)
+    plt.close("all")

@@ -1,0 +1,443 @@
+"""The monitor: divisions of records into batches, late and repeated records, memory, reasons, events and errors."""
+
+import copy
+import pickle
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from sklearn.base import BaseEstimator, TransformerMixin, clone
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import LinearRegression
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+
+from skthermo.detection import (
+    FusedDetector,
+    MahalanobisDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
+from skthermo.monitoring import Monitor
+from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._promise import find_events
+from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
+
+TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
+N_BASELINE, N_SERVICE = 1200, 140  # six-hourly: 300 and 35 days
+ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*(season|baseline|independent|not judged|far beyond)")
+
+
+def campaign(n, seed, start="2025-01-01"):
+    """Temperatures and frequencies that follow them with delay, six-hourly, with AR(1) noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n + 4)
+    air = 10 - 12 * np.cos(2 * np.pi * t / 1461) + 5 * np.sin(np.pi * t / 2) + rng.normal(0, 2, n + 4)
+    noise = rng.normal(0, 0.003, (n + 4, 3))
+    for row in range(1, n + 4):
+        noise[row] += 0.5 * noise[row - 1]
+    late = 0.5 * air[4:] + 0.5 * air[:-4]
+    F = np.array([2.0, 3.0, 5.0]) * (1 - 1e-3 * late[:, np.newaxis] + noise[4:])
+    T = air[4:, np.newaxis] + [0, 1, -1] + rng.normal(0, 0.3, (n, 3))
+    stamps = pd.date_range(start, periods=n, freq="6h").as_unit("ns")
+    return pd.DataFrame(np.hstack([T, F]), stamps, [*TEMPERATURES, *MODES])
+
+
+ALL = campaign(N_BASELINE + N_SERVICE, 0)
+BASELINE = ALL[:N_BASELINE]
+
+
+def in_service():
+    """Records with gaps, missing values, markers, a dead thermometer and damage."""
+    records, rng = ALL[N_BASELINE:].copy(), np.random.default_rng(1)
+    records.iloc[100:, 3:] *= [0.98, 0.985, 1.0]
+    records = records.mask(rng.uniform(size=records.shape) < 0.03)
+    records.iloc[20, 3:] = np.nan
+    records.iloc[25, :3] = np.nan
+    records.iloc[30, 4], records.iloc[31, 0] = -999.0, 285.0
+    records.iloc[60:, 2] = records.iloc[60, 2]
+    records.iloc[50, 3] *= 100  # absurd
+    return records.drop(records.index[[5, 6, *range(80, 92)]])
+
+
+SERVICE = in_service()
+
+
+def compensator(regressor=None, **options):
+    return TemperatureCompensator(regressor or LinearRegression(), targets=MODES, **options)
+
+
+def lagged(regressor=None):
+    return make_pipeline(LagFeatures([0, 2, 4], freq="6h", tolerance="6h"), regressor or LinearRegression())
+
+
+FOREST = OutlierDetector(IsolationForest(n_estimators=20, random_state=0), block="1D")
+DETECTORS = {
+    "raw": (MahalanobisDetector(), "nothing"),
+    "neighbours": (make_pipeline(compensator(KNeighborsRegressor(20)), MahalanobisDetector()), "nothing"),
+    "hinges": (
+        make_pipeline(compensator(make_pipeline(HingeFeatures(), LinearRegression())), MahalanobisDetector()),
+        "nothing",
+    ),
+    "lags": (make_pipeline(compensator(lagged()), MahalanobisDetector()), "30 h"),
+    "whitened, mean by time": (make_pipeline(compensator(lagged(), scale="local"), WindowedAlarm("36h")), "66 h"),
+    "mean by number": (make_pipeline(compensator(lagged()), WindowedAlarm(5)), "4 records and 30 h"),
+    "m of n": (make_pipeline(compensator(), WindowedAlarm(6, rule="m-of-n")), "5 records"),
+    "m of n by time": (make_pipeline(compensator(), WindowedAlarm("2D", rule="m-of-n")), "48 h"),
+    "forest": (make_pipeline(compensator(lagged()), FOREST), "30 h"),
+    "fused": (
+        FusedDetector(
+            [
+                ("lags", make_pipeline(compensator(lagged()), MahalanobisDetector())),
+                ("window", make_pipeline(compensator(), WindowedAlarm("2D"))),
+            ]
+        ),
+        "48 h",
+    ),
+}
+SETTINGS = settings(
+    max_examples=2,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],  # a smaller example would take minutes
+    suppress_health_check=list(HealthCheck),
+)
+_fitted = {}
+
+
+def fitted(name, **options):
+    """A fitted monitor, its answers to all records at once, and how it stands then."""
+    key = (name, *options.items())
+    if key not in _fitted:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            monitor = Monitor(DETECTORS[name][0], targets=MODES, **options).fit(BASELINE)
+            after = copy.deepcopy(monitor)
+            _fitted[key] = monitor, after.update(SERVICE), after
+    monitor, answers, after = _fitted[key]
+    return copy.deepcopy(monitor), answers, after
+
+
+def last_of_each(parts):
+    answers = pd.concat(parts)
+    return answers[~answers.index.duplicated(keep="last")].sort_index()
+
+
+def assert_same_course(monitor, answers, after, parts):
+    pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True, check_freq=False)
+    for name in ("events_", "days_", "judged_", "faults_", "records_", "corrected_"):
+        pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True, check_freq=False)
+    for count in ("n_records", "n_not_judged", "n_implausible"):
+        assert monitor.counts_[count] == after.counts_[count]
+    assert monitor.state() == after.state()
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+@settings(SETTINGS)
+@given(data=st.data())
+def test_any_division_into_batches_gives_the_course_of_one_pass(name, data):
+    monitor, answers, after = fitted(name)
+    n = len(SERVICE)
+    delays = data.draw(st.lists(st.integers(0, 12), min_size=n, max_size=n), "records until each comes")
+    order = np.argsort(np.arange(n) + delays, kind="stable")
+    cuts = sorted(data.draw(st.sets(st.integers(1, n - 1), min_size=3, max_size=6), "cuts"))
+    parts, n_repeated = [], 0
+    for batch in np.split(order, cuts):
+        again = data.draw(st.lists(st.sampled_from(list(batch)), max_size=3), "rows that are sent twice")
+        n_repeated += len(again)
+        parts.append(monitor.update(SERVICE.iloc[[*batch, *again]]))
+    assert_same_course(monitor, answers, after, parts)
+    assert monitor.counts_["n_repeated"] == n_repeated
+    assert monitor.counts_["n_too_late"] == 0
+
+
+def test_hour_by_hour_and_day_by_day():
+    for batches in ([SERVICE.iloc[[n]] for n in range(40)], [day for _, day in SERVICE[:40].resample("D") if len(day)]):
+        monitor, answers, _ = fitted("whitened, mean by time")
+        parts = [monitor.update(batch) for batch in batches]
+        pd.testing.assert_frame_equal(
+            pd.concat(parts)[ANSWER], answers[:40][ANSWER], check_exact=True, check_freq=False
+        )
+        assert not any(part["revised"].any() for part in parts)
+
+
+@pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "m of n by time", "fused"])
+def test_indices_are_those_of_the_detector_on_all_records(name):
+    monitor, _, _ = fitted(name, sensors=False)
+    service = ALL[N_BASELINE:].drop(ALL.index[-50:-40])
+    answers = monitor.update(service)
+    columns = MODES if name == "raw" else list(ALL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        expected = -monitor.detector_.score_samples(pd.concat([BASELINE, service])[columns])
+    np.testing.assert_allclose(answers["index"], expected[N_BASELINE:], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+def test_memory_is_what_lags_and_windows_need(name):
+    monitor, _, _ = fitted(name)
+    assert str(monitor.memory_) == DETECTORS[name][1]
+    judge, times = monitor.bench_.judge, ALL.index.asi8
+    rows = range(N_BASELINE, N_BASELINE + 3)
+    alone = [judge.alone(ALL, times, row) for row in rows]
+    np.testing.assert_allclose(judge.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
+
+
+def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch):
+    monitor, _, _ = fitted("lags")
+    judge, exact = monitor.bench_.judge, Judge._exact
+    edge = 3.0000005
+    bits = iter([edge - 1e-12, edge + 1e-12])
+
+    def at_an_edge(self, records):
+        """As if a call with many records moved the last bits."""
+        return np.full(len(records), edge + 1e-12 if len(records) < 10 else next(bits))
+
+    monkeypatch.setattr(Judge, "_exact", at_an_edge)
+    first, second = (judge.index(ALL[: N_BASELINE + 20], N_BASELINE) for _ in range(2))
+    monkeypatch.setattr(Judge, "_exact", exact)
+    np.testing.assert_array_equal(first, second)
+    assert first[0] == 3.000001
+
+
+def test_events_are_those_of_the_rule_on_the_whole_series():
+    _, answers, after = fitted("lags")
+    events = find_events(answers["index"].to_numpy(), answers.index, after.promise_.rule)
+    assert len(events) >= 1
+    pd.testing.assert_frame_equal(
+        after.events_[list(events)], events, check_dtype=False, check_exact=True, check_index_type=False
+    )
+    inside = answers["event"] > 0
+    assert (answers["state"] == "alarm").equals(inside)
+    assert after.events_["n_alarms"].sum() == inside.sum() == after.days_["n_alarms"].sum()
+    assert answers.loc[~inside, "modes"].eq("").all()
+    assert answers.loc[inside, "modes"].ne("").all()
+    assert after.events_["modes"].iloc[-1].split(", ")[0] in ("f1", "f2")
+
+
+def test_days_summarise_their_records():
+    _, answers, after = fitted("whitened, mean by time")
+    by_day = answers.groupby(answers.index.normalize())
+    assert after.days_["n_records"].tolist() == by_day.size().tolist()
+    assert after.days_["n_judged"].tolist() == by_day["index"].count().tolist()
+    np.testing.assert_array_equal(after.days_["index_max"], by_day["index"].max())
+    np.testing.assert_array_equal(after.days_["index_median"], by_day["index"].median())
+
+
+def test_reasons_say_why_a_record_is_not_judged():
+    _, answers, after = fitted("lags")
+    stamp = ALL.index[N_BASELINE:]
+    assert answers.loc[stamp[20], "reason"] == "no mode has a value"
+    assert answers.loc[stamp[25], "reason"].startswith("no temperature has a value")
+    assert "lags find no record" in answers.loc[stamp[92], "reason"]
+    assert "f2 is -999: taken as missing" in answers.loc[stamp[30], "reason"]
+    assert "T1 is 285: taken as missing" in answers.loc[stamp[31], "reason"]
+    assert (answers["state"] == "not judged").equals(answers["index"].isna())
+    assert after.counts_["n_implausible"] == 2
+    for name, reason in (
+        ("mean by number", "its window holds fewer than"),
+        ("forest", "missing, and the detector needs every mode"),
+    ):
+        _, answers, _ = fitted(name)
+        assert answers.loc[answers["index"].isna(), "reason"].str.contains(reason).any() or name == "mean by number"
+
+
+def test_too_late_records_are_told_and_not_judged():
+    monitor, _, _ = fitted("lags")
+    monitor.update(SERVICE[50:80])
+    before = monitor.judged_
+    with pytest.warns(UserWarning, match="2 of 2 new records are not judged"):
+        answers = monitor.update(SERVICE[:2])
+    assert answers["state"].eq("not judged").all()
+    assert answers["reason"].str.contains("came too late, more than 7D").all()
+    early = BASELINE.iloc[[0]].set_axis(BASELINE.index[[0]] + pd.Timedelta("1h"))
+    with pytest.warns(UserWarning, match="before the end of the baseline"):
+        monitor.update(early)
+    assert monitor.counts_["n_too_late"] == 3
+    pd.testing.assert_frame_equal(monitor.judged_, before)
+
+
+def test_known_records_are_repeated_or_refused():
+    monitor, _, _ = fitted("lags")
+    monitor.update(SERVICE[:40])
+    again = monitor.update(pd.concat([BASELINE[-3:], SERVICE[30:41]]))
+    assert again.index.tolist() == SERVICE.index[40:41].tolist()
+    assert monitor.counts_["n_repeated"] == 13
+    changed = SERVICE[35:45].copy()
+    changed.iloc[2, 4] = 3.1
+    saved = pickle.dumps(monitor)
+    with pytest.raises(ValueError, match=r"1 of 6 repeated records .* first 2025-11-06 18:00:00: 'f2' is 3.1"):
+        monitor.update(changed)
+    twice = pd.concat([SERVICE[41:42], SERVICE[41:42] * 1.01])
+    with pytest.raises(ValueError, match="repeated records have other values"):
+        monitor.update(twice)
+    assert pickle.dumps(monitor) == saved
+
+
+def shifted_zone(records):
+    return records.tz_localize("UTC")
+
+
+def with_text(records):
+    return records.astype({"f1": object}).assign(f1="5 Hz")
+
+
+def infinite(records):
+    return records.assign(T2=np.inf)
+
+
+def without_stamps(records):
+    return records.reset_index(drop=True)
+
+
+def renamed(records):
+    return records.rename(columns={"T2": "T9"})
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (renamed, r"lack the columns \['T2'\] of the baseline, and have \['T9'\]"),
+        (without_stamps, "expected a DatetimeIndex"),
+        (infinite, "5 of 30 values are infinite, the first at .* in column 'T2'"),
+        (with_text, "5 Hz"),
+        (shifted_zone, "time zone UTC, the baseline None"),
+        (pd.DataFrame.to_numpy, "of type ndarray; expected a frame"),
+    ],
+)
+def test_records_that_cannot_be_read_leave_the_monitor_as_it_was(change, match):
+    monitor, _, _ = fitted("lags")
+    monitor.update(SERVICE[:10])
+    saved = pickle.dumps(monitor)
+    with pytest.raises(ValueError, match=match):
+        monitor.update(change(SERVICE[10:15]))
+    assert pickle.dumps(monitor) == saved
+
+
+def test_a_batch_without_records_changes_nothing():
+    monitor, _, _ = fitted("lags")
+    for empty in (SERVICE[:0], pd.DataFrame(columns=list(SERVICE))):
+        got = monitor.update(empty)
+        assert len(got) == 0
+        assert list(got) == [*ANSWER, "revised"]
+    assert monitor.state() == "not judged"
+    assert monitor.last_ == BASELINE.index[-1]
+
+
+def test_a_detector_that_looks_at_later_records_is_refused():
+    detector = make_pipeline(HampelFilter(5), compensator(), MahalanobisDetector())
+    with pytest.raises(ValueError, match="compares records with later ones"):
+        Monitor(detector).fit(BASELINE)
+
+
+class RunningMean(TransformerMixin, BaseEstimator):
+    """A user's step that looks back, which no inspection finds."""
+
+    def __init__(self, records=8):
+        self.records = records
+
+    def fit(self, X, y=None):
+        return self
+
+    def transform(self, X):
+        return X.rolling(self.records, min_periods=1).mean()
+
+
+def test_memory_of_steps_that_are_not_known_is_asked_for():
+    detector = make_pipeline(compensator().set_output(transform="pandas"), RunningMean(), MahalanobisDetector())
+    with pytest.raises(ValueError, match=r"looks at later records, or farther back; expected .* memory='48h'"):
+        Monitor(detector).fit(BASELINE)
+    monitor = Monitor(detector, memory="2D", sensors=False).fit(BASELINE)
+    other = copy.deepcopy(monitor)
+    whole = monitor.update(ALL[N_BASELINE:])
+    parts = [other.update(day) for _, day in ALL[N_BASELINE:].resample("D")]
+    pd.testing.assert_frame_equal(whole, pd.concat(parts), check_freq=False)
+
+
+def test_frequency_columns_have_to_be_known():
+    with pytest.raises(ValueError, match="expected targets="):
+        Monitor(MahalanobisDetector()).fit(BASELINE)
+    with pytest.raises(ValueError, match="expected different names among the columns"):
+        Monitor(MahalanobisDetector(), targets=["f9"]).fit(BASELINE)
+    assert Monitor(DETECTORS["lags"][0], sensors=False).fit(BASELINE).targets_ == MODES
+
+
+def test_state_does_not_grow_with_history():
+    monitor = Monitor(DETECTORS["lags"][0], keep="20D").fit(BASELINE)
+    sizes = []
+    for _, week in ALL[N_BASELINE:].resample("7D"):
+        monitor.update(week)
+        sizes.append((len(monitor.records_), len(monitor.judged_), len(monitor.corrected_)))
+    assert sizes[-1] == sizes[-2] == (81, 81, 81)
+    assert len(monitor.days_) == 35
+    assert len(monitor.course_.checkpoints) <= 9
+    other = Monitor(DETECTORS["lags"][0], keep="20D").fit(BASELINE)
+    assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is judged
+    pd.testing.assert_frame_equal(other.days_, monitor.days_)
+
+
+def test_what_the_owner_says_of_an_event_stays_with_it():
+    monitor, _, _ = fitted("lags")
+    held = SERVICE.index[100:104]
+    monitor.update(SERVICE[:115].drop(held))
+    assert monitor.state() == "alarm"
+    number = len(monitor.events_)
+    monitor.acknowledge(number, harmless=True, note="crane on the deck")
+    monitor.update(SERVICE.loc[held])
+    event = monitor.events_.iloc[-1]
+    assert event[["acknowledged", "harmless", "note"]].tolist() == [True, True, "crane on the deck"]
+    assert "acknowledged as harmless (crane on the deck)" in monitor.summary()
+    with pytest.raises(ValueError, match="expected the number of one of the"):
+        monitor.acknowledge(99, harmless=True)
+
+
+def test_stiffening_is_no_damage_where_softening_is_asked_for():
+    stiffer = ALL[N_BASELINE:].copy()
+    stiffer.iloc[80:, 3:] *= [1.03, 1.02, 1.02]
+    softer = ALL[N_BASELINE:].copy()
+    softer.iloc[80:, 3:] *= [0.97, 0.98, 0.98]
+    monitor = Monitor(DETECTORS["lags"][0], direction="softening", sensors=False).fit(BASELINE)
+    other = copy.deepcopy(monitor)
+    answers = monitor.update(stiffer)
+    last = monitor.events_.iloc[-1]
+    assert last["kind"] == "stiffening"
+    assert pd.isna(last["end"])
+    assert monitor.state() == "healthy"
+    assert answers.iloc[-1][["state", "reason", "event"]].tolist() == [
+        "healthy",
+        "stiffer than the baseline",
+        len(monitor.events_),
+    ]
+    other.update(softer)
+    assert other.events_["kind"].iloc[-1] == "damage"
+    assert other.state() == "alarm"
+
+
+def test_a_monitor_is_cloned_and_has_parameters():
+    monitor, _, after = fitted("lags")
+    twin = clone(monitor)
+    assert not hasattr(twin, "detector_")
+    assert twin.get_params()["late"] == "7D"
+    assert twin.set_params(late="2D", detector__mahalanobisdetector__contamination=0.01).late == "2D"
+    again = pickle.loads(pickle.dumps(after))
+    pd.testing.assert_frame_equal(again.judged_, after.judged_)
+    assert again.summary() == after.summary()
+    with pytest.raises(ValueError, match="expected to keep records two days longer"):
+        Monitor(MahalanobisDetector(), targets=MODES, keep="5D").fit(BASELINE)
+
+
+def test_calendar_days_of_a_time_zone_with_summer_time():
+    records = campaign(N_BASELINE + 40, 3, "2024-06-06").tz_localize("UTC").tz_convert("Europe/Zurich")
+    monitor = Monitor(DETECTORS["lags"][0], targets=MODES).fit(records[:N_BASELINE])
+    other = copy.deepcopy(monitor)
+    whole = monitor.update(records[N_BASELINE:])
+    parts = [other.update(records[n : n + 3]) for n in range(N_BASELINE, len(records), 3)]
+    pd.testing.assert_frame_equal(whole, pd.concat(parts), check_freq=False)
+    assert monitor.days_.index.equals(records[N_BASELINE:].index.normalize().unique())
+    assert monitor.days_.equals(other.days_)
