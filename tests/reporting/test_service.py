@@ -194,7 +194,7 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
     monitor = FakeMonitor(drift=found)
     standing = standing_of(monitor)
     (said,) = drift_sentences(standing)
-    loss = f"deck has lost 2.0{SPACE}% (± 0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
+    loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert said.startswith(loss)
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
@@ -248,6 +248,9 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
     assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
     assert "Mode f2" not in page.text
     assert "is swapped with another" in page.cells
+    seen = [event_row("2025-03-03", "2025-03-09", note="cold"), event_row("2025-03-20", "2025-03-21")]
+    notes = Page(events(standing_of(FakeMonitor(faults=faults, events=seen)))).text
+    assert notes.count("failed at that time") == notes.count("cold; T1 failed at that time") == 1
     assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text
     assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
 

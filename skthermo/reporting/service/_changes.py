@@ -48,7 +48,7 @@ def _group(name: Any, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
 
 def _size(value: float, error: float) -> str:
     """A size in percent with two standard errors."""
-    return f"{100 * abs(value):.1f}{SPACE}% (± {percent(N_ERRORS * error, '.1f')})"
+    return f"{100 * abs(value):.1f}{SPACE}% (±{SPACE}{percent(N_ERRORS * error, '.1f')})"
 
 
 def _reached(row: pd.Series, last: pd.Timestamp, limit: float) -> str:
