@@ -349,6 +349,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/structures/_view.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
+    ("monitoring/_files.py", "monitoring/test_files.py"): [
+        ("functions read from files", "isinstance(found, type) and found", "found"),
+        ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
+        ("versions of a saved monitor", "if monitor.versions_ != versions():", "if False:"),
+    ],
+    ("monitoring/__main__.py", "monitoring/test_command.py"): [
+        ("an alarm that has ended within a batch", 'if "alarm" in states or monitor', "if monitor"),
+        ("a night without a new record", "if is_judged else NOT_JUDGED", "if True else NOT_JUDGED"),
+    ],
+    ("_io/_shared_files.py", "test_shared_files.py"): [
+        ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),
+    ],
 }
 
 
