@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._changes import drift, drift_sentences, sensors
 from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import unjudged
+from skthermo.reporting.service._sections import monitor_page, unjudged
 from skthermo.reporting.service._standing import Standing
 from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
@@ -154,6 +154,13 @@ def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
     assert page.cells == [str(number), "2"]
 
 
+def test_a_new_baseline_after_a_change_of_the_structure_is_said():
+    monitor = FakeMonitor(n_days=3)
+    assert "The structure was changed" not in monitor_page(monitor, monitor.last_, 0.1)[0]
+    monitor.since_ = pd.Timestamp("2024-12-20")
+    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in monitor_page(monitor, None, 0.1)[0]
+
+
 def test_stiffening_is_reported_and_is_no_alarm():
     monitor = FakeMonitor(events=[event_row("2025-06-10", None, kind="stiffening")])
     page = today_of(monitor)
@@ -231,6 +238,9 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
     since = monitor.days_.index[400]
     assert since < monitor.judged_.index[0]
     assert headline(today_of(monitor)) == f"Not judged since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    n_kept = len(monitor.judged_)
+    text = Page(unjudged(standing_of(monitor))).text
+    assert f"Why {500 - n_kept} of them, which are older, were not judged is no longer kept." in text
 
 
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
