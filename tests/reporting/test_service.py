@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._changes import drift, drift_sentences, sensors
 from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import monitor_page, unjudged
+from skthermo.reporting.service._sections import introduction, unjudged
 from skthermo.reporting.service._standing import Standing
 from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
@@ -155,10 +155,10 @@ def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
 
 
 def test_a_new_baseline_after_a_change_of_the_structure_is_said():
-    monitor = FakeMonitor(n_days=3)
-    assert "The structure was changed" not in monitor_page(monitor, monitor.last_, 0.1)[0]
+    monitor = FakeMonitor()
+    assert len(introduction(monitor)) == 1
     monitor.since_ = pd.Timestamp("2024-12-20")
-    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in monitor_page(monitor, None, 0.1)[0]
+    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in introduction(monitor)[1]
 
 
 def test_stiffening_is_reported_and_is_no_alarm():

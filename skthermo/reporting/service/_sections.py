@@ -21,7 +21,7 @@ MOST_REASONS = 12  # largest number of reasons in a table
 def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, tuple[str, Html]]]:
     """What stands above the sections, and these with their titles."""
     standing = Standing.of(monitor, now, limit)
-    return paragraphs(*_introduction(monitor)), {
+    return paragraphs(*introduction(monitor)), {
         "today": ("Today", today(standing)),
         "events": ("Events", events(standing)),
         "index": ("Damage index", _index(standing)),
@@ -33,7 +33,7 @@ def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, 
     }
 
 
-def _introduction(monitor: Any) -> list[str]:
+def introduction(monitor: Any) -> list[str]:
     """What the monitor learned from, and how many records have come since."""
     first, last = (moment(time) for time in monitor.trained_.index[[0, -1]])
     n_records = int(monitor.counts_["n_records"])
