@@ -292,6 +292,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
         ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
+    ("monitoring/drift/_kalman.py", "monitoring/drift"): [
+        ("slopes move levels", "covariance[:, :n] += self.length", "covariance[:, :n] += 0.9 * self.length"),
+    ],
+    ("monitoring/drift/_track.py", "monitoring/drift"): [
+        (
+            "weather beside drift",
+            "replace(daily, basis=with_time(daily, N_SHAPES))",
+            "replace(daily, basis=0 * with_time(daily, N_SHAPES))",
+        ),
+    ],
+    ("monitoring/drift/_explanations.py", "monitoring/drift"): [
+        ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
+    ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
