@@ -22,6 +22,11 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/drift/_follower.py", "monitoring/test_drift_follower.py"): [
+        ("follower learns from sudden changes", "absorb=not sudden[0]", "absorb=True"),
+        ("follower takes out doubtful drift", "(by_chance / distance) ** 2, 0.0)", "0 * by_chance, 0.0)"),
+        ("follower without lags", "beside = pd.concat(", "beside = T[self.temperatures] if len(T) else pd.concat("),
+    ],
     ("fem/modal/_tracking.py", "fem/test_tracking.py"): [
         ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
