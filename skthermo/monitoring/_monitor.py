@@ -368,7 +368,7 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If records lack columns.
+            If the records are not as `update` expects them.
 
         Notes
         -----
@@ -383,6 +383,10 @@ class Monitor(SavesFrames, Estimator):
         only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
         """
         check_is_fitted(self)
+        if records is not None:
+            records = self.bench_.plausible.cleaned(
+                read_records(records, self.baseline_.columns, self.baseline_.index.tz)
+            )[0]
         retraining = retrained(self, records, until=until, force=check_flag(force, "force"), limit=self._limit)
         if retraining.accepted:
             self._take_over(retraining)
@@ -406,7 +410,7 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If no record of the baseline is from before ``since``.
+            If no record of the baseline is from before ``since``, or none of those is needed any more.
 
         Notes
         -----
