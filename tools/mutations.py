@@ -22,6 +22,15 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
+        ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
+    ],
+    ("monitoring/_judge.py", "monitoring/test_monitor.py"): [
+        ("indices that are not computed alone at an edge", "np.flatnonzero(from_edge <=", "np.flatnonzero(from_edge < -"),
+    ],
+    ("monitoring/_course.py", "monitoring/test_monitor.py"): [
+        ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
+    ],
     ("monitoring/retraining/_harvest.py", "monitoring/test_retraining.py"): [
         ("records of an event train", "kept &= ~inside", "kept &= True"),
         ("records before an event train", "event.start - margin", "event.start"),
