@@ -58,7 +58,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
     ],
     ("monitoring/sensors/_modes.py", "monitoring/sensors/test_sensor_watch.py"): [
-        ("damage taken for exchanged modes", "if is_far and is_near", "if is_near"),
+        ("damage taken for exchanged modes", "if is_near else", "if True else"),
     ],
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
