@@ -22,6 +22,11 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/drift/_follower.py", "monitoring/test_drift_follower.py"): [
+        ("follower learns from sudden changes", "absorb=not sudden[0]", "absorb=True"),
+        ("follower takes out doubtful drift", "(by_chance / distance) ** 2, 0.0)", "0 * by_chance, 0.0)"),
+        ("follower without lags", "beside = pd.concat(", "beside = T[self.temperatures] if len(T) else pd.concat("),
+    ],
     ("fem/modal/_tracking.py", "fem/test_tracking.py"): [
         ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
@@ -345,6 +350,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("monitoring/_direction.py", "monitoring/test_direction.py"): [
         ("direction told by lowered frequencies", "[1] <= nnls(-effects", "[1] >= nnls(-effects"),
+    ],
+    ("monitoring/_files.py", "monitoring/test_files.py"): [
+        ("functions read from files", "isinstance(found, type) and found", "found"),
+        ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
+        ("versions of a saved monitor", "if monitor.versions_ != versions():", "if False:"),
+    ],
+    ("monitoring/__main__.py", "monitoring/test_command.py"): [
+        ("an alarm that has ended within a batch", 'if "alarm" in states or monitor', "if monitor"),
+        ("a night without a new record", "if is_judged else NOT_JUDGED", "if True else NOT_JUDGED"),
+    ],
+    ("_io/_shared_files.py", "test_shared_files.py"): [
+        ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),
     ],
 }
 

@@ -42,7 +42,7 @@ def second_year(follower, steady):
 
 def followed(follower, daily, changes):
     """States of the follower day by day, where ln stiffness of the diagonals changes by so much."""
-    state, slopes = follower.start(), follower.filter.effects.slopes[:, 2]
+    state, slopes = follower.start(), follower.filter.slopes[:, 2]
     for row, change in enumerate(changes):
         day = slice(row, row + 1)
         shifted = daily.values[day] + change * slopes
@@ -61,7 +61,7 @@ def with_drift(follower, lost, error):
 def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
     T, F = steady.temperatures[-5:], steady.frequencies[-5:]
     clear, doubtful = (with_drift(follower, 0.03, error) for error in (1e-5, 0.03))
-    shift = follower.filter.effects.slopes[:, 0] * np.log(0.97)
+    shift = follower.filter.slopes[:, 0] * np.log(0.97)
     pd.testing.assert_frame_equal(follower.corrected(clear, T, F), F * np.exp(-shift), rtol=1e-9)
     pd.testing.assert_frame_equal(follower.corrected(doubtful, T, F), F)
     swapped = F.iloc[:, ::-1]
@@ -143,3 +143,14 @@ def test_lags_see_the_days_before():
     expected = apart.groupby(apart.index.normalize()).mean()
     np.testing.assert_allclose(state.waiting.values, expected, rtol=1e-9)
     assert state.day == expected.index[-1]
+
+
+def test_states_are_saved_without_types_of_others(follower, steady):
+    skops = pytest.importorskip("skops.io")
+    state = follower.advance(follower.start(), steady.temperatures[FIRST : FIRST + 1], steady.frequencies[FIRST:][:1])
+    file = skops.dumps(state)
+    unknown = skops.get_untrusted_types(data=file)
+    assert all(name.startswith("skthermo.") for name in unknown)
+    again = skops.loads(file, trusted=unknown)
+    assert (again.day, again.n_left_out) == (state.day, 0)
+    pd.testing.assert_frame_equal(follower.report(again), follower.report(state), check_exact=True)

@@ -12,6 +12,7 @@ import pandas as pd
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import check_same_rows
 from skthermo._frequency_effects import FrequencyEffects, healthy_frequencies, read_groups
+from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps
 from skthermo._validation import check_is_fitted
 from skthermo._warnings import warnings_once
@@ -28,7 +29,7 @@ MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has 
 
 
 @dataclass(frozen=True)
-class ParameterState:
+class ParameterState(SavesFrames):
     """What a `ParameterFilter` knows at the end of a day.
 
     Parameters

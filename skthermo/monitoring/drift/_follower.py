@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,7 +27,8 @@ LIMIT = 0.05
 ONE_DAY = pd.DateOffset(days=1)
 
 
-class Waiting(NamedTuple):
+@dataclass(frozen=True)
+class Waiting:
     """Daily means of days that wait, as in `DailyMeans`."""
 
     values: Array
@@ -275,7 +276,7 @@ class DriftFollower:
 
     def _foretold(self, known: ParameterState, waiting: Waiting) -> tuple[Array, Array]:
         """Mean of ln ratios of each measured mode over the days that wait, and its covariance."""
-        noise, slopes = self.filter.noise, self.filter.effects.slopes
+        noise, slopes = self.filter.noise, self.filter.slopes
         known_days = ~np.isnan(waiting.values)
         weights = known_days / np.maximum(known_days.sum(axis=0), 1)
         ahead = np.arange(1, len(weights) + 1)
