@@ -33,6 +33,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
+    ("monitoring/sensors/_changes.py", "monitoring/sensors/test_changes.py"): [
+        ("weather that the baseline does not have", "1 / BEYOND**2", "1e12"),
+        ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
+    ],
+    ("monitoring/sensors/_modes.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("damage taken for exchanged modes", "if is_far and is_near", "if is_near"),
+    ],
+    ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
+    ],
     ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
@@ -282,6 +292,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
         ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
+    ("monitoring/drift/_kalman.py", "monitoring/drift"): [
+        ("slopes move levels", "covariance[:, :n] += self.length", "covariance[:, :n] += 0.9 * self.length"),
+    ],
+    ("monitoring/drift/_track.py", "monitoring/drift"): [
+        (
+            "weather beside drift",
+            "replace(daily, basis=with_time(daily, N_SHAPES))",
+            "replace(daily, basis=0 * with_time(daily, N_SHAPES))",
+        ),
+    ],
+    ("monitoring/drift/_explanations.py", "monitoring/drift"): [
+        ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
+    ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
@@ -342,6 +365,18 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("plotting/structures/_view.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
+    ],
+    ("monitoring/_files.py", "monitoring/test_files.py"): [
+        ("functions read from files", "isinstance(found, type) and found", "found"),
+        ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
+        ("versions of a saved monitor", "if monitor.versions_ != versions():", "if False:"),
+    ],
+    ("monitoring/__main__.py", "monitoring/test_command.py"): [
+        ("an alarm that has ended within a batch", 'if "alarm" in states or monitor', "if monitor"),
+        ("a night without a new record", "if is_judged else NOT_JUDGED", "if True else NOT_JUDGED"),
+    ],
+    ("_io/_shared_files.py", "test_shared_files.py"): [
+        ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),
     ],
 }
 

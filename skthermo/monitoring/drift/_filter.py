@@ -25,6 +25,7 @@ RATE = 0.02  # standard deviation of the yearly change of a group that is expect
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
 ACCURATE = 2e-5  # error of ln frequencies up to which a quadratic function of the parameters takes the model's place
+TURN = 0.01  # standard deviation of what a year adds to the yearly rate
 MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has mislearned, for each function of weather
 
 
@@ -222,7 +223,7 @@ class ParameterFilter:
         covariance[levels, levels] = (RATE * span / 2) ** 2
         covariance[levels, slopes] = covariance[slopes, levels] = -(RATE**2) * span / 2
         covariance[-n_modes:, -n_modes:] = noise.stationary
-        before = daily.days[0] - pd.tseries.frequencies.to_offset(freq)
+        before = pd.date_range(end=daily.days[0], periods=2, freq=freq)[0]
         found = cls(
             records,
             effects.members,
@@ -238,9 +239,9 @@ class ParameterFilter:
 
     def advance(self, state: ParameterState, T: Any, F: Any, *, absorb: bool = True) -> ParameterState:
         """The state at the end of the day of some records; of the next day if there are none."""
-        step = pd.tseries.frequencies.to_offset(self.records.freq)
         if not len(F):
-            return self._step(replace(state, day=state.day + step, weather=np.nan), None, absorb)
+            day = pd.date_range(state.day, periods=2, freq=self.records.freq)[1]  # also where clocks change
+            return self._step(replace(state, day=day, weather=np.nan), None, absorb)
         days = pd.date_range(state.day, F.index.max(), freq=self.records.freq)[1:]
         if not len(days) or F.index.min() < days[0]:
             raise ValueError(f"records begin at {F.index.min()}; expected times after the day of {state.day:%Y-%m-%d}")
@@ -287,7 +288,8 @@ class ParameterFilter:
         """One day further; what is not learned from has no effect but on the distance."""
         n = len(self.members)
         length = length_of(self.records.freq)
-        steps = DailySteps(length, WALK**2 * length * np.eye(n), self.noise.memory, self.noise.renewal)
+        walk, turn = (deviation**2 * length * np.eye(n) for deviation in (WALK, TURN))
+        steps = DailySteps(length, walk, turn, self.noise.memory, self.noise.renewal)
         predicted = steps.predict(State(state.mean, state.covariance))
         if day is None or not len(day.values):
             return replace(state, mean=predicted.mean, covariance=predicted.covariance, distance=np.nan, n_modes=0)

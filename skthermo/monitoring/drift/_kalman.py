@@ -44,12 +44,13 @@ class DailySteps:
     """How states go from one day to the next.
 
     The states are levels, a slope of each, constants, and disturbances. Levels walk at random with covariance ``walk``
-    a day, and by their slopes times ``length``; disturbances fade by the factors ``memory`` and are renewed with
-    covariance ``renewal``.
+    a day, and by their slopes times ``length``; slopes walk with covariance ``turn``; disturbances fade by the factors
+    ``memory`` and are renewed with covariance ``renewal``.
     """
 
     length: float
     walk: Array
+    turn: Array
     memory: Array
     renewal: Array
 
@@ -66,6 +67,7 @@ class DailySteps:
             covariance[:n] += self.length * covariance[n : 2 * n]
             covariance[:, :n] += self.length * covariance[:, n : 2 * n]
             covariance[:n, :n] += self.walk
+            covariance[n : 2 * n, n : 2 * n] += self.turn
         mean[-fading:] *= self.memory
         covariance[-fading:] *= self.memory[:, np.newaxis]
         covariance[:, -fading:] *= self.memory

@@ -114,6 +114,8 @@ def track_parameters(
     if not is_real(significance) or not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
     random = as_random_state(random_state)
+    order = np.argsort(F.index, kind="stable")
+    T, F = T.iloc[order], F.iloc[order]
     records = DailyRecords.of(fem, T, freq)
     daily = with_enough_days(records.means(T, F, calendar(F.index, freq)), fem.mode_names_)
     effects = GroupEffects.of(fem, T, F, groups)
@@ -148,7 +150,7 @@ def mode_trends(daily: DailyMeans, noise: DailyNoise, slopes: Array, freq: str) 
     covariance = np.diag(np.append(np.tile(deviations**2, n_modes), np.zeros(n_modes)))
     covariance[-n_modes:, -n_modes:] = noise.stationary
     days = [observation(wide, number, noise, none) for number in range(len(daily.days))]
-    steps = DailySteps(length_of(freq), np.zeros((0, 0)), noise.memory, noise.renewal)
+    steps = DailySteps(length_of(freq), np.zeros((0, 0)), np.zeros((0, 0)), noise.memory, noise.renewal)
     state = steps.filtered(State(np.zeros(len(covariance)), covariance), days)
     places = (np.arange(n_modes)[:, np.newaxis] * (size + N_SHAPES) + size + np.arange(N_SHAPES)).ravel()
     years = (len(daily.days) - 1) * length_of(freq)
@@ -176,7 +178,8 @@ class Followed:
         covariance = np.diag(np.repeat([0.0, ANY_RATE**2, MISLEARNED**2, 0.0], [n, n, n_modes * size, n_modes]))
         covariance[-n_modes:, -n_modes:] = self.noise.stationary
         days = [observation(self.daily, number, self.noise, slopes) for number in range(len(self.daily.days))]
-        steps = DailySteps(self.length, walk**2 * self.length * np.eye(n), self.noise.memory, self.noise.renewal)
+        steady, walks = np.zeros((n, n)), walk**2 * self.length * np.eye(n)
+        steps = DailySteps(self.length, walks, steady, self.noise.memory, self.noise.renewal)
         means, covariances, end = steps.smoothed(State(np.zeros(len(covariance)), covariance), days)
         deviations = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
         return [

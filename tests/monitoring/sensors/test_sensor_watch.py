@@ -121,11 +121,12 @@ def test_damage_is_not_taken_for_a_fault(watch, records, lost):
     pd.testing.assert_frame_equal(watch.masked(state, T, F)[1], F)
 
 
-def test_where_most_thermometers_depart_none_is_left_out(watch, records):
+@pytest.mark.parametrize("moved", [[6.0, -6.0, 20.0], [-6.0, 20.0, 20.0], [25.0, 25.0, 25.0]])
+def test_where_most_thermometers_depart_none_is_left_out(watch, records, moved):
     T = records[0].copy()
-    T.loc[after(T), ["T0", "T1", "T2"]] += [6.0, -6.0, 20.0]
+    T.loc[after(T), ["T0", "T1", "T2"]] += moved
     state = service(watch, T, records[1], 30)
-    assert set(watch.faults(state)["kind"]) == {"disagree"}
+    assert set(watch.faults(state)["kind"]) <= {"disagree"}
     pd.testing.assert_frame_equal(watch.masked(state, T, records[1])[0], T)
 
 
