@@ -22,6 +22,15 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
+        ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
+    ],
+    ("monitoring/_judge.py", "monitoring/test_monitor.py"): [
+        ("indices that are not computed alone at an edge", "np.flatnonzero(from_edge <=", "np.flatnonzero(from_edge < -"),
+    ],
+    ("monitoring/_course.py", "monitoring/test_monitor.py"): [
+        ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
+    ],
     ("monitoring/retraining/_harvest.py", "monitoring/test_retraining.py"): [
         ("records of an event train", "kept &= ~inside", "kept &= True"),
         ("records before an event train", "event.start - margin", "event.start"),
@@ -49,7 +58,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
     ],
     ("monitoring/sensors/_modes.py", "monitoring/sensors/test_sensor_watch.py"): [
-        ("damage taken for exchanged modes", "if is_far and is_near", "if is_near"),
+        ("damage taken for exchanged modes", "if is_near else", "if True else"),
     ],
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),

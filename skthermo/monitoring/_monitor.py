@@ -524,46 +524,55 @@ class Monitor(SavesFrames, Estimator):
     @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
+        check_is_fitted(self)
         return self.store_.baseline
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
+        check_is_fitted(self)
         return self.store_.kept
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
+        check_is_fitted(self)
         return self.course_.corrected.loc[self.records_.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
+        check_is_fitted(self)
         return self.store_.last
 
     @property
     def judged_(self) -> pd.DataFrame:
         """The latest judgement of each record that is kept."""
+        check_is_fitted(self)
         return self.course_.judged
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
+        check_is_fitted(self)
         return self.course_.days
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
+        check_is_fitted(self)
         return event_table(self.course_.log.events, self.said_, self.baseline_.index.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
+        check_is_fitted(self)
         return self.bench_.stages.faults(self.course_.stages)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
+        check_is_fitted(self)
         return self.bench_.stages.drifts(self.course_.stages)
 
     def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:

@@ -16,7 +16,6 @@ from skthermo.monitoring.sensors._thermometers import local_days
 ABSURD = 0.25  # change of a frequency, as a logarithm, that no damage gives to one mode alone
 UNMOVED = 0.05  # median of the changes of all modes up to which one moves alone
 FEWEST = 3  # modes of which one can be told to move alone
-FAR = 4.0  # daily deviations by which both modes are away from their places
 NEARER = 0.5  # distance of both from their places when exchanged, over that as they are
 CERTAIN = 20.0  # logarithm of the odds that two modes are exchanged
 LARGEST = 50.0  # logarithm of the odds that one record may add
@@ -80,8 +79,8 @@ class Modes:
     def odds_of_exchange(self, rest: Array, expected: Array) -> Array:
         """Logarithm of the odds that a day's values of each pair are exchanged, against their being in place.
 
-        Modes are exchanged only where the lower column rises and the upper one falls, by about their distance: no
-        damage does that, and the odds are as bad as they can be otherwise.
+        Modes are exchanged only where both come much nearer to their places by it: the lower column has risen and the
+        upper one fallen, by about their distance. No damage does that, and the odds are as bad as can be otherwise.
         """
         today, places = median(rest), median(expected)
         found = np.zeros(len(self.pairs()))
@@ -93,9 +92,8 @@ class Modes:
             here = today[both] / self.deviations[both]
             exchanged = np.array([today[second] + gap, today[first] - gap]) / self.deviations[both]
             odds = (here @ here - exchanged @ exchanged) / 2
-            is_far = (np.sign(gap) * here * [1, -1] > FAR).all()
             is_near = (np.abs(exchanged) < NEARER * np.abs(here)).all()
-            found[pair] = min(odds, LARGEST) if is_far and is_near else -LARGEST
+            found[pair] = min(odds, LARGEST) if is_near else -LARGEST
         return found
 
 
