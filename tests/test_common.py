@@ -31,6 +31,7 @@ from skthermo.detection import (
     TemperatureCompensator,
     WindowedAlarm,
 )
+from skthermo.monitoring import Monitor
 from skthermo.preprocessing import BiasAligner, HampelFilter, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
@@ -178,6 +179,12 @@ BOUND = [  # estimators and what they learn from
     (ModeTracker((NOMINAL, SHAPES)), ()),
 ]
 STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0)
+MONITOR = Monitor(MahalanobisDetector(), targets=["f1", "f2"])  # takes frames on a DatetimeIndex only
+YEAR = pd.DataFrame(
+    np.random.default_rng(0).normal([10, 4, 9], 0.1, (400, 3)),
+    index=pd.date_range("2025", periods=400),
+    columns=["T1", "f1", "f2"],
+)
 
 
 def fitted(estimator, *data):
@@ -220,14 +227,15 @@ def test_every_estimator_is_listed():
     rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
     public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
     estimators = {thing for thing in public if isinstance(thing, type) and issubclass(thing, BaseEstimator)}
-    listed = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY]
+    listed = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR]
     assert estimators == {type(estimator) for estimator in listed}
 
 
 @pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 def test_fitted_state_has_a_trailing_underscore():
     cases = [(estimator, fitted(estimator, RECORDS)) for estimator in TRANSFORMERS_AND_DETECTORS]
-    cases += [(estimator, fitted(estimator, *data)) for estimator, data in BOUND] + [(STUDY, run(STUDY))]
+    cases += [(estimator, fitted(estimator, *data)) for estimator, data in BOUND]
+    cases += [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR))]
     wrong = []
     for estimator, fit in cases:
         state = set(vars(fit)) - set(vars(estimator))
@@ -257,7 +265,7 @@ NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|warn_
 
 
 def test_every_method_says_that_the_estimator_is_not_fitted():
-    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY]
+    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR]
     wrong = []
     for kind in {type(estimator): estimator for estimator in estimators}.values():
         for name in dir(type(kind)):
@@ -265,8 +273,10 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
                 continue
             try:
                 member = getattr(clone(kind), name)
-                needed = inspect.signature(member).parameters.values() if callable(member) else ()
-                member(*[T for one in needed if one.default is one.empty and one.kind is one.POSITIONAL_OR_KEYWORD])
+                given = inspect.signature(member).parameters.values() if callable(member) else ()
+                needed = [one for one in given if one.default is one.empty]
+                by_name = {one.name: True for one in needed if one.kind is one.KEYWORD_ONLY}
+                member(*[T for one in needed if one.kind is one.POSITIONAL_OR_KEYWORD], **by_name)
                 wrong.append(f"{type(kind).__name__}.{name} needs no fit")
             except NotFittedError:
                 pass

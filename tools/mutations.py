@@ -22,6 +22,26 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
+        ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
+    ],
+    ("monitoring/_judge.py", "monitoring/test_monitor.py"): [
+        ("indices that are not computed alone at an edge", "np.flatnonzero(from_edge <=", "np.flatnonzero(from_edge < -"),
+    ],
+    ("monitoring/_course.py", "monitoring/test_monitor.py"): [
+        ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
+    ],
+    ("monitoring/retraining/_harvest.py", "monitoring/test_retraining.py"): [
+        ("records of an event train", "kept &= ~inside", "kept &= True"),
+        ("records before an event train", "event.start - margin", "event.start"),
+    ],
+    ("monitoring/retraining/_shift.py", "monitoring/test_retraining.py"): [
+        ("a change that is never real", "self.is_real and self.size > MATTERS", "self.is_real and self.size > 100"),
+    ],
+    ("monitoring/retraining/_new_level.py", "monitoring/test_retraining.py"): [
+        ("the wrong way to the new level", "(1 + self.table", "(1 - self.table"),
+        ("old weeks that never fade", "moved[kept]", "moved"),
+    ],
     ("monitoring/drift/_follower.py", "monitoring/test_drift_follower.py"): [
         ("follower learns from sudden changes", "absorb=not sudden[0]", "absorb=True"),
         ("follower takes out doubtful drift", "(by_chance / distance) ** 2, 0.0)", "0 * by_chance, 0.0)"),
@@ -32,6 +52,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
+    ],
+    ("monitoring/sensors/_changes.py", "monitoring/sensors/test_changes.py"): [
+        ("weather that the baseline does not have", "1 / BEYOND**2", "1e12"),
+        ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
+    ],
+    ("monitoring/sensors/_modes.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("damage taken for exchanged modes", "if is_near else", "if True else"),
+    ],
+    ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
+        ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
     ],
     ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
@@ -346,6 +376,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/comparison/_agreement.py", "plotting/test_comparison.py"): [
         ("measured rates outside their bands", '(rows["inside"] == 0)', '(rows["inside"] == 2)'),
         ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
+    ],
+    ("reporting/service/_standing.py", "reporting/test_service.py"): [
+        ("silence called healthy", "return self.now - self.last > self.step + LATE", "return False"),
+        ("much lost stiffness called healthy", "return ATTENTION if said == HEALTHY and self.worn else", "return"),
+    ],
+    ("plotting/_monitor.py", "plotting/test_monitor.py"): [
+        (
+            "days without records that nobody sees",
+            'pd.date_range(days.index[0], days.index[-1], freq="D")',
+            "days.index",
+        ),
     ],
     ("reporting/_choice.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),

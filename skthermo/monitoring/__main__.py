@@ -108,7 +108,7 @@ def _update(options: argparse.Namespace) -> int:
 def _status(options: argparse.Namespace) -> int:
     """Say how things stand; the file is whole at any time, and needs no lock to be read."""
     monitor = load_monitor(options.monitor)
-    print("\n".join([*_standing(monitor), "", monitor.summary()]))
+    print(monitor.summary())
     return _reported(monitor, options, CODES[monitor.state()])
 
 

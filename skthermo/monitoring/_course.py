@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo._saved_frames import SavesFrames
-from skthermo.monitoring._days import days_of
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import EventLog
 from skthermo.monitoring._judge import Judge
@@ -82,7 +81,7 @@ class Course(SavesFrames):
         start = bench.judge.memory.start(times, len(times), int(times[-1]) + 1)
         nothing = nothing_judged(baseline.index[:0])
         checkpoint = Checkpoint(end.normalize(), bench.stages.start(), log)
-        return cls(bench.plausible.cleaned(baseline)[0].iloc[start:], (checkpoint,), log, nothing, days_of(nothing))
+        return cls(bench.plausible.cleaned(baseline)[0].iloc[start:], (checkpoint,), log, nothing, _days_of(nothing))
 
     @property
     def stages(self) -> StageState:
@@ -165,7 +164,7 @@ class Course(SavesFrames):
         self, stages: Stages, days: Sequence[pd.Timestamp], states: Sequence[StageState], answers: pd.DataFrame
     ) -> pd.DataFrame:
         """Daily summaries, those of some days anew."""
-        new = days_of(answers)
+        new = _days_of(answers)
         if stages.drift is not None:
             by_day = dict(zip(days, states, strict=True))
             shares = pd.DataFrame({day: stages.drifts(by_day[day])["taken_out"] for day in new.index}).T
@@ -228,3 +227,23 @@ def _answers(
         "event": np.where(judged, event, 0),
     }
     return pd.DataFrame(table, stamps)
+
+
+def _days_of(answers: pd.DataFrame) -> pd.DataFrame:
+    """A row for each calendar day that has records, from the judgements of all of them in order of time.
+
+    ``n_records``, of which ``n_judged`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if none is judged.
+    """
+    day = answers.index.normalize()
+    starts = np.flatnonzero(np.append(True, day[1:] != day[:-1])) if len(day) else np.empty(0, dtype=np.intp)
+    stops = np.append(starts, len(day))[1:]
+    index, is_alarm = answers["index"].to_numpy(), (answers["state"] == "alarm").to_numpy()
+    known = [index[start:stop][~np.isnan(index[start:stop])] for start, stop in zip(starts, stops, strict=True)]
+    table = {
+        "n_records": stops - starts,
+        "n_judged": np.array([len(values) for values in known], dtype=np.int64),
+        "n_alarms": np.array([is_alarm[a:b].sum() for a, b in zip(starts, stops, strict=True)], dtype=np.int64),
+        "index_median": np.array([np.median(values) if len(values) else np.nan for values in known], dtype=float),
+        "index_max": np.array([values.max() if len(values) else np.nan for values in known], dtype=float),
+    }
+    return pd.DataFrame(table, day[starts].rename("day"))

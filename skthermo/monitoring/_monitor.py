@@ -32,6 +32,7 @@ from skthermo.monitoring._course import Bench, Course, nothing_judged
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
 from skthermo.monitoring._files import versions, write_monitor
+from skthermo.monitoring._in_words import in_words
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
@@ -41,7 +42,6 @@ from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
-MOST_EVENTS = 5  # in a summary
 MOST_CAUSES = 3  # in a warning
 
 
@@ -368,7 +368,7 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If records lack columns.
+            If the records are not as `update` expects them.
 
         Notes
         -----
@@ -383,6 +383,10 @@ class Monitor(SavesFrames, Estimator):
         only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
         """
         check_is_fitted(self)
+        if records is not None:
+            records = self.bench_.plausible.cleaned(
+                read_records(records, self.baseline_.columns, self.baseline_.index.tz)
+            )[0]
         retraining = retrained(self, records, until=until, force=check_flag(force, "force"), limit=self._limit)
         if retraining.accepted:
             self._take_over(retraining)
@@ -406,7 +410,7 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If no record of the baseline is from before ``since``.
+            If no record of the baseline is from before ``since``, or none of those is needed any more.
 
         Notes
         -----
@@ -507,75 +511,60 @@ class Monitor(SavesFrames, Estimator):
             State, records, events, sensors and drift.
         """
         check_is_fitted(self)
-        lines = [f"State: {self.state()} ({self.last_})" if len(self.records_) else "No record since the baseline."]
-        counts = self.counts_
-        lines.append(
-            f"Records: {counts['n_records']} since {self.baseline_.index[-1]}, {counts['n_not_judged']} not judged, "
-            f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_repeated']} repeated."
-        )
-        lines.append(
-            f"Damage events open above {self.threshold_:.4g} and close at or below {self.release_:.4g}; a healthy "
-            f"structure has {self.promise_.expected:.3g} a year on average, {self.promise_.lowest} to "
-            f"{self.promise_.highest} in a single one."
-        )
-        events = self.events_
-        if not len(events):
-            lines.append("Events: none.")
-        for number, event in events.iloc[-MOST_EVENTS:].iterrows():
-            lines.append(f"Event {number}: {_event_in_words(event)}.")
-        if len(events) > MOST_EVENTS:
-            lines.append(f"{len(events) - MOST_EVENTS} earlier events are in events_.")
-        for _, fault in self.faults_[self.faults_["until"].isna()].iterrows():
-            lines.append(f"Sensor {fault['column']}: {fault['kind']} since {fault['since']}.")
-        drift = self.drift_
-        if drift is not None:
-            for group, one in drift[drift["significant"]].iterrows():
-                lines.append(f"Drift of {group}: {one['change']:+.1%} so far, {one['per_year']:+.2%} a year.")
-        return "\n".join(lines)
+        return in_words(self)
 
     @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
+        check_is_fitted(self)
         return self.store_.baseline
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
+        check_is_fitted(self)
         return self.store_.kept
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
+        check_is_fitted(self)
         return self.course_.corrected.loc[self.records_.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
+        check_is_fitted(self)
         return self.store_.last
 
     @property
     def judged_(self) -> pd.DataFrame:
         """The latest judgement of each record that is kept."""
+        check_is_fitted(self)
         return self.course_.judged
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
+        check_is_fitted(self)
         return self.course_.days
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
+        check_is_fitted(self)
         return event_table(self.course_.log.events, self.said_, self.baseline_.index.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
+        check_is_fitted(self)
         return self.bench_.stages.faults(self.course_.stages)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
+        check_is_fitted(self)
         return self.bench_.stages.drifts(self.course_.stages)
 
     def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:
@@ -634,14 +623,6 @@ def _warn_of_not_judged(answers: pd.DataFrame) -> None:
         f"{more}",
         "records not judged",
     )
-
-
-def _event_in_words(event: pd.Series) -> str:
-    until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
-    said = f", acknowledged as {'harmless' if event['harmless'] else 'not harmless'}" if event["acknowledged"] else ""
-    note = f" ({event['note']})" if event["note"] else ""
-    peak = f"highest index {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode alone'}"
-    return f"{event['kind']} from {event['start']} {until}, {peak}{said}{note}"
 
 
 def _duration(value: Any, name: str) -> pd.Timedelta:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from skthermo._arrays import Array
 from skthermo.plotting._axes import Axes, date_axis, figure_legend, panels
 from skthermo.plotting._limits import hold_outliers, mark_unjudged
 from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, line_style, marker_style, pyplot, shortened
@@ -38,10 +39,8 @@ class MonitorDisplay:
     Parameters
     ----------
     index : DataFrame
-        On a ``DatetimeIndex``, a row for each record or day: ``index`` (NaN where none was judged), ``is_alarm`` and,
-        of days, ``median``.
-    threshold : float
-        A damage index above it is an alarm.
+        On a ``DatetimeIndex``, a row for each record or day: ``index`` (NaN where none was judged), ``is_alarm``,
+        ``threshold`` (an event begins above it) and, of days, ``median``.
     events : DataFrame
         ``kind``, ``start``, ``end`` (NaT while it is open) and ``harmless``.
     drift : DataFrame
@@ -64,7 +63,7 @@ class MonitorDisplay:
     points_ : list of Line2D
         Records or days that are not in alarm, and those in alarm.
     threshold_line_ : Line2D or None
-        Threshold.
+        Threshold, in steps where a new detector has taken over.
     event_spans_ : list of Polygon
         Shades of events.
     drift_lines_ : list of Line2D
@@ -90,7 +89,6 @@ class MonitorDisplay:
     """
 
     index: pd.DataFrame
-    threshold: float
     events: pd.DataFrame
     drift: pd.DataFrame
     drift_errors: pd.Series
@@ -154,7 +152,8 @@ class MonitorDisplay:
         if absent or not asked:
             raise ValueError(f"parts are {asked}; expected some of {[part for part in PARTS if shown[part]]}")
         events = _overlapping(monitor.events_, "start", "end", index.index)
-        return cls(index, float(monitor.threshold_), events, drift, errors, faults, asked).plot(**options)
+        index = index.assign(threshold=_thresholds(monitor, index.index, pd.Timedelta("1D" if by == "day" else "1ns")))
+        return cls(index, events, drift, errors, faults, asked).plot(**options)
 
     def plot(self, ax: Axes = None) -> MonitorDisplay:
         """Draw into axes.
@@ -214,12 +213,16 @@ class MonitorDisplay:
             if rows.any() or colour == BLUE:
                 self.points_ += ax.plot(x[rows], index[rows], **style, label=label)
         mark_unjudged(ax, {"": x[np.isnan(index)]}, "day" if is_daily else "")
+        threshold = self.index["threshold"].to_numpy()
         style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold of an alarm"}
-        self.threshold_line_ = ax.axhline(self.threshold, **style)
+        if (threshold == threshold[0]).all():
+            self.threshold_line_ = ax.axhline(threshold[0], **style)
+        else:
+            self.threshold_line_ = ax.plot(x, threshold, drawstyle="steps-post", **style)[0]
         ax.set_ylim(bottom=0)
         if np.isfinite(index).any():
-            hold_outliers(ax, keep=(0.0, self.threshold))
-        ax.set_ylim(top=max(ax.get_ylim()[1], 1.1 * self.threshold))
+            hold_outliers(ax, keep=(0.0, threshold.max()))
+        ax.set_ylim(top=max(ax.get_ylim()[1], 1.1 * threshold.max()))
         ax.set_ylabel("damage index")
 
     def _draw_drift(self, ax: Axes) -> None:
@@ -282,6 +285,16 @@ def _by_day(days: pd.DataFrame) -> pd.DataFrame:
 
 def _by_record(judged: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame({"index": judged["index"], "is_alarm": judged["state"] == "alarm"})
+
+
+def _thresholds(monitor: Any, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:
+    """Threshold at the end of records or days of this length; before what is kept, the earliest known."""
+    judged = getattr(monitor, "judged_", None)
+    if judged is None or not len(judged):
+        return np.full(len(times), float(monitor.threshold_))
+    known, stamps = judged["threshold"].to_numpy(dtype=float), judged.index.as_unit("ns").asi8
+    places = np.searchsorted(stamps, (times.as_unit("ns") + length).asi8) - 1
+    return known[np.clip(places, 0, None)]
 
 
 def _overlapping(table: pd.DataFrame, begin: str, end: str, times: pd.DatetimeIndex) -> pd.DataFrame:

@@ -23,7 +23,7 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._weather_regression import NORMAL, WeatherRegression, robust_deviation
+from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
 from skthermo.preprocessing._stamps import as_duration
 
 LEAST_WINDOW = 3  # rows

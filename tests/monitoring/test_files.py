@@ -16,7 +16,9 @@ from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 
+from skthermo.datasets import make_truss
 from skthermo.monitoring import load_monitor
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
 
 ENDINGS = ("joblib", "skops")
@@ -67,7 +69,25 @@ def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
     assert_same_course(loaded, monitor)
 
 
-@each_form
+@pytest.mark.parametrize("ending", ["skops"])
+def test_drift_and_faulty_sensors_go_on_where_they_stopped(records, path):
+    baseline, targets = records[:FIRST], [name for name in records if name.startswith("f")]
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=200, noise=0.01, refine=10)
+    fem = DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(LinearRegression()), random_state=0)
+    monitor = fitted_monitor(records, fem=fem.fit(baseline.drop(columns=targets), baseline[targets]))
+    records = records[FIRST : FIRST + 20].copy()
+    records.iloc[2:, 0] = 20.0
+    monitor.update(records[:15])
+    assert set(monitor.faults_["column"]) == {records.columns[0]}
+    monitor.save(path)
+    loaded = load_monitor(path)
+    for one in (monitor, loaded):
+        one.update(records[15:])
+    pd.testing.assert_frame_equal(loaded.drift_, monitor.drift_, check_exact=True)
+    assert_same_course(loaded, monitor)
+
+
+@pytest.mark.parametrize("ending", ["skops"])
 def test_a_time_zone_comes_back(records, path):
     zoned = records.tz_localize("Europe/Brussels")
     monitor = fitted_monitor(zoned)

@@ -200,6 +200,17 @@ def test_a_refit_goes_on_with_a_new_baseline_and_old_weeks_fade(renewed, records
     assert monitor.prior_ is None
 
 
+def test_a_second_intervention_begins_from_the_first(renewed, records):
+    monitor = deepcopy(renewed[0])
+    both = joined(make_truss_campaign(2, damage={"diagonal": -0.15, "bottom": -0.2}, random_state=0))
+    quietly(monitor.update, both[YEAR + 21 : YEAR + 51])
+    found = quietly(monitor.begin_again, both.index[YEAR + 21])
+    truth = both.mean() / records["repaired"].mean() - 1
+    assert (np.abs(found.table["change"] - truth[found.table.index]) < 4 * found.table["standard_error"]).all()
+    assert monitor.state() == "healthy"
+    assert (found.baseline.index >= found.since).sum() == 30
+
+
 def test_a_new_baseline_needs_every_mode_and_something_before(monitor, records):
     repaired = records["repaired"][YEAR : YEAR + 20].assign(f3=np.nan)
     quietly(monitor.update, repaired)

@@ -46,6 +46,15 @@ def test_records_in_alarm_have_a_colour_and_a_marker_of_their_own():
     np.testing.assert_array_equal(alarm.get_ydata(), monitor.judged_["index"].iloc[-5:])
 
 
+def test_a_new_threshold_is_a_step_on_the_day_of_its_first_record():
+    monitor = FakeMonitor(freq="12h", n_days=60)
+    monitor.judged_.loc[monitor.judged_.index[31:], "threshold"] = 5.0  # from noon of the sixteenth day
+    steps = MonitorDisplay.from_estimator(monitor).threshold_line_.get_ydata()
+    np.testing.assert_array_equal(steps, [3.0] * 15 + [5.0] * 15)
+    steps = MonitorDisplay.from_estimator(monitor, by="record").threshold_line_.get_ydata()
+    np.testing.assert_array_equal(steps, monitor.judged_["threshold"])
+
+
 def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis():
     rows = [
         event_row("2025-02-01", "2025-02-08"),

@@ -66,6 +66,7 @@ class FakeMonitor:
         self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
         self.targets_, self.threshold_, self.release_ = ["f1", "f2"], 3.0, 2.0
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
+        self.trained_, self.since_ = self.baseline_, None
         self.counts_ = {"n_records": len(stamps), "n_not_judged": int((~known).sum()), "n_repeated": 2}
         rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
         self.promise_ = SimpleNamespace(

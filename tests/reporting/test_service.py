@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._changes import drift, drift_sentences, sensors
 from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import unjudged
+from skthermo.reporting.service._sections import introduction, unjudged
 from skthermo.reporting.service._standing import Standing
 from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
@@ -29,13 +29,13 @@ SECTIONS = ["today", "events", "index", "drift", "sensors", "unjudged", "promise
 SPACE = "\xa0"
 
 
-def standing_of(monitor, now=None):
+def standing_of(monitor, now=None, limit=0.1):
     """A monitor five hours after its newest record, unless another time is given."""
-    return Standing.of(monitor, monitor.last_ + pd.Timedelta("5h") if now is None else now)
+    return Standing.of(monitor, monitor.last_ + pd.Timedelta("5h") if now is None else now, limit)
 
 
 def today_of(monitor, now=None):
-    return Page(today(standing_of(monitor, now), limit=0.1))
+    return Page(today(standing_of(monitor, now)))
 
 
 def headline(page):
@@ -154,6 +154,13 @@ def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
     assert page.cells == [str(number), "2"]
 
 
+def test_a_new_baseline_after_a_change_of_the_structure_is_said():
+    monitor = FakeMonitor()
+    assert len(introduction(monitor)) == 1
+    monitor.since_ = pd.Timestamp("2024-12-20")
+    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in introduction(monitor)[1]
+
+
 def test_stiffening_is_reported_and_is_no_alarm():
     monitor = FakeMonitor(events=[event_row("2025-06-10", None, kind="stiffening")])
     page = today_of(monitor)
@@ -191,27 +198,49 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
         },
         ["deck", "piers"],
     )
-    standing = standing_of(FakeMonitor(drift=found))
-    (said,) = drift_sentences(standing, 0.1)
-    loss = f"deck has lost 2.0{SPACE}% (± 0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
+    monitor = FakeMonitor(drift=found)
+    standing = standing_of(monitor)
+    (said,) = drift_sentences(standing)
+    loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert said.startswith(loss)
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
     assert said.endswith(f"{reached} {years[0.008]}).")
-    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing, 0.015)[0]
-    page = Page(drift(standing, 0.1))
+    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[0]
+    page = Page(drift(standing))
     assert said in page.text
     assert len(page.drawings()) == 1
     assert page.cells[2::3] == ["yes", "no"]
 
     def sentence(**changed):
-        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))), 0.1)[0]
+        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[0]
 
     assert sentence(per_year_error=0.01).endswith("at the earliest).")
     assert sentence(significant=False) == "No drift beyond its error."
     assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
     assert "reached" not in sentence(per_year=0.01)
     assert "more than 100 years" in sentence(per_year=-1e-4)
+
+
+@pytest.mark.parametrize("significant", [True, False])
+def test_no_structure_is_healthy_that_has_lost_much_stiffness_slowly(significant):
+    columns = {"change": [-0.12], "standard_error": [0.01], "per_year": [-0.01], "per_year_error": [0.001]}
+    drift = pd.DataFrame(columns, ["deck"]).assign(significant=significant)
+    page = today_of(FakeMonitor(drift=drift))
+    assert state_of(page) == ("attention" if significant else "healthy")
+    assert (f"deck has lost 10{SPACE}% or more of the stiffness" in page.text) == significant
+    page = today_of(FakeMonitor(drift=drift, events=[event_row("2025-06-10", None)]))
+    assert state_of(page) == "alarm"
+
+
+def test_silence_of_the_sensors_longer_than_what_is_kept():
+    monitor = FakeMonitor(n_days=900, n_unjudged=500)
+    since = monitor.days_.index[400]
+    assert since < monitor.judged_.index[0]
+    assert headline(today_of(monitor)) == f"Not judged since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    n_kept = len(monitor.judged_)
+    text = Page(unjudged(standing_of(monitor))).text
+    assert f"Why {500 - n_kept} of them, which are older, were not judged is no longer kept." in text
 
 
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
@@ -229,6 +258,9 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
     assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
     assert "Mode f2" not in page.text
     assert "is swapped with another" in page.cells
+    seen = [event_row("2025-03-03", "2025-03-09", note="cold"), event_row("2025-03-20", "2025-03-21")]
+    notes = Page(events(standing_of(FakeMonitor(faults=faults, events=seen)))).text
+    assert notes.count("failed at that time") == notes.count("cold; T1 failed at that time") == 1
     assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text
     assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
 
@@ -248,7 +280,7 @@ def test_time_zones_and_the_clock():
     assert state_of(today_of(monitor)) == "alarm"
     utc = (monitor.last_ + pd.Timedelta("5h")).tz_convert("UTC")
     assert state_of(today_of(monitor, utc)) == "alarm"
-    assert state_of(Page(today(Standing.of(monitor), 0.1))) == "alarm"  # by the clock, long after
+    assert state_of(Page(today(Standing.of(monitor)))) == "alarm"  # by the clock, long after
     with pytest.raises(ValueError, match="expected a time without a time zone"):
         today_of(FakeMonitor(), utc)
     with pytest.raises(ValueError, match="now is 'soon'; expected a time"):

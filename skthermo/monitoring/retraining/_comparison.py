@@ -17,7 +17,7 @@ from skthermo.monitoring.retraining._blocks import block_mean, blocks_of
 
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
 STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
-CLEAR = 2.0  # standard errors from which a difference is one
+CLEAR = 3.0  # standard errors from which a difference is one
 WORSE = np.log(1.1)  # of the smallest change found, from which it counts
 FALSE, SMALLEST = "records above the threshold", "smallest change found"  # rows that decide
 

@@ -31,7 +31,9 @@ Limit = Callable[[BaseEstimator, pd.DataFrame], float]
 class Retraining:
     """A detector that has learned anew, and whether it takes over.
 
-    Attributes
+    `Monitor.refit` and `Monitor.begin_again` give it.
+
+    Parameters
     ----------
     kind : {"refit", "new baseline"}
         Whether more records joined the baseline, or a new one began after an intervention.
@@ -62,6 +64,30 @@ class Retraining:
     shift : DataFrame or None
         For a refit, by mode: ``change`` of frequencies, relative, that weather does not explain between the baseline
         and the new records, its ``standard_error``, and the same ``per_year`` and ``per_year_error`` over all of them.
+
+    See Also
+    --------
+    Monitor : A damage detector in service.
+
+    Examples
+    --------
+    A year of records joins the baseline:
+
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+    >>> from skthermo.monitoring import Monitor
+    >>> healthy = make_truss_campaign(2, random_state=0)
+    >>> records = healthy.temperatures.join(healthy.frequencies)
+    >>> compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
+    >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False).fit(records[:365])
+    >>> answers = monitor.update(records[365:])
+    >>> retraining = monitor.refit()
+    >>> print(retraining.summary())
+    Refit: accepted.
+    >>> len(monitor.trained_)
+    730
     """
 
     kind: str
@@ -150,13 +176,18 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = _stamp(since, monitor.trained_.index)
     old, targets, prior = _in_charge(monitor), list(monitor.targets_), monitor.prior_
-    if prior is None or since > monitor.since_:  # another intervention: what is now the baseline is that before it
-        prior = old.baseline[old.baseline.index < since]
+    first = since if monitor.since_ is None else max(since, monitor.since_)
+    if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
+        prior = old.baseline
+    if prior is None:
+        raise ValueError(f"the baseline since {monitor.since_} needs no older records any more; expected refit")
+    prior = prior[prior.index < since]
     if not len(prior):
         raise ValueError(f"since is {since}, but the baseline begins at {old.baseline.index[0]}; expected a later time")
     events = monitor.events_
     damage = events[events["acknowledged"] & ~events["harmless"]]
-    known = pd.concat([old.baseline, _kept(monitor, None)])
+    trained, kept = old.baseline[old.baseline.index >= first], monitor.corrected_
+    known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
     own = harvest.records
     missing = [str(name) for name in targets if not len(own) or own[name].notna().sum() < 2]
@@ -190,11 +221,7 @@ def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
         records = monitor.corrected_
-    columns = list(monitor.trained_.columns)
-    missing = [str(name) for name in columns if name not in records.columns]
-    if missing:
-        raise ValueError(f"records lack the columns {missing}; expected those of fit, {[str(one) for one in columns]}")
-    records = records[columns].sort_index()
+    records = records[list(monitor.trained_.columns)].sort_index()
     known = records.index.isin(monitor.trained_.index)
     return records[~known if monitor.since_ is None else ~known & (records.index >= monitor.since_)]
 

@@ -17,6 +17,7 @@ CLIPPED = 5.0  # standard deviations at which an innovation is clipped: one odd 
 LEAST_DAYS = 2  # with values since an offset began
 LEAST_DRIFT = 7  # with values since a drift began
 MONTH = 30  # days in the means that tell how far a level wanders
+SEASONAL = 0.3  # degrees by which a level, and its course over `LONGEST`, differ from those of the baseline's season
 BEYOND = 1.0  # standard deviation of the error of what new weather moves a prediction by, as a share of that
 MOST_CORRELATED = 0.95  # of neighbouring days
 TESTS_A_DAY = 10.0  # independent ones to which the search over dates and shapes amounts; found by simulation
@@ -27,7 +28,8 @@ HIGHEST = 2.0  # times the lowest threshold, so that a fault of the baseline doe
 class Change(NamedTuple):
     """An offset or a drift: its statistic, first day, size on the last day and rate in a day (0 for an offset).
 
-    ``z`` is robust, so that a few odd days do not make it; ``weight`` is the same without a bound.
+    One of a single day is found only where no longer one is. ``z`` is robust, so that a few odd days do not make it;
+    ``weight`` is the same without a bound.
     """
 
     z: float
@@ -35,6 +37,7 @@ class Change(NamedTuple):
     first: int
     size: float
     rate: float
+    n_days: int
 
 
 class Departures(NamedTuple):
@@ -96,36 +99,42 @@ class DailyNoise:
         largest = 0.0
         for last in range(LONGEST // 4, len(departures.days) + 1, 4):
             change = self.change(departures.rows(slice(max(last - LONGEST, 0), last)))
-            largest = max(largest, change.z if change is not None else 0.0)
+            if change is not None and change.n_days >= LEAST_DAYS:
+                largest = max(largest, change.z)
         return float(np.clip(SAFER * largest, self.limit, HIGHEST * self.limit))
 
     def change(self, departures: Departures) -> Change | None:
         """The most likely offset or drift that still lasts on the last day; None with too few days.
 
         The level before the change is unknown: by as much as it wanders, by the errors of what foretells it, as if days
-        of the baseline were independent, and in new weather by some share of what lies beyond the baseline's.
+        of the baseline were independent, by what seasons differ from year to year, and in new weather by as much as
+        that moves the prediction.
         """
         given = departures.known()
         if len(given.days) < LEAST_DAYS:
             return None
         at, scale = given.days.astype(float), self.scale * given.deviations
-        since = at - at[: 1 - LEAST_DAYS, np.newaxis]
+        since = at - at[:, np.newaxis]
         ramps = np.maximum(since[: max(len(at) + 1 - LEAST_DRIFT, 0)] + 1.0, 0.0)
-        shapes = np.vstack([given.deviations, given.beyond, since >= 0, ramps]) / scale
+        line = 2 * (at - at[0]) / LONGEST - 1
+        shapes = np.vstack([given.deviations, np.ones(len(at)), line, given.beyond, since >= 0, ramps]) / scale
         white = self._whitened(at, np.vstack([given.values / self.scale, shapes]))
-        exact, levels, steps = white[0], white[1:3], white[3:]
+        exact, levels, steps = white[0], white[1:5], white[5:]
         slower = (1 + self.correlation) / (1 - self.correlation)
         unknown = self.wander**2 + slower * self.scale**2 * float(np.median(given.errors))
-        prior = np.diag([1 / max(unknown, 1e-12), 1 / BEYOND**2])
+        prior = np.diag([1 / max(unknown, 1e-12), 1 / SEASONAL**2, 1 / SEASONAL**2, 1 / BEYOND**2])
         evidence = steps - steps @ levels.T @ np.linalg.solve(levels @ levels.T + prior, levels)
         information = np.maximum((steps * evidence).sum(axis=1), 1e-12)
         slopes, roots = evidence @ exact / information, np.sqrt(information)
         weights = np.abs(slopes) * roots
         z = np.abs(evidence @ np.clip(exact, -CLIPPED, CLIPPED)) / roots
-        best = int(np.where(z >= min(self.limit, z.max()), weights, 0.0).argmax())
-        first, is_drift = int(at[best % len(since)]), best >= len(since)
+        lasts = np.tile(np.arange(len(at))[::-1] + 1, 2)[: len(z)]
+        certain = (z > self.limit) & (lasts >= LEAST_DAYS)
+        best = int(np.where(certain | (not certain.any()), weights, 0.0).argmax())
+        first, is_drift = int(at[best % len(at)]), best >= len(at)
         size = slopes[best] * (at[-1] - first + 1) if is_drift else slopes[best]
-        return Change(float(z.max()), float(weights[best]), first, float(size), float(slopes[best] * is_drift))
+        rate = float(slopes[best] * is_drift)
+        return Change(float(z[best]), float(weights[best]), first, float(size), rate, int(lasts[best]))
 
     def for_no_change(self, departures: Departures, expected: float) -> tuple[float, int]:
         """Logarithm of the odds that a change has ended, against its going on as expected, and the day it ended."""

@@ -21,8 +21,9 @@ from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
 A_DEGREE = 1.0  # below which thermometers may depart without a fault
 IMPOSSIBLE = 30.0  # degrees, or the baseline's range, outside that range, which no weather gives
 LEAST_OTHERS = 2  # thermometers that tell which one is at fault
+CLEAR = 4.6  # logarithm of the odds that one thermometer is at fault, against each other one
 ENDED = 7.0  # logarithm of the odds that an offset or a drift has ended
-RECENT = 7  # days that may already be without the fault
+RECENT = 7  # days that may already be without a fault, or not tell yet which thermometer has it
 KINDS_OF_RUNS = {"absurd": ABSURD, "stuck": REPEATED, "dead": MISSING}
 
 
@@ -245,10 +246,15 @@ class SensorWatch:
         return faults.left_out(len(self.sensors) + len(self.modes)) >= 0
 
     def _change(self, state: WatchState, sensor: int) -> Change | None:
-        """The offset or drift of a thermometer that noise does not explain and that matters; None without one."""
-        noise = self.thermometers.noises[sensor]
-        found = noise.change(Departures(state.days, *state.departures[:, :, sensor]))
-        return found if found is not None and found.z > noise.limit and abs(found.size) > A_DEGREE else None
+        """The most likely offset or drift of a thermometer, whatever it amounts to; None with too few days."""
+        departures = Departures(state.days, *state.departures[:, :, sensor])
+        return self.thermometers.noises[sensor].change(departures)
+
+    def _is_fault(self, sensor: int, change: Change | None) -> bool:
+        """Whether noise does not explain a change, and it matters."""
+        if change is None or change.n_days < LEAST_DAYS:
+            return False
+        return change.z > self.thermometers.noises[sensor].limit and abs(change.size) > A_DEGREE
 
     def _without_ended(self, state: WatchState, midnight: int) -> WatchState:
         """Offsets and drifts that have ended are closed; those that last are estimated again."""
@@ -267,7 +273,7 @@ class SensorWatch:
                 state = self._departing(self._forgotten(state, sensor, end))
             elif midnight - told < LONGEST * DAY / 2 and faults.kind[fault] != "disagree":
                 found = self._change(state, sensor)
-                if found is not None:
+                if found is not None and self._is_fault(sensor, found):
                     state = replace(state, faults=faults.with_values(fault, **self._described(found)))
         return state
 
@@ -277,26 +283,35 @@ class SensorWatch:
         return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
 
     def _with_departures(self, state: WatchState, midnight: int) -> WatchState:
-        """Thermometers that depart from the others from now on: the worst first, then without it."""
-        before = state
-        while True:
-            free = np.flatnonzero(self._trusted(state.faults))
-            changes = {sensor: found for sensor in free if (found := self._change(state, sensor)) is not None}
-            if not changes:
-                return self._agreed(state, midnight) if state is not before else state
-            worst = max(changes, key=lambda sensor: changes[sensor].weight)
-            others = [sensor for sensor in free if sensor != worst and not np.isnan(state.means[-1, sensor])]
-            n_departing = 1 + len(state.faults.lasting("offset", "drift"))
-            if len(others) < LEAST_OTHERS or 2 * n_departing >= len(self.sensors):
-                if before.faults.lasting("disagree") or not others:
-                    return before
-                other = max(others, key=lambda sensor: changes[sensor].weight if sensor in changes else 0.0)
-                found = self._described(changes[worst]) | {"kind": "disagree", "rate": 0.0}
-                faults = before.faults.opened(column=int(worst), other=int(other), told=midnight, **found)
-                return replace(before, faults=faults)
-            found = self._described(changes[worst])
-            faults = state.faults.opened(column=int(worst), told=midnight, **found)
-            state = self._departing(replace(state, faults=faults))
+        """A thermometer that departs from the others from now on, at most one a day; or that it cannot be told."""
+        changes = self._changes(state)
+        told = {sensor: found for sensor, found in changes.items() if self._is_fault(sensor, found)}
+        if not told or len(changes) < 2:
+            return state
+        worst = max(told, key=lambda sensor: told[sensor].weight)
+        found = self._described(told[worst])
+        without = self._departing(replace(state, faults=state.faults.opened(column=worst, told=midnight, **found)))
+        left = self._changes(without)
+        also = [sensor for sensor in left if self._is_fault(sensor, left[sensor])]
+        rivals = [
+            sensor
+            for sensor in left
+            if sensor not in also and changes[sensor].weight ** 2 + 2 * CLEAR > told[worst].weight ** 2
+        ]
+        n_departing = 1 + len(also) + len(state.faults.lasting("offset", "drift"))
+        is_clear = len(changes) > LEAST_OTHERS and 2 * n_departing < len(self.sensors)
+        if is_clear and not rivals:
+            return self._agreed(without, midnight)
+        if state.faults.lasting("disagree") or (is_clear and told[worst].n_days < RECENT):
+            return state
+        other = max(set(changes) - {worst}, key=lambda sensor: changes[sensor].weight)
+        found |= {"kind": "disagree", "rate": 0.0}
+        return replace(state, faults=state.faults.opened(column=worst, other=other, told=midnight, **found))
+
+    def _changes(self, state: WatchState) -> dict[int, Change]:
+        """The most likely change of each thermometer that is not left out and has a value."""
+        free = np.flatnonzero(self._trusted(state.faults) & ~np.isnan(state.means[-1]))
+        return {int(sensor): found for sensor in free if (found := self._change(state, sensor)) is not None}
 
     def _agreed(self, state: WatchState, midnight: int) -> WatchState:
         """Thermometers that disagreed do so no longer: the one at fault has been found."""

@@ -9,7 +9,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, spread_evenly
-from skthermo._weather_regression import out_of_fold
+from skthermo.preprocessing._weather_regression import out_of_fold
 
 MOST_ROWS = 4000  # that are predicted for each shift
 FARTHEST = 1 / 4  # of the records, by which they may be shifted

@@ -25,7 +25,7 @@ KINDS = {
 }
 
 
-def drift_sentences(standing: Standing, limit: float) -> list[str]:
+def drift_sentences(standing: Standing) -> list[str]:
     """Change of each group that is beyond its error, its rate, and when it reaches a limit."""
     found = standing.monitor.drift_
     if found is None:
@@ -33,7 +33,7 @@ def drift_sentences(standing: Standing, limit: float) -> list[str]:
     certain = found[found["significant"].astype(bool)]
     if not len(certain):
         return ["No drift beyond its error."]
-    return [_group(name, row, standing.last, limit) for name, row in certain.iterrows()]
+    return [_group(name, row, standing.last, standing.limit) for name, row in certain.iterrows()]
 
 
 def _group(name: Any, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
@@ -48,7 +48,7 @@ def _group(name: Any, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
 
 def _size(value: float, error: float) -> str:
     """A size in percent with two standard errors."""
-    return f"{100 * abs(value):.1f}{SPACE}% (± {percent(N_ERRORS * error, '.1f')})"
+    return f"{100 * abs(value):.1f}{SPACE}% (±{SPACE}{percent(N_ERRORS * error, '.1f')})"
 
 
 def _reached(row: pd.Series, last: pd.Timestamp, limit: float) -> str:
@@ -78,10 +78,10 @@ def _year(last: pd.Timestamp, years: float) -> str:
     return f"{last + years * YEAR:%Y}"
 
 
-def drift(standing: Standing, limit: float) -> Html:
+def drift(standing: Standing) -> Html:
     """Drift by group: in words, as a drawing and in numbers."""
     title, found = "Slow change of the structure", standing.monitor.drift_
-    parts = [bullets(drift_sentences(standing, limit))]
+    parts = [bullets(drift_sentences(standing))]
     if found is not None:
         meaning = (
             "Structures age: parts lose stiffness slowly. The monitor follows this with the model of the structure, "

@@ -6,9 +6,9 @@ from collections.abc import Hashable
 
 import pandas as pd
 
-from skthermo._formatting import counted, duration_text, significant
+from skthermo._formatting import counted, duration_text, listed, significant
 from skthermo.reporting._html import Html, element, paragraphs, section, table
-from skthermo.reporting.service._standing import Standing, moment
+from skthermo.reporting.service._standing import ONE_DAY, Standing, moment
 
 MOST_LISTED = 30  # largest number of events in the table
 COLUMNS = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
@@ -25,12 +25,13 @@ def events(standing: Standing) -> Html:
     text += f", and {others:,} in which the structure was stiffer, which is reported but no damage." if others else "."
     rest = len(known) - MOST_LISTED
     older = f"The table lists the newest {MOST_LISTED}; {rest:,} older ones are in the monitor." if rest > 0 else ""
-    rows = [_cells(number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
+    rows = [_cells(standing, number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
     caption = "Events, the newest first, with the modes that drive each, the worst first, and its number of records."
     return section("events", "Events", paragraphs(text, older), table(caption, COLUMNS, rows, is_cards=True))
 
 
-def _cells(number: Hashable, event: pd.Series) -> list[object]:
+def _cells(standing: Standing, number: Hashable, event: pd.Series) -> list[object]:
+    note = "; ".join(filter(None, [event["note"], _failing(standing, event)]))
     said = "yes, harmless" if event["harmless"] else "yes, not harmless" if event["acknowledged"] else "not yet"
     return [
         f"{number}",
@@ -41,8 +42,19 @@ def _cells(number: Hashable, event: pd.Series) -> list[object]:
         event["modes"] or "none named",
         f"{event['n_alarms']:,}",
         said,
-        element("span", event["note"], class_="text") if event["note"] else "",
+        element("span", note, class_="text") if note else "",
     ]
+
+
+def _failing(standing: Standing, event: pd.Series) -> str:
+    """Sensors that failed in the time of an event, before the monitor had noticed."""
+    faults = standing.monitor.faults_
+    end = standing.last if pd.isna(event["end"]) else event["end"]
+    at_that_time = [
+        fault["since"] <= end and event["start"] < fault["told"] + ONE_DAY for _, fault in faults.iterrows()
+    ]
+    names = sorted({str(name) for name in faults.loc[at_that_time, "column"]}) if any(at_that_time) else []
+    return f"{listed(names)} failed at that time" if names else ""
 
 
 def promise(standing: Standing) -> Html:

@@ -20,23 +20,33 @@ MOST_REASONS = 12  # largest number of reasons in a table
 
 def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, tuple[str, Html]]]:
     """What stands above the sections, and these with their titles."""
-    standing = Standing.of(monitor, now)
-    first, last = (moment(time) for time in monitor.baseline_.index[[0, -1]])
-    n_records = int(monitor.counts_["n_records"])
-    introduction = (
-        f"The monitor compares new records with those of the healthy structure from {first} to {last}. "
-        f"{counted(n_records, 'record')} {'has' if n_records == 1 else 'have'} come since."
-    )
-    return paragraphs(introduction), {
-        "today": ("Today", today(standing, limit)),
+    standing = Standing.of(monitor, now, limit)
+    return paragraphs(*introduction(monitor)), {
+        "today": ("Today", today(standing)),
         "events": ("Events", events(standing)),
         "index": ("Damage index", _index(standing)),
-        "drift": ("Slow change", drift(standing, limit)),
+        "drift": ("Slow change", drift(standing)),
         "sensors": ("Sensors", sensors(standing)),
         "unjudged": ("What was not judged", unjudged(standing)),
         "promise": ("The promise", promise(standing)),
         "settings": ("Settings", _settings(monitor)),
     }
+
+
+def introduction(monitor: Any) -> list[str]:
+    """What the monitor learned from, and how many records have come since."""
+    first, last = (moment(time) for time in monitor.trained_.index[[0, -1]])
+    n_records = int(monitor.counts_["n_records"])
+    sentences = [
+        f"The monitor learned from records of the healthy structure from {first} to {last}, and compares new ones with "
+        f"them. Since the baseline, {counted(n_records, 'record')} {'has' if n_records == 1 else 'have'} come."
+    ]
+    if monitor.since_ is not None:
+        sentences.append(
+            f"The structure was changed: as it is since {moment(monitor.since_)}, it counts as healthy. Older records, "
+            "moved to its new frequencies, stand for weather that has not come since."
+        )
+    return sentences
 
 
 def _index(standing: Standing) -> Html:
@@ -72,7 +82,9 @@ def unjudged(standing: Standing) -> Html:
     without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
     is_unknown = judged["state"] == NOT_JUDGED
     since = f"since {moment(judged.index[0])}" if len(judged) else ""
-    parts = [paragraphs(text, without)]
+    forgotten = unknown - int(is_unknown.sum()) - int(counts.get("n_too_late", 0))
+    older = f"Why {forgotten:,} of them, which are older, were not judged is no longer kept." if forgotten > 0 else ""
+    parts = [paragraphs(text, older, without)]
     caption = f"Why records were not judged: those that are kept, {since}."
     parts.append(_reasons(caption, judged.loc[is_unknown, "reason"].replace("", "no reason given")))
     remarks = judged.loc[~is_unknown, "reason"]

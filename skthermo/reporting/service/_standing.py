@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import SPACE, counted, duration_text
+from skthermo._formatting import SPACE, counted, duration_text, listed, percent
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
-ALARM, HEALTHY, NOT_JUDGED = "alarm", "healthy", "not judged"
+ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not judged"
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A monitor, and the time at which its page is written, in the time zone of the records."""
+    """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss."""
 
     monitor: Any
     now: pd.Timestamp
+    limit: float
 
     @classmethod
-    def of(cls, monitor: Any, now: Any = None) -> Standing:
+    def of(cls, monitor: Any, now: Any = None, limit: float = 0.1) -> Standing:
         """Now is by the clock where no time is given."""
         zone = monitor.last_.tz
         try:
@@ -35,7 +36,7 @@ class Standing:
             raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
         if zone is not None:
             time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
-        return cls(monitor, time)
+        return cls(monitor, time, limit)
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -75,11 +76,19 @@ class Standing:
 
     @property
     def state(self) -> str:
-        """An alarm lasts until its event has ended; without new records nothing is healthy."""
+        """An alarm lasts until its event ends; nothing is healthy without new records, or with much stiffness lost."""
         said = self.monitor.state()
         if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records):
             return NOT_JUDGED
-        return said
+        return ATTENTION if said == HEALTHY and self.worn else said
+
+    @property
+    def worn(self) -> list[str]:
+        """Groups whose slow loss of stiffness has reached the limit."""
+        drift = self.monitor.drift_
+        if drift is None:
+            return []
+        return [str(name) for name in drift.index[drift["significant"].astype(bool) & (drift["change"] <= -self.limit)]]
 
     def headline(self) -> str:
         """The state in one line."""
@@ -89,6 +98,8 @@ class Standing:
             return f"Alarm since {moment(since)}"
         if self.state == HEALTHY:
             return "Healthy: no alarm"
+        if self.state == ATTENTION:
+            return "No alarm, but much stiffness has been lost slowly"
         if not self.has_records:
             return "Not judged: no record since the baseline"
         if self.is_ahead:
@@ -104,8 +115,15 @@ class Standing:
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
             )
-            silence = f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
-            return text + (silence if self.is_silent else "")
+            if self.is_silent:
+                text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
+            return text
+        if self.state == ATTENTION:
+            return (
+                f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
+                "the stiffness since the baseline. The monitor takes slow drift out before it judges, so that this "
+                "raises no alarm. An engineer should judge whether the structure can bear it."
+            )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
         if not self.has_records:
@@ -131,11 +149,13 @@ class Standing:
     @property
     def unjudged_since(self) -> pd.Timestamp:
         """First record after the last one that was judged."""
-        known = self.judged.index[self.judged["state"] != NOT_JUDGED]
-        after = self.judged.index[self.judged.index > known[-1]] if len(known) else self.judged.index
-        days = self.monitor.days_
-        first_day = days.index[0] if not (days["n_judged"] > 0).any() else None
-        return first_day if first_day is not None else after[0] if len(after) else self.last
+        days, judged = self.monitor.days_, self.judged
+        known = judged.index[judged["state"] != NOT_JUDGED]
+        if len(known):
+            return judged.index[judged.index > known[-1]][0]
+        some = days.index[days["n_judged"] > 0]
+        after = days.index[days.index > some[-1]] if len(some) else days.index
+        return after[0] if len(after) else self.last
 
     def opened(self, kind: str) -> pd.DataFrame:
         """Events of a kind that have not ended."""

@@ -5,18 +5,19 @@ from __future__ import annotations
 from skthermo._formatting import counted, listed, significant
 from skthermo.reporting._html import Html, bullets, element, joined, paragraphs, section
 from skthermo.reporting.service._changes import drift_sentences, sensor_sentences
-from skthermo.reporting.service._standing import ALARM, HEALTHY, NOT_JUDGED, Standing, moment
+from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment
 
-SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: "M12 5.5v8.5M12 17.2v1.3", NOT_JUDGED: "M6 12h12"}
+EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
+SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATION, NOT_JUDGED: "M6 12h12"}
 """Lines within a circle: a tick, an exclamation mark, a dash."""
 
 MOST_NAMED = 5  # largest number of events in a sentence
 
 
-def today(standing: Standing, limit: float) -> Html:
+def today(standing: Standing) -> Html:
     """State, and what an owner should know, in a few sentences."""
     sentences = [*_newest(standing), *_events(standing), *sensor_sentences(standing)]
-    sentences += drift_sentences(standing, limit)
+    sentences += drift_sentences(standing)
     words = (
         "A record is one measurement of temperatures and natural frequencies. Its damage index says how far the "
         "frequencies are from those of the healthy structure in the same weather. An event begins when the index "
@@ -80,6 +81,8 @@ def _waiting(standing: Standing) -> list[int]:
 
 def _what_to_do(standing: Standing) -> list[str]:
     steps = []
+    if standing.state == ATTENTION:
+        steps.append("Ask an engineer to look at the parts that have lost stiffness.")
     if standing.state == ALARM:
         steps.append(
             "Ask an engineer to look at the structure, beginning with what the modes named above depend on, and at the "

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from skthermo.monitoring.sensors._changes import BEYOND, DailyNoise, Departures
+from skthermo.monitoring.sensors._changes import BEYOND, LONGEST, SEASONAL, DailyNoise, Departures
 
 
 def departures(random, n, correlation):
@@ -25,9 +25,9 @@ def test_a_change_is_what_dense_least_squares_finds():
     lag = np.abs(known.days[:, np.newaxis] - known.days)
     covariance = np.outer(known.deviations, known.deviations) * 1.2**2 * 0.5**lag
     level = 0.3**2 + (1 + 0.5) / (1 - 0.5) * 1.2**2 * 0.01
-    covariance += level * np.outer(known.deviations, known.deviations) + BEYOND**2 * np.outer(
-        known.beyond, known.beyond
-    )
+    line = 2 * (known.days - known.days[0]) / LONGEST - 1
+    covariance += level * np.outer(known.deviations, known.deviations)
+    covariance += SEASONAL**2 * (1 + np.outer(line, line)) + BEYOND**2 * np.outer(known.beyond, known.beyond)
     inverse = np.linalg.inv(covariance)
     shape = (known.days >= found.first).astype(float)
     size = shape @ inverse @ (known.values * known.deviations) / (shape @ inverse @ shape)
