@@ -26,7 +26,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
     ],
     ("monitoring/_judge.py", "monitoring/test_monitor.py"): [
-        ("indices that are not computed alone at an edge", "np.flatnonzero(from_edge <=", "np.flatnonzero(from_edge < -"),
+        ("indices at an edge that are not computed alone", "flatnonzero(from_edge <=", "flatnonzero(from_edge < -"),
     ],
     ("monitoring/_course.py", "monitoring/test_monitor.py"): [
         ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
