@@ -26,7 +26,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
     ],
     ("monitoring/_judge.py", "monitoring/test_monitor.py"): [
-        ("indices that are not computed alone at an edge", "np.flatnonzero(from_edge <=", "np.flatnonzero(from_edge < -"),
+        ("indices at an edge that are not computed alone", "flatnonzero(from_edge <=", "flatnonzero(from_edge < -"),
     ],
     ("monitoring/_course.py", "monitoring/test_monitor.py"): [
         ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
@@ -396,6 +396,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("plotting/structures/_view.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
+    ],
+    ("monitoring/_promise.py", "monitoring/test_promise.py"): [
+        ("promised tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
+        ("promised end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
+        ("promised numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
+    ],
+    ("monitoring/_direction.py", "monitoring/test_direction.py"): [
+        ("direction told by lowered frequencies", "[1] <= nnls(-effects", "[1] >= nnls(-effects"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [
         ("functions read from files", "isinstance(found, type) and found", "found"),

@@ -414,7 +414,8 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        The call says that the records since are healthy. Open events end.
+        The call says that the records since are healthy. Open events end, and count as harmless if nothing else has
+        been said of them. Records of an event that began since, and was acknowledged as damage, do not train.
 
         The records of the baseline stand in for the weather that has not come since: each mode is moved to its new
         level, which is the mean of what the old regression on the weather leaves of the new records. As few days tell
@@ -472,14 +473,21 @@ class Monitor(SavesFrames, Estimator):
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, stages = retraining.baseline, None, self.bench_.stages
+        trained, end, stages, said = retraining.baseline, None, self.bench_.stages, self.said_
         if retraining.kind == "new baseline":
-            end = retraining.since.as_unit("ns").value
+            end = (self.last_ + pd.Timedelta("1s")).as_unit("ns").value
+            note = f"ended by the new baseline since {retraining.since}"
+            known = self.events_["acknowledged"]
+            said += tuple(
+                Acknowledgement(one.kind, one.peak_time, True, note)
+                for one, is_known in zip(self.course_.log.events, known, strict=True)
+                if one.end is None and not is_known
+            )
             stages = Stages.of(trained, self.targets_, fem=self._renewed_chain(trained), sensors=self.sensors)
         charge = self._charge_of(retraining.detector, trained, self.bench_.judge.columns, stages)
         course = self.course_.handed_over(charge.bench, self.store_, charge.rules, end)
         self._put_in_charge(charge, trained, course)
-        self.prior_, self.since_ = retraining.prior, retraining.since
+        self.prior_, self.since_, self.said_ = retraining.prior, retraining.since, said
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.

@@ -23,8 +23,8 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
 from skthermo.preprocessing._stamps import as_duration
+from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
 
 LEAST_WINDOW = 3  # rows
 

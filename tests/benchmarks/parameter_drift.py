@@ -30,7 +30,7 @@ from ageing_bridges import BRIDGES
 from scipy import stats
 
 from skthermo.detection import TemperatureCompensator
-from skthermo.monitoring.drift import track_parameters
+from skthermo.monitoring import track_parameters
 from skthermo.monitoring.drift._filter import GroupEffects
 from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
@@ -49,10 +49,10 @@ def truth(times, rate, first):
 def tracked(fem, T, F):
     """Daily estimates and errors of ln stiffness by group, whether a drift is found, and which groups come first."""
     history = track_parameters(fem, T, F, random_state=0)
-    table, names, found = history.table, history.effects.names, history.explanations
-    estimates = np.log(table.xs("estimate", axis=1, level=1)[names])
-    errors = np.log(table.xs("upper", axis=1, level=1)[names]).sub(estimates) / BAND
-    first = {names[group] for member in found.sets[0] for group in found.instead(member)}
+    table = history.table
+    estimates = np.log(table.xs("estimate", axis=1, level=1))
+    errors = np.log(table.xs("upper", axis=1, level=1)).sub(estimates) / BAND
+    first = {group for rivals in history.rivals.values() for group in rivals}
     return estimates, errors, history.has_drift, first, estimates.index[0]
 
 

@@ -171,6 +171,7 @@ def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
     assert found.accepted
     assert monitor.state() == "healthy"
     assert monitor.events_["end"].notna().all()
+    assert monitor.events_["note"].str.contains("new baseline").any()
     later = slice(YEAR + 21, 2 * YEAR)
     fresh, old = decisions(monitor, records["repaired"][later]), decisions(fitted, records["healthy"][later])
     ratios = [float((one["index"] / one["threshold"]).median()) for one in (fresh, old)]

@@ -118,7 +118,7 @@ class Retraining:
             lines.append(
                 f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
             )
-        lines += [f"Note: {note}." for note in self.notes]
+        lines += [f"{note[:1].upper()}{note[1:]}." for note in self.notes]
         return "\n".join(lines)
 
 
@@ -185,7 +185,7 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
     if not len(prior):
         raise ValueError(f"since is {since}, but the baseline begins at {old.baseline.index[0]}; expected a later time")
     events = monitor.events_
-    damage = events[events["acknowledged"] & ~events["harmless"]]
+    damage = events[events["acknowledged"] & ~events["harmless"] & (events["start"] >= since)]
     trained, kept = old.baseline[old.baseline.index >= first], monitor.corrected_
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
