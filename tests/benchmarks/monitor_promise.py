@@ -266,9 +266,9 @@ def report(found):
 
 
 def monitored(years, per_day):
-    """False events a year of monitors that are fitted to every fifth year and given the years after it."""
+    """False events a year of monitors that are fitted to every tenth year and given the years after it."""
     numbers = []
-    for number in range(0, years.n_years, 5):
+    for number in range(0, years.n_years, 10):
         records = pd.concat([years.year(number + i) for i in range(N_JUDGED + 1)])
         records.index = pd.date_range(records.index[0], periods=len(records), freq=DAY / per_day)
         detector = make_pipeline(compensator(per_day), WindowedAlarm("7D"))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 
 N_SHAPES = 5  # a line, and the leading components of a random walk beside it
-WALKS = np.array([0.0, 0.002, 0.004, 0.008, 0.016, 0.032])
+WALKS = np.array([0.0, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032])
 """Standard deviations of what a random walk adds to ln stiffness in a year that are tried."""
 
 RATE = 0.03  # standard deviation of a yearly change of ln stiffness of a group that drifts

@@ -35,6 +35,13 @@ class Course(NamedTuple):
     end_covariance: Array
     walk: float
 
+    def with_error_of_effects(self, share: float) -> Course:
+        """The same course, of which a share may be an error of the FE model's effects."""
+        return self._replace(
+            deviation=np.hypot(self.deviation, share * self.mean),
+            end_covariance=self.end_covariance + share**2 * np.outer(self.end, self.end),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ParameterHistory:

@@ -29,6 +29,7 @@ from skthermo.monitoring.drift._noise import DailyNoise
 
 ANY_TREND = 0.3  # prior standard deviation of a trend of ln frequency over the records
 ANY_RATE = 0.1  # prior standard deviation of the yearly change of ln stiffness of a group that is followed
+EFFECT_ERROR = 0.01  # relative error of the FE model's effects of groups that bands allow for
 FEWEST = 3  # days with a mode for each coefficient that it needs, below which the mode is left out
 
 
@@ -89,6 +90,8 @@ def track_parameters(
     coefficients for each mode, so that one year's weather is not taken for ageing and a chain that was trained on
     drifting records does not hide the drift. A disturbance of each mode fades from day to day, and the rest is new with
     each record. The variances are those of greatest restricted likelihood; modes are correlated.
+
+    Bands allow for an error of 1 % of the FE model's effects; if it is less accurate than that, they are too narrow.
 
     Each mode's trend is estimated first. Sets of one or two groups then explain these trends, weighed by their
     evidence: most structures age in few places, and changes in all groups at once are hardly ever determined. If no
@@ -230,6 +233,7 @@ def history_of(
         others = [member for member in best if member not in one] if has_drift else []
         label = " and ".join(names[group] for group in one)
         named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
+    named = {name: course.with_error_of_effects(EFFECT_ERROR) for name, course in named.items()}
     information = np.diag(followed.trends.information())
     with np.errstate(divide="ignore"):
         alone = 1 / np.sqrt(information) / followed.trends.years

@@ -118,7 +118,7 @@ class Retraining:
             lines.append(
                 f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
             )
-        lines += [f"Note: {note}." for note in self.notes]
+        lines += [f"{note[:1].upper()}{note[1:]}." for note in self.notes]
         return "\n".join(lines)
 
 
