@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pandas as pd
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51, make_kw51_campaign, make_truss, make_truss_campaign
@@ -32,6 +33,13 @@ class Truss:
     def records(self, campaign):
         """Temperatures and frequencies, and how many of them are the first year."""
         return campaign.temperatures, campaign.frequencies, 365
+
+    def quiet_first(self, n_years, seed, correlation=0.0, **changes):
+        """As `records`: a year without changes, and years with them, whose drift begins then."""
+        parts = [self.campaign(1, 1000 + seed, correlation), self.campaign(n_years - 1, seed, correlation, **changes)]
+        later = parts[1].frequencies.index + pd.Timedelta(days=365)
+        T, F = (pd.concat([parts[0][name], parts[1][name].set_axis(later)]) for name in ("temperatures", "frequencies"))
+        return T, F, 365
 
     def chain(self, wrong=False):
         model = make_truss()

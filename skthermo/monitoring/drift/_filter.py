@@ -200,6 +200,7 @@ class ParameterFilter:
     start_: ParameterState = field(repr=False)
 
     @classmethod
+    @warnings_once()
     def of(
         cls,
         fem: Any,

@@ -11,6 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from skthermo._arrays import Array, as_random_state, is_real
+from skthermo._warnings import warnings_once
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, Explanations, ModeTrends
 from skthermo.monitoring.drift._filter import (
@@ -33,6 +34,7 @@ EFFECT_ERROR = 0.01  # relative error of the FE model's effects of groups that b
 FEWEST = 3  # days with a mode for each coefficient that it needs, below which the mode is left out
 
 
+@warnings_once()
 def track_parameters(
     fem: Any,
     T: pd.DataFrame,

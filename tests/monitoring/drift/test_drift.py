@@ -117,6 +117,19 @@ def test_memory_and_variances_of_noise_are_recovered():
     assert abs(noise.correlation[0, 1]) < 0.1
 
 
+def test_errors_of_long_means_are_those_of_the_noise():
+    random = np.random.RandomState(0)
+    n_days, n_modes, memory = 2500, 8, 0.9
+    values = np.zeros((n_days, n_modes))
+    for day in range(1, n_days):
+        values[day] = memory * values[day - 1] + np.sqrt(1 - memory**2) * random.standard_normal(n_modes)
+    noise = DailyNoise.of(values, np.ones((n_days, n_modes, 1)), np.ones((n_days, n_modes)))
+    lasting = (noise.fading**2 * (1 + noise.memory) / (1 - noise.memory) + noise.fresh**2) ** 0.5
+    truth = np.sqrt((1 + memory) / (1 - memory))
+    chance, grid = np.sqrt((1 + memory) / (1 - memory) / n_days), 0.3 / np.sqrt(12)
+    assert np.sqrt(np.mean((lasting / truth - 1) ** 2)) < 1.5 * np.hypot(chance, grid)
+
+
 def test_a_known_drift_is_recovered(history):
     truth = 1 - 0.02 * 7 * np.arange(len(history.days)) / 365
     table, rate = history.table["bottom"], history.rates.loc["bottom"]
@@ -191,6 +204,17 @@ def test_days_and_modes_may_be_missing(ageing, history):
     assert found.has_drift
     assert found.explanations["groups"].iloc[0] == ("bottom",)
     assert table["lower"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["upper"].iloc[-1]
+
+
+def test_filled_temperatures_are_told_once(healthy):
+    campaign, fem = healthy
+    T, F = campaign.temperatures.copy(), campaign.frequencies
+    T.iloc[30:50, 0] = np.nan
+    for follow in (lambda: track_parameters(fem, T, F, GROUPS, WEEK), lambda: ParameterFilter.of(fem, T, F, GROUPS)):
+        with pytest.warns(UserWarning, match="'T1' in 20 of 730 rows") as given:
+            follow()
+        assert len(given) == 1
+        assert given[0].filename == __file__
 
 
 def trends_of(change, slopes, error=1e-3, years=4.0):
