@@ -202,7 +202,7 @@ def promised_rule(
         warn_user(
             f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
             f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {np.sqrt(squares[0]):.3g}: "
-            f"{asked:.2g} events are asked for in its time; expected {FAR} or more, by a longer baseline or more alarms",
+            f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
     if (squares[0] - tail.base) / tail.excess > _largest_share(tail.k):
