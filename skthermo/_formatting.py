@@ -53,6 +53,12 @@ def counted(number: int, one: str, many: str | None = None) -> str:
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
 
 
+def counted_number(value: float, noun: str, digits: int = 6) -> str:
+    """A number that need not be whole, with its noun."""
+    number = f"{value:.{digits}g}"
+    return f"{number} {noun if number == '1' else noun + 's'}"
+
+
 def printable(text: Any) -> str:
     """Text in which control characters are seen as their escapes and harm no reader; white space becomes one space."""
     spaced = re.sub(r"[\t\n\v\f\r\x85\u2028\u2029]+", " ", str(text))

@@ -6,6 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from skthermo._formatting import counted_number
+
 MOST_EVENTS = 5  # that are told, the latest ones
 
 
@@ -58,5 +60,7 @@ def _drift(drift: pd.DataFrame, n_left_out: int) -> list[str]:
         for group, one in drift[drift["significant"]].iterrows()
     ]
     if n_left_out:
-        lines.append(f"Drift has not been followed for {n_left_out} days: the frequencies changed at once.")
+        lines.append(
+            f"Drift has not been followed for {counted_number(n_left_out, 'day')}: the frequencies changed at once."
+        )
     return lines

@@ -61,7 +61,7 @@ class Monitor(SavesFrames, Estimator):
     Parameters
     ----------
     detector : detector or Pipeline
-        Any detector of `skthermo.detection`, or a pipeline that ends with one, such as
+        Any detector of ``skthermo.detection``, or a pipeline that ends with one, such as
         ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
         frequencies only.
     targets : sequence of str, optional
@@ -235,6 +235,10 @@ class Monitor(SavesFrames, Estimator):
         if keep < late + 2 * ONE_DAY:
             raise ValueError(f"keep is {self.keep!r} and late {self.late!r}; expected to keep records two days longer")
         baseline = read_records(X)
+        if not len(baseline):
+            raise ValueError(
+                "the baseline has no records; expected those of the healthy structure, of a year if possible"
+            )
         if baseline.index.has_duplicates:
             again = baseline.index[baseline.index.duplicated()]
             raise ValueError(
@@ -599,7 +603,9 @@ class Monitor(SavesFrames, Estimator):
     def _why_too_late(self, records: pd.DataFrame) -> list[str]:
         end = self.baseline_.index[-1]
         return [
-            f"before the end of the baseline ({end})" if stamp <= end else f"came too late, more than {self.late} after"
+            f"before the end of the baseline ({end})"
+            if stamp <= end
+            else f"came too late, more than {self.late} after newer records"
             for stamp in records.index
         ]
 

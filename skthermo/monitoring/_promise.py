@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import gamma, nbinom
 
 from skthermo._arrays import Array
+from skthermo._formatting import counted_number
 from skthermo._saved_frames import SavesFrames
 from skthermo._warnings import warn_user
 
@@ -98,9 +99,10 @@ class Promise:
     method: str
 
     def __str__(self) -> str:
+        expected = counted_number(self.expected, "false alarm")
         return (
-            f"{self.expected:g} false alarms a year on average, {self.lowest} to {self.highest} in a single year "
-            f"(90 %); {self.method}" + (f"; not promised for {self.unseen}" if self.unseen else "")
+            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
+            + (f"; not promised for {self.unseen}" if self.unseen else "")
         )
 
 
@@ -177,18 +179,18 @@ def promised_rule(
     excursions = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))
     excursions = excursions.sort_values("peak", ascending=False)
     squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
+    years = counted_number(n_years, "year", 2)
     if len(squares) < FEWEST_PEAKS or asked > len(squares):
         raise ValueError(
-            f"false_alarms_per_year is {per_year:g}, but the {n_years:.2g} years of the baseline have only "
-            f"{len(squares)} excursions that end with {hold} of quiet; expected at least {FEWEST_PEAKS}, and as "
-            "many as alarms are asked for"
+            f"false_alarms_per_year is {per_year:g}, but the {years} of the baseline have only "
+            f"{counted_number(len(squares), 'excursion')} that end with {hold} of quiet; expected at "
+            f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
     tail = Tail.of(squares, asked)
     rule, unseen = EventRule(tail.threshold(asked), release, hold), _unseen_season(known.index)
     lowest, highest = tail.numbers(asked, n_years)
-    method = (
-        f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {n_years:.2g} years of "
-        "baseline" + (", extrapolated beyond all of them" if asked < FAR else "")
+    method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
+        ", extrapolated" if asked < FAR else ""
     )
     if unseen:
         warn_user(
@@ -198,9 +200,9 @@ def promised_rule(
         )
     if asked < FAR:
         warn_user(
-            f"{per_year:g} false alarms a year are {asked:.2g} in the {n_years:.2g} years of the baseline: the "
-            f"threshold {rule.threshold:.3g} is extrapolated beyond its highest excursion ({np.sqrt(squares[0]):.3g}); "
-            f"expected at least {FAR}, by a longer baseline or more alarms",
+            f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
+            f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {np.sqrt(squares[0]):.3g}: "
+            f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
     if (squares[0] - tail.base) / tail.excess > _largest_share(tail.k):

@@ -50,7 +50,9 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
             f"{len(infinite)} of {values.size} values are infinite, the first at {X.index[row]} in column "
             f"{X.columns[column]!r}; expected numbers, and NaN where a value is missing"
         )
-    frame = pd.DataFrame(values, X.index.as_unit("ns"), X.columns)
+    stamps = X.index.as_unit("ns")
+    stamps.freq = None  # that of one batch is not that of its parts
+    frame = pd.DataFrame(values, stamps, X.columns)
     return frame if X.index.is_monotonic_increasing else frame.sort_index(kind="stable")
 
 

@@ -126,9 +126,9 @@ def last_of_each(parts):
 
 
 def assert_same_course(monitor, answers, after, parts):
-    pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True, check_freq=False)
+    pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
     for name in ("events_", "days_", "judged_", "faults_", "records_", "corrected_"):
-        pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True, check_freq=False)
+        pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
     for count in ("n_records", "n_not_judged", "n_implausible"):
         assert monitor.counts_[count] == after.counts_[count]
     assert monitor.state() == after.state()
@@ -157,9 +157,7 @@ def test_hour_by_hour_and_day_by_day():
     for batches in ([SERVICE.iloc[[n]] for n in range(24)], [day for _, day in SERVICE[:24].resample("D") if len(day)]):
         monitor, answers, _ = fitted("whitened, mean by time")
         parts = [monitor.update(batch) for batch in batches]
-        pd.testing.assert_frame_equal(
-            pd.concat(parts)[ANSWER], answers[:24][ANSWER], check_exact=True, check_freq=False
-        )
+        pd.testing.assert_frame_equal(pd.concat(parts)[ANSWER], answers[:24][ANSWER], check_exact=True)
         assert not any(part["revised"].any() for part in parts)
 
 
@@ -244,6 +242,20 @@ def test_reasons_say_why_a_record_is_not_judged():
         assert answers.loc[answers["index"].isna(), "reason"].str.contains(reason).any() or name == "mean by number"
 
 
+def test_answers_do_not_keep_the_frequency_of_a_batch():
+    monitor, records = copy.deepcopy(fitted("lags")[0]), ALL[N_BASELINE : N_BASELINE + 40]
+    assert records.index.freq is not None
+    one = copy.deepcopy(monitor).update(records)
+    parts = [monitor.update(part) for part in (records[:11][::-1], records[5:11], records[11:40])]
+    pd.testing.assert_frame_equal(pd.concat(parts), one)
+    assert records.index.freq is not None
+
+
+def test_a_baseline_without_records_is_refused():
+    with pytest.raises(ValueError, match="the baseline has no records"):
+        Monitor(MahalanobisDetector(), targets=MODES).fit(BASELINE[:0])
+
+
 def test_too_late_records_are_told_and_not_judged():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[50:80])
@@ -251,7 +263,7 @@ def test_too_late_records_are_told_and_not_judged():
     with pytest.warns(UserWarning, match="2 of 2 new records are not judged"):
         answers = monitor.update(SERVICE[:2])
     assert answers["state"].eq("not judged").all()
-    assert answers["reason"].str.contains("came too late, more than 7D").all()
+    assert answers["reason"].str.contains("came too late, more than 7D after newer records").all()
     early = BASELINE.iloc[[0]].set_axis(BASELINE.index[[0]] + pd.Timedelta("1h"))
     with pytest.warns(UserWarning, match="before the end of the baseline"):
         monitor.update(early)
@@ -353,7 +365,7 @@ def test_memory_of_steps_that_are_not_known_is_asked_for():
     other = copy.deepcopy(monitor)
     whole = monitor.update(ALL[N_BASELINE:])
     parts = [other.update(day) for _, day in ALL[N_BASELINE:].resample("D")]
-    pd.testing.assert_frame_equal(whole, pd.concat(parts), check_freq=False)
+    pd.testing.assert_frame_equal(whole, pd.concat(parts))
 
 
 def test_frequency_columns_have_to_be_known():
@@ -434,6 +446,6 @@ def test_calendar_days_of_a_time_zone_with_summer_time():
     other = copy.deepcopy(monitor)
     whole = monitor.update(records[N_BASELINE:])
     parts = [other.update(records[n : n + 3]) for n in range(N_BASELINE, len(records), 3)]
-    pd.testing.assert_frame_equal(whole, pd.concat(parts), check_freq=False)
+    pd.testing.assert_frame_equal(whole, pd.concat(parts))
     assert monitor.days_.index.equals(records[N_BASELINE:].index.normalize().unique())
     assert monitor.days_.equals(other.days_)

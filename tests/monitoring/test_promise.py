@@ -137,7 +137,7 @@ def test_half_a_year_promises_nothing_for_the_other_half():
 @pytest.mark.filterwarnings("ignore:the baseline has no record of")
 def test_a_threshold_far_beyond_the_baseline_is_said_to_be_one():
     index = pd.Series(chi(np.random.default_rng(6), 90), stamps(90))
-    with pytest.warns(UserWarning, match="extrapolated beyond its highest excursion"):
+    with pytest.warns(UserWarning, match="1 false alarm a year, and the baseline is 0.24 years long: .* extrapolated"):
         promise = promised_rule(index, 1.0)
     assert promise.rule.threshold > index.max()
 
@@ -167,3 +167,10 @@ def test_few_healthy_baselines_are_said_to_have_such_a_day():
             promised_rule(pd.Series(chi(random, 365), stamps(365)))
         told += len(caught)
     assert told <= 4
+
+
+def test_one_is_singular():
+    index = pd.Series(chi(np.random.default_rng(9), 366), stamps(366))
+    assert str(promised_rule(index)).startswith("1 false alarm a year")
+    assert str(promised_rule(index)).endswith("in 1 year of baseline")
+    assert str(promised_rule(index, 2.0)).startswith("2 false alarms a year")

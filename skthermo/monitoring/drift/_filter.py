@@ -78,7 +78,7 @@ class ResponseSurface:
         rows = known[spread_evenly(np.arange(len(known)), 8 * n_terms)]
         values = exact(rows)
         tried = np.arange(len(rows)) % 4 == 3
-        coefficients = np.linalg.lstsq(exact.terms(rows[~tried]), values[~tried])[0]
+        coefficients = np.linalg.lstsq(exact.terms(rows[~tried]), values[~tried], rcond=None)[0]
         errors = np.abs(exact.terms(rows[tried]) @ coefficients - values[tried])
         return replace(exact, coefficients=coefficients) if errors.max() <= ACCURATE else exact
 
@@ -308,6 +308,8 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
         if not has_stamps(table):
             raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
     check_same_rows(T, F, ("temperatures", "frequencies"))
+    if not len(T):
+        raise ValueError("the records have no rows; expected temperatures and frequencies over years")
     if (as_floats(F) <= 0).any():
         row = np.flatnonzero((as_floats(F) <= 0).any(axis=1))[0]
         raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
@@ -316,8 +318,14 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
 
 
 def length_of(freq: str) -> float:
-    """Years between two daily means."""
-    return pd.Timedelta(freq) / YEAR
+    """Years between two daily means; an error for what is no period."""
+    try:
+        length = pd.Timedelta(freq) / YEAR if isinstance(freq, str) else np.nan
+    except ValueError:
+        length = np.nan
+    if not length > 0:
+        raise ValueError(f"freq is {freq!r:.100}; expected a day or some days, such as '1D' or '7D'")
+    return length
 
 
 def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array) -> Observation:

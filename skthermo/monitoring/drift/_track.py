@@ -118,7 +118,7 @@ def track_parameters(
     check_records(fem, T, F)
     if not is_real(significance) or not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
-    random = as_random_state(random_state)
+    random, length = as_random_state(random_state), length_of(freq)
     order = np.argsort(F.index, kind="stable")
     T, F = T.iloc[order], F.iloc[order]
     records = DailyRecords.of(fem, T, freq)
@@ -127,7 +127,7 @@ def track_parameters(
     noise = DailyNoise.of(daily.values, with_time(daily, N_SHAPES), daily.counts)
     trends = mode_trends(daily, noise, effects.slopes, freq)
     found = Explanations.of(trends, noise.freedom, random)
-    followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length_of(freq))
+    followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length)
     changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
     slopes = effects.of_changes(changes if found.p_value <= significance else {})
     followed = replace(followed, trends=replace(followed.trends, slopes=slopes))

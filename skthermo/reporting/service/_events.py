@@ -6,7 +6,7 @@ from collections.abc import Hashable
 
 import pandas as pd
 
-from skthermo._formatting import counted, duration_text, listed, significant
+from skthermo._formatting import counted, counted_number, duration_text, listed, significant
 from skthermo.reporting._html import Html, element, paragraphs, section, table
 from skthermo.reporting.service._standing import ONE_DAY, Standing, moment
 
@@ -93,11 +93,6 @@ def promise(standing: Standing) -> Html:
         paragraphs(*sentences),
         table("The rule for events, for the engineer.", ["What", "Value"], rows),
     )
-
-
-def counted_number(value: float, noun: str) -> str:
-    """A number that need not be whole, with its noun."""
-    return f"{value:g} {noun if value == 1 else noun + 's'}"
 
 
 def duration_of(years: float) -> str:

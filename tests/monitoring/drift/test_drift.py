@@ -319,6 +319,11 @@ def test_wrong_input_is_refused(healthy):
         track_parameters(fem, T, F, ["deck"])
     with pytest.raises(ValueError, match="significance is 2"):
         track_parameters(fem, T, F, significance=2)
+    with pytest.raises(ValueError, match="the records have no rows"):
+        track_parameters(fem, T[:0], F[:0])
+    for freq in ("month", "ME", 7, "0D", "NaT"):
+        with pytest.raises(ValueError, match=f"freq is {freq!r}; expected a day or some days"):
+            track_parameters(fem, T, F, freq=freq)
 
 
 def test_the_display_shows_each_group_its_band_and_a_limit(history):
