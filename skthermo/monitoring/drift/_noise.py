@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 
 LASTING = np.geomspace(1.5, 99, 16)
-"""Factors by which the fading part raises the variance of a mean of many days that are tried, each 1.3 times the last."""
+"""Factors by which the fading part raises the variance of a mean of many days that are tried."""
 
 MEMORIES = (LASTING - 1) / (LASTING + 1)
 """Correlations of the fading part from one day to the next that belong to them."""
