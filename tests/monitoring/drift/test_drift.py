@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.exceptions import NotFittedError
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.monitoring import track_parameters
-from skthermo.monitoring.drift import ParameterFilter
+from skthermo.monitoring.drift import DriftFollower, ParameterFilter
 from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
 from skthermo.monitoring.drift._filter import shapes_of_time
 from skthermo.monitoring.drift._kalman import DailySteps, Observation, State
@@ -295,6 +296,10 @@ def test_wrong_input_is_refused(healthy):
         track_parameters(fem, T, F, ["deck"])
     with pytest.raises(ValueError, match="significance is 2"):
         track_parameters(fem, T, F, significance=2)
+    with pytest.raises(ValueError, match=r"of which the baseline lacks \['f1', .* among the temperatures \['T1'"):
+        DriftFollower.of(fem, T, F.add_prefix("mode "))
+    with pytest.raises(NotFittedError):
+        DriftFollower.of(DataInformedFEM(make_truss()), T, F)
     with pytest.raises(ValueError, match="the records have no rows"):
         track_parameters(fem, T[:0], F[:0])
     for freq in ("month", "ME", 7, "0D", "NaT"):
