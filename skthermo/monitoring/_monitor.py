@@ -61,7 +61,7 @@ class Monitor(SavesFrames, Estimator):
     Parameters
     ----------
     detector : detector or Pipeline
-        Any detector of `skthermo.detection`, or a pipeline that ends with one, such as
+        Any detector of ``skthermo.detection``, or a pipeline that ends with one, such as
         ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
         frequencies only.
     targets : sequence of str, optional

@@ -155,7 +155,7 @@ def main():
     parser.add_argument("--rates", type=float, nargs="+", default=[0.0, 0.005, 0.01, 0.02], help="lost a year")
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     parser.add_argument("--correlation", type=float, default=0.0, help="of the noise of neighbouring records")
-    parser.add_argument("--wrong", action="store_true", help="a model whose stiffnesses are 5 % off")
+    parser.add_argument("--wrong", action="store_true", help="a model whose stiffnesses are 5 %% off")
     parser.add_argument("--each", action="store_true", help="print every run")
     options = parser.parse_args()
     warnings.simplefilter("ignore")

@@ -78,7 +78,7 @@ class ResponseSurface:
         rows = known[spread_evenly(np.arange(len(known)), 8 * n_terms)]
         values = exact(rows)
         tried = np.arange(len(rows)) % 4 == 3
-        coefficients = np.linalg.lstsq(exact.terms(rows[~tried]), values[~tried])[0]
+        coefficients = np.linalg.lstsq(exact.terms(rows[~tried]), values[~tried], rcond=None)[0]
         errors = np.abs(exact.terms(rows[tried]) @ coefficients - values[tried])
         return replace(exact, coefficients=coefficients) if errors.max() <= ACCURATE else exact
 
