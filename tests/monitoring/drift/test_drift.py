@@ -1,6 +1,7 @@
 """Drift of groups: the filter and smoother are exact, what is there is found, and what is not there is not claimed."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -321,3 +322,9 @@ def test_the_display_shows_each_group_its_band_and_a_limit(history):
     with pytest.raises(ValueError, match="expected a ParameterHistory"):
         ParameterHistoryDisplay.from_history(None)
     plt.close("all")
+
+
+def test_more_groups_than_modes_are_said_to_be_a_limit(history):
+    assert "modes do not determine" not in history.summary()
+    fewer = replace(history, modes=history.modes[:1])
+    assert "which these modes do not determine" in fewer.summary()
