@@ -24,6 +24,7 @@ YEAR = pd.Timedelta(days=365.25)
 RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
+MIRRORED = 1e-6  # difference of the cosine of two effects from 1, below which they are the same
 ACCURATE = 2e-5  # error of ln frequencies up to which a quadratic function of the parameters takes the model's place
 TURN = 0.01  # standard deviation of what a year adds to the yearly rate
 MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has mislearned, for each function of weather
@@ -161,8 +162,9 @@ class GroupEffects:
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
         frequencies = FrequencyEffects.of(fem, parameters(fem, T), as_floats(F), of_model)
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])
-        _, slopes = frequencies(np.zeros(len(of_model)))
-        return cls(-slopes @ incidence, members, frequencies, incidence)
+        unchanged = np.zeros(len(of_model))
+        slopes, nominal = (-effects(unchanged)[1] @ incidence for effects in (frequencies, frequencies.nominal()))
+        return cls(with_mirror_images(slopes, nominal), members, frequencies, incidence)
 
     def of_changes(self, changes: Mapping[int, float]) -> Array:
         """The slopes, but of some groups those of the chord to a larger change of their ln stiffness."""
@@ -171,6 +173,16 @@ class GroupEffects:
             if abs(change) > SMALL:
                 slopes[:, group] = self.frequencies(-np.expm1(change * self.incidence[:, group]))[0] / change
         return slopes
+
+
+def with_mirror_images(slopes: Array, nominal: Array) -> Array:
+    """Effects in which groups that have the same at the model's nominal state have their mean.
+
+    A chain may have left the symmetry of its structure: mirror images would then seem to differ.
+    """
+    unit = nominal / np.maximum(np.linalg.norm(nominal, axis=0), np.finfo(float).tiny)
+    images = (unit.T @ unit > 1 - MIRRORED).astype(float)
+    return slopes @ (images / images.sum(axis=0))
 
 
 @dataclass(frozen=True)

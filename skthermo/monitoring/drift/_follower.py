@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._arrays import Array
+from skthermo._validation import check_is_fitted
 from skthermo._warnings import without_warnings
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans
@@ -125,7 +126,20 @@ class DriftFollower:
         Returns
         -------
         DriftFollower
+
+        Raises
+        ------
+        ValueError
+            If the chain is not fitted, or the baseline lacks columns that it was fitted on.
         """
+        check_is_fitted(fem)
+        temperatures = list(getattr(fem, "feature_names_in_", ["named temperatures"]))
+        missing = [one for one in temperatures if one not in T] + [one for one in fem.mode_names_ if one not in F]
+        if missing:
+            raise ValueError(
+                f"the chain fem was fitted on temperatures and modes of which the baseline lacks {missing}; expected "
+                f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
+            )
         T, F = T[list(fem.feature_names_in_)], F[list(fem.mode_names_)]
         followed, memory = ParameterFilter.of(fem, T, F, groups), Memory.of(fem.mapper_)
         n_modes, size = F.shape[1], followed.records.basis.size

@@ -11,7 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from skthermo._arrays import Array, as_floats, is_real
-from skthermo._formatting import SPACE, listed, percent, probability_text, significant
+from skthermo._formatting import SPACE, counted, listed, percent, probability_text, significant
 from skthermo._frames import frame_like
 from skthermo._times import has_stamps
 
@@ -322,6 +322,13 @@ class ParameterHistory:
             yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
         if self.unseen:
             yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
+        if len(self.groups) > len(self.modes):
+            yield (
+                f"There are {len(self.groups)} groups and {counted(len(self.modes), 'mode')}: which group "
+                "drifts depends on the stiffness in the chain, which these modes do not determine, and may be "
+                "named wrongly, such as the "
+                "mirror image of the one that drifts."
+            )
         for group, others in self.lookalikes.items():
             if group not in self.rivals:
                 yield f"A drift of {group} would look like one of {' or '.join(others)}."

@@ -1,15 +1,19 @@
 """Drift of groups: the filter and smoother are exact, what is there is found, and what is not there is not claimed."""
 
 import pickle
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.exceptions import NotFittedError
 
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.fem import AffineModel, add_noise
 from skthermo.monitoring import track_parameters
-from skthermo.monitoring.drift import ParameterFilter
+from skthermo.monitoring.drift import DriftFollower, ParameterFilter
 from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
 from skthermo.monitoring.drift._filter import shapes_of_time
 from skthermo.monitoring.drift._kalman import DailySteps, Observation, State
@@ -319,6 +323,10 @@ def test_wrong_input_is_refused(healthy):
         track_parameters(fem, T, F, ["deck"])
     with pytest.raises(ValueError, match="significance is 2"):
         track_parameters(fem, T, F, significance=2)
+    with pytest.raises(ValueError, match=r"of which the baseline lacks \['f1', .* among the temperatures \['T1'"):
+        DriftFollower.of(fem, T, F.add_prefix("mode "))
+    with pytest.raises(NotFittedError):
+        DriftFollower.of(DataInformedFEM(make_truss()), T, F)
     with pytest.raises(ValueError, match="the records have no rows"):
         track_parameters(fem, T[:0], F[:0])
     for freq in ("month", "ME", 7, "0D", "NaT"):
@@ -340,3 +348,30 @@ def test_the_display_shows_each_group_its_band_and_a_limit(history):
     with pytest.raises(ValueError, match="expected a ParameterHistory"):
         ParameterHistoryDisplay.from_history(None)
     plt.close("all")
+
+
+def test_more_groups_than_modes_are_said_to_be_a_limit(history):
+    assert "modes do not determine" not in history.summary()
+    fewer = replace(history, modes=history.modes[:1])
+    assert "which these modes do not determine" in fewer.summary()
+
+
+def test_mirror_images_are_named_together():
+    """Springs in a row between two walls: no frequency tells the first from the last."""
+    elongations = np.vstack([np.eye(5)[0], np.diff(np.eye(5), axis=0), -np.eye(5)[-1]])
+    stiffness = {(f"k{k}",): 1e4 * np.outer(one, one) for k, one in enumerate(elongations, 1)}
+    model = AffineModel(stiffness, np.eye(5), n_modes=4)
+    days = pd.date_range("2025-01-01", periods=730)
+    random = np.random.RandomState(0)
+    T = pd.DataFrame({"T": 12 * np.sin(2 * np.pi * np.arange(730) / 365) + random.normal(0, 3, 730)}, days)
+    theta = np.tile(1 - 0.002 * T.to_numpy(), (1, 6))
+    theta[:, 0] *= 1 - 0.02 * np.arange(730) / 365
+    F = pd.DataFrame(add_noise(model.frequencies(theta), 0.003, random_state=random), days, list("abcd"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # four modes do not determine six parameters
+        fem = DataInformedFEM(model, random_state=0).fit(T[:365], F[:365])
+        history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
+    assert history.sets == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
+    assert_allclose(*history.rates.loc[["k1", "k6"], "probability"])
+    assert (history.rates.loc[["k1", "k6"], "drifts"] == "perhaps").all()
+    assert_allclose(history.rates.loc["k1", "per_year"], -0.02, atol=3 * history.rates.loc["k1", "standard_error"])
