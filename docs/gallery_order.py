@@ -15,6 +15,7 @@ ORDER = [
     "plot_model_updating.py",
     "plot_owner_report.py",
     "plot_in_service.py",
+    "plot_new_baseline.py",
     "plot_gauss_newton_step.py",
     "plot_regressors.py",
     "plot_grid_search.py",

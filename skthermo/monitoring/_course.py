@@ -38,7 +38,10 @@ class Bench:
     release: float
 
     def series(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
-        """Index of the records from a position on for each kind of event: 0 where they go the other way."""
+        """Index of the records from a position on for each kind of event.
+
+        It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
+        """
         if self.direction is None:
             return {"damage": index}
         with np.errstate(invalid="ignore"):
@@ -48,8 +51,8 @@ class Bench:
             begin = self.judge.memory.start(stamps_of(records), first)
             signs = self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])
             stiffer = signs[first - begin :] < 0
-        quiet = np.where(np.isnan(index), np.nan, 0.0)
-        return {"damage": np.where(stiffer, quiet, index), "stiffening": np.where(stiffer, index, quiet)}
+        softer = wanted[first:] & ~stiffer
+        return {"damage": np.where(stiffer, np.nan, index), "stiffening": np.where(softer, np.nan, index)}
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.stats import chi
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array
@@ -18,6 +19,8 @@ from skthermo._validation import last_step
 from skthermo._warnings import without_warnings
 
 LOWERED = 1e-3  # share by which a frequency is lowered to see what the detector gets
+MIXED = 0.02  # share of a squared departure that raised frequencies may leave where it counts as stiffening
+NOISE = 0.001  # probability of more than noise
 MOST_ROWS = 500  # of the baseline, the last ones, on which that is tried
 
 
@@ -26,8 +29,9 @@ class Direction:
     """Tells softening from stiffening, by Rayleigh's principle.
 
     A loss of stiffness lowers some natural frequencies and raises none, whatever the structure. A record, or the mean
-    of a window, counts as softening if frequencies that are lowered, each by as much as suits best, explain more of
-    its departure from the baseline than raised ones do: least squares in standard deviations of the baseline.
+    of a window, counts as stiffening if frequencies that are raised, each by as much as suits best, explain more of its
+    departure from the baseline than lowered ones do, and leave no more than noise or a fiftieth of its square: least
+    squares in standard deviations of the baseline. A mixed change, as by a retrofit that adds mass, is no stiffening.
 
     ``steps`` are those of the detector before its last one, ``lowered`` what they make of one that is lowered by a
     share of itself, (n_features, n_modes), ``baseline`` the distribution of (means of) what the last step gets.
@@ -71,7 +75,9 @@ class Direction:
         root = whitenings(self.baseline.covariance, present[np.newaxis])[0][0]
         white = root @ np.where(present, departure - self.baseline.mean, 0.0)
         effects = root @ self.lowered
-        return 1 if nnls(effects, white)[1] <= nnls(-effects, white)[1] else -1
+        left = nnls(-effects, white)[1]
+        explained = left <= max(np.sqrt(MIXED) * np.linalg.norm(white), chi.isf(NOISE, present.sum()))
+        return -1 if explained and left < nnls(effects, white)[1] else 1
 
 
 def _features(steps: Any, columns: list, X: pd.DataFrame) -> pd.DataFrame:

@@ -72,3 +72,11 @@ def test_without_a_compensator_it_is_that_of_the_frequencies():
     direction = Direction.of(MahalanobisDetector().fit(F), F, ["a", "b", "c"])
     moved = F.iloc[:6].assign(a=[3, 5, 4, 4, 3, 5], b=[5, 5, 6, 4, 4, 6], c=9.0)
     assert direction.of_rows(moved).tolist() == [1, -1, -1, 1, 1, -1]
+
+
+def test_a_mixed_change_is_no_stiffening():
+    random, index = np.random.default_rng(0), pd.date_range("2025-01-01", periods=400)
+    F = pd.DataFrame(random.normal([4.0, 5.0, 9.0], 0.01, (400, 3)), index, ["a", "b", "c"])
+    direction = Direction.of(MahalanobisDetector().fit(F), F, ["a", "b", "c"])
+    moved = F.iloc[:2].assign(a=4.2, b=[4.9, 5.0], c=9.0)  # a rises by 20 deviations, b falls by 10 or stays
+    assert direction.of_rows(moved).tolist() == [1, -1]

@@ -242,7 +242,8 @@ def _too_few(records: pd.DataFrame) -> str:
         return "there are no records since the baseline that may train"
     n_weeks = blocks_of(records.index).max() + 1
     if n_weeks < FEWEST_WEEKS:
-        return f"{counted(len(records), 'new record')} in {counted(n_weeks, 'week')}; expected {FEWEST_WEEKS} or more"
+        come = f"{counted(len(records), 'new record')} in {counted(n_weeks, 'week')}"
+        return f"{come}; expected {FEWEST_WEEKS} weeks or more"
     return ""
 
 
