@@ -73,7 +73,8 @@ class DailyNoise:
         products, logarithms, _ = _innovations(columns, known, thinness, candidates)
         n_days, n_regressors = known.sum(axis=0), regressors.shape[2]
         gram, cross = products[:, :, 1:, 1:], products[:, :, 1:, 0]
-        ridge = 1e-10 * np.trace(gram, axis1=2, axis2=3)[:, :, np.newaxis, np.newaxis] * np.eye(n_regressors)
+        size = np.trace(gram, axis1=2, axis2=3)[:, :, np.newaxis, np.newaxis]
+        ridge = np.where(size > 0, 1e-10 * size, 1.0) * np.eye(n_regressors)  # 0 for a mode that was not measured
         coefficients = np.linalg.solve(gram + ridge, cross[..., np.newaxis])[..., 0]
         rest = np.maximum(products[:, :, 0, 0] - (cross * coefficients).sum(axis=2), 0.0)
         freedom = np.maximum(n_days - n_regressors, 1)

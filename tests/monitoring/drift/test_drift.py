@@ -356,6 +356,18 @@ def test_more_groups_than_modes_are_said_to_be_a_limit(history):
     assert "which these modes do not determine" in fewer.summary()
 
 
+@pytest.mark.parametrize("n_measured", [0, 10])
+def test_a_mode_that_is_hardly_measured_is_left_out(ageing, n_measured):
+    campaign, fem = ageing
+    F = campaign.frequencies.copy()
+    F.iloc[n_measured:, 1] = np.nan
+    found = track_parameters(fem, campaign.temperatures, F, GROUPS, WEEK, random_state=0)
+    assert found.explanations["groups"].iloc[0] == ("bottom",)
+    assert "Measured on too few days to be used: f2." in found.summary()
+    error = found.rates.loc["bottom", "standard_error"]
+    assert_allclose(found.rates.loc["bottom", "per_year"], -0.02, atol=3 * error)
+
+
 def test_mirror_images_are_named_together():
     """Springs in a row between two walls: no frequency tells the first from the last."""
     elongations = np.vstack([np.eye(5)[0], np.diff(np.eye(5), axis=0), -np.eye(5)[-1]])
