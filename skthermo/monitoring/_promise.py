@@ -15,6 +15,7 @@ from skthermo._saved_frames import SavesFrames
 from skthermo._warnings import warn_user
 
 YEAR = pd.Timedelta(days=365.25)
+ONE_DAY = pd.Timedelta(days=1)
 N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
 NEAR = 15  # days of the year, up to which a record stands for the season around it
@@ -183,7 +184,8 @@ def promised_rule(
     if len(squares) < FEWEST_PEAKS or asked > len(squares):
         raise ValueError(
             f"false_alarms_per_year is {per_year:g}, but the {years} of the baseline have only "
-            f"{counted_number(len(squares), 'excursion')} that end with {hold} of quiet; expected at "
+            f"{counted_number(len(squares), 'excursion')} that end with "
+            f"{counted_number(hold / ONE_DAY, 'day')} of quiet; expected at "
             f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
     tail = Tail.of(squares, asked)
@@ -192,6 +194,15 @@ def promised_rule(
     method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
         ", extrapolated" if asked < FAR else ""
     )
+    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen)
+    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method)
+
+
+def _warn_of_baseline(
+    excursions: pd.DataFrame, tail: Tail, rule: EventRule, asked: float, per_year: float, years: str, unseen: str
+) -> None:
+    """Warn of a threshold that stands on seasons not seen, on too little time, or on a single excursion."""
+    squares = excursions["peak"].to_numpy() ** 2
     if unseen:
         warn_user(
             f"the baseline has no record of {unseen}: the number of false alarms a year is that of the seasons that it "
@@ -214,7 +225,6 @@ def promised_rule(
             "without records of a fault or of another state",
             "excursion of the baseline",
         )
-    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method)
 
 
 def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:

@@ -212,6 +212,30 @@ class Followed:
         return Course(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
 
 
+def confused_sets(found: Explanations, rivals: Mapping[int, Sequence[int]]) -> list[tuple[int, ...]]:
+    """Groups that cannot be told apart: in the drift that was found, or by their effects on the modes."""
+    sets = [tuple(others) for others in rivals.values() if len(others) > 1]
+    for group, others in found.lookalikes.items():
+        alike = tuple(sorted([group, *(one for one in others if group in found.lookalikes.get(one, []))]))
+        if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
+            sets.append(alike)
+    return sets
+
+
+def mode_table(names: Sequence[Any], followed: Followed, explained: Array) -> pd.DataFrame:
+    """Measured and explained change of ln frequency over the records; NaN for a mode that was hardly measured."""
+    trends = followed.trends
+    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.days), trends.n_shapes)[-1:])
+    columns = {
+        "measured": at_end @ trends.mean,
+        "explained": explained,
+        "standard_error": np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T)),
+    }
+    table = pd.DataFrame(columns, index=pd.Index(names, name="mode"))
+    table.loc[~followed.daily.known.any(axis=0)] = np.nan
+    return table
+
+
 def history_of(
     fem: Any, effects: GroupEffects, followed: Followed, significance: float, random: np.random.RandomState
 ) -> ParameterHistory:
@@ -225,11 +249,7 @@ def history_of(
             replaced = {member for member, others in rivals.items() if group in others}
             others = [member for member in best if member not in replaced] if has_drift else []
             courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
-    sets = [tuple(others) for others in rivals.values() if len(others) > 1]
-    for group, others in found.lookalikes.items():
-        alike = tuple(sorted([group, *(one for one in others if group in found.lookalikes.get(one, []))]))
-        if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
-            sets.append(alike)
+    sets = confused_sets(found, rivals)
     named = {names[group]: courses[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []
@@ -240,18 +260,8 @@ def history_of(
     with np.errstate(divide="ignore"):
         alone = 1 / np.sqrt(information) / followed.trends.years
     shifts = sum((np.outer(courses[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
-    trends, n_shapes = followed.trends, followed.trends.n_shapes
-    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.days), n_shapes)[-1:])
+    trends = followed.trends
     misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
-    modes = pd.DataFrame(
-        {
-            "measured": at_end @ trends.mean,
-            "explained": shifts[-1] if has_drift else np.zeros(len(trends.slopes)),
-            "standard_error": np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T)),
-        },
-        index=pd.Index(fem.mode_names_, name="mode"),
-    )
-    modes.loc[~followed.daily.known.any(axis=0)] = np.nan
     return ParameterHistory(
         days=followed.daily.days,
         courses=named,
@@ -270,7 +280,7 @@ def history_of(
         lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
         unseen=[names[group] for group in np.flatnonzero(found.unseen)],
         noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
-        modes=modes,
+        modes=mode_table(fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes))),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
         widening=found.widening,
         shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, followed.daily.days, fem.mode_names_),
