@@ -403,7 +403,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("promised numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
     ],
     ("monitoring/_direction.py", "monitoring/test_direction.py"): [
-        ("direction told by lowered frequencies", "[1] <= nnls(-effects", "[1] >= nnls(-effects"),
+        ("direction told by lowered frequencies", "and left < nnls(effects", "and left > nnls(effects"),
+        ("a mixed change called stiffening", "-1 if explained and left", "-1 if left"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [
         ("functions read from files", "isinstance(found, type) and found", "found"),

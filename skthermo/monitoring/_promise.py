@@ -202,7 +202,7 @@ def _warn_of_baseline(
     excursions: pd.DataFrame, tail: Tail, rule: EventRule, asked: float, per_year: float, years: str, unseen: str
 ) -> None:
     """Warn of a threshold that stands on seasons not seen, on too little time, or on a single excursion."""
-    squares = excursions["peak"].to_numpy() ** 2
+    highest, second = excursions["peak"].iloc[:2]
     if unseen:
         warn_user(
             f"the baseline has no record of {unseen}: the number of false alarms a year is that of the seasons that it "
@@ -212,15 +212,15 @@ def _warn_of_baseline(
     if asked < FAR:
         warn_user(
             f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
-            f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {np.sqrt(squares[0]):.3g}: "
+            f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
-    if (squares[0] - tail.base) / tail.excess > _largest_share(tail.k):
-        others = Tail.of(squares[1:], asked).threshold(asked)
+    if (highest**2 - tail.base) / tail.excess > _largest_share(tail.k):
+        others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked).threshold(asked)
         warn_user(
             f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
-            f"(damage index {np.sqrt(squares[0]):.3g}, next {np.sqrt(squares[1]):.3g}) and raises the threshold "
+            f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
             f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
             "without records of a fault or of another state",
             "excursion of the baseline",
