@@ -28,6 +28,12 @@ from skthermo.plotting.structures._members import (
 from skthermo.plotting.structures._view import View
 
 WIDTH, THIN = 2.5, 0.8
+LABELS = {
+    "probability": "probability of damage",
+    "severity": "mean loss of stiffness",
+    "if_damaged": "loss of stiffness where damaged",
+}
+"""What the columns of located damage are called beside a colour bar."""
 
 
 @dataclass(eq=False, repr=False)
@@ -39,7 +45,7 @@ class StructureDisplay:
 
     Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
-    It is best made by `from_structure`.
+    It is best made by `from_structure`, or by `from_located`.
 
     Parameters
     ----------
@@ -119,6 +125,33 @@ class StructureDisplay:
             raise ValueError("values and groups are both given; expected one of them to colour the members")
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
+
+    @classmethod
+    def from_located(cls, located: Any, quantity: str = "probability", **options: Any) -> StructureDisplay:
+        """Draw where a structure is damaged, member by member.
+
+        Parameters
+        ----------
+        located : LocatedDamage
+            From `~skthermo.studies.locate_damage`.
+        quantity : {"probability", "severity", "if_damaged"}, default="probability"
+            Column of its table that colours the members; those of no group are grey.
+        **options : dict
+            Options of `plot`; by default the colours go from 0 to 1.
+
+        Returns
+        -------
+        StructureDisplay
+
+        Raises
+        ------
+        ValueError
+            If the quantity is unknown.
+        """
+        if quantity not in LABELS:
+            raise ValueError(f"quantity is {quantity!r}; expected one of {list(LABELS)}")
+        options = {"cmap": "YlOrRd", "limits": (0.0, 1.0)} | options
+        return cls.from_structure(located.structure, located.table[quantity], label=LABELS[quantity], **options)
 
     def plot(
         self,

@@ -1,0 +1,175 @@
+"""Located damage, as `locate_damage` returns it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arguments import check_probability
+from skthermo._formatting import SPACE, percent, share_text
+from skthermo.fem import Structure
+from skthermo.studies.identification import IdentifiedDamage
+from skthermo.studies.location._places import Places
+
+LIKELY, PROBABLE = 0.9, 0.5
+"""Probabilities with which a summary says where damage is: almost surely, and more likely than not."""
+
+WORTH_TELLING = 0.1  # probability of a group from which on a summary says where in it
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One explanation: the damaged members and the severity of each group in it, and its probability."""
+
+    probability: float
+    members: Mapping[str, frozenset[Hashable]]
+    severities: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedDamage:
+    """Where in its groups a structure is damaged, member by member, as far as records tell.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a member of a group: ``group``; ``element``, its number along the group; ``probability`` that it is
+        among the damaged members; ``severity``, its mean over all explanations, where those without it count as 0;
+        ``if_damaged``, its mean where it is damaged; ``is_likely``, whether it is in the smallest set that holds all
+        damaged members with a probability of 90 %, given that there are any.
+    groups : DataFrame
+        One row a group: ``probability`` that a part of it is damaged, or all; ``severity``, ``elements``, their number;
+        ``pieces``, into how many it was divided; ``likely``, how many elements hold its damage with a probability of
+        90 %.
+    levels : DataFrame
+        One row a division and group: ``pieces``; ``stretches`` of neighbouring pieces of which was asked whether they
+        are damaged; ``probability`` of the group; ``likely``, how many elements held its damage with a probability of
+        90 %.
+    found : IdentifiedDamage
+        What was found for whole groups.
+    structure : Structure
+        Whose members these are.
+    probability_of_damage : float
+        Probability that a member is damaged.
+    probability_of_else : float
+        Probability that something else shifted the frequencies, beside damage or alone.
+    alike : mapping of str to str
+        Group -> parts of it of which these modes cannot tell one from the other.
+    """
+
+    table: pd.DataFrame
+    groups: pd.DataFrame
+    levels: pd.DataFrame
+    found: IdentifiedDamage
+    structure: Structure = field(repr=False)
+    probability_of_damage: float
+    probability_of_else: float
+    alike: Mapping[str, str]
+    explained: Sequence[Explained] = field(repr=False)
+    places: Mapping[str, Places] = field(repr=False)
+
+    def likely_members(self, probability: float = LIKELY, group: str | None = None) -> list[Hashable]:
+        """The fewest members that hold all damaged ones with a probability, given that there are any.
+
+        Parameters
+        ----------
+        probability : float, default=0.9
+            Between 0 and 1.
+        group : str, optional
+            Only damage in this group. By default in any.
+
+        Returns
+        -------
+        list of members
+            The most probable first; none if there is no damage.
+
+        Raises
+        ------
+        ValueError
+            If the group is unknown, or the probability is not between 0 and 1.
+        """
+        if group is not None and group not in self.places:
+            raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
+        return fewest(self._sets(group), check_probability(probability, "probability"))[0]
+
+    def answer(self) -> list[str]:
+        """Where the structure is damaged, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences.
+        """
+        return list(self._answer())
+
+    def summary(self) -> str:
+        """What was found, where in each group, and what cannot be told apart.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        return "\n".join(self.answer()).replace(SPACE, " ")
+
+    def _sets(self, group: str | None) -> list[tuple[frozenset[Hashable], float]]:
+        """Sets of damaged members and their probabilities."""
+        if group is not None:
+            return [(e.members[group], e.probability) for e in self.explained if group in e.members]
+        return [(frozenset().union(*e.members.values()), e.probability) for e in self.explained if e.members]
+
+    def _answer(self) -> Iterator[str]:
+        probable = self.groups[self.groups["probability"] >= WORTH_TELLING]
+        if probable.empty:
+            yield (
+                f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "
+                "name."
+            )
+        for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
+            yield from self._of_group(str(group), row)
+        if self.probability_of_else >= WORTH_TELLING:
+            yield f"Something else may have shifted the frequencies ({share_text(self.probability_of_else)})."
+
+    def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
+        damaged = f"{group} is damaged with a probability of {share_text(row['probability'])}"
+        places = self.places[group]
+        if row["pieces"] == 1:
+            yield damaged + (", of one element." if row["elements"] == 1 else "; it was not divided.")
+            return
+        (small, in_small), (wide, in_wide) = (fewest(self._sets(group), level) for level in (PROBABLE, LIKELY))
+        if len(small) == len(places.members):
+            yield f"{damaged}; these records do not say where in it."
+            return
+        yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({share_text(in_small)})."
+        if len(wide) == len(places.members):
+            yield f"The rest of {group} cannot be excluded."
+        elif set(wide) != set(small):
+            where = places.text(wide, alternatives=True)
+            yield f"It lies in {where} with {share_text(in_wide)}; the rest of {group} is unlikely."
+        else:
+            yield f"The rest of {group} is unlikely."
+        if group in self.alike:
+            yield f"These modes cannot tell {self.alike[group]} from each other."
+
+    def __repr__(self) -> str:
+        best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
+        return f"LocatedDamage({', '.join(f'{group} {share:.0%}' for group, share in best.items())})"
+
+
+def fewest(sets: Collection[tuple[frozenset[Hashable], float]], probability: float) -> tuple[list[Hashable], float]:
+    """The fewest members, by their own probabilities, that hold all damaged ones with a probability, and theirs."""
+    shares: dict[Hashable, float] = {}
+    for members, share in sets:
+        for member in members:
+            shares[member] = shares.get(member, 0.0) + share
+    ordered = sorted(shares, key=lambda member: -shares[member])
+    rank = {member: position for position, member in enumerate(ordered)}
+    held = np.zeros(len(ordered))
+    for members, share in sets:
+        held[max(rank[member] for member in members)] += share
+    held = np.cumsum(held) / max(held.sum(), np.finfo(float).tiny)
+    number = int(np.searchsorted(held, probability * (1 - 1e-9))) + 1
+    return ordered[:number], float(held[number - 1]) if ordered else 0.0
