@@ -344,7 +344,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         ----------
         masses : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,)
             Names and masses in kg; a vector holds lumped masses.
-        amounts : (float, float), default=(0, 2)
+        amounts : (float, float), default=(0.0, 2.0)
             Smallest and largest amount that a reduced model covers, above -1; a full model has no bounds.
 
         Returns
@@ -367,7 +367,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         >>> loaded.parameter_names
         ('bottom', 'top', 'diagonal', 'vertical', '1 + asphalt')
         >>> loaded.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 1.5]])[:, 0].round(3)
-        array([7.485, 6.876])
+        array([7.485, 7.269])
         """
         if not isinstance(masses, Mapping) or not masses:
             raise ValueError(f"masses is {masses!r:.200}; expected a mapping of name to mass in kg")
