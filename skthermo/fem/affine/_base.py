@@ -71,6 +71,15 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         return dict(self._groups)
 
     @property
+    def parameter_terms(self) -> dict[str, tuple[int, ...]]:
+        """Parameters and the positions of the stiffness terms that each scales; none for a parameter of the mass."""
+        exponents = self._full_core.stiffness.exponents
+        return {
+            name: tuple(np.flatnonzero(column).tolist())
+            for name, column in zip(self._parameter_names, exponents.T, strict=True)
+        }
+
+    @property
     def rows_per_chunk(self) -> int:
         """How many samples are solved together, so that memory stays bounded."""
         return self._core.rows_per_chunk
