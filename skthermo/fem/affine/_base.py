@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import copy
 from functools import partial
 from typing import Any, Self
@@ -22,6 +22,8 @@ from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import check_different, check_modes, read_mass, read_matrix
 from skthermo.fem.modal import LocalModes
 
+Content = tuple[Hashable, tuple[str, ...]]
+
 
 class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel, ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
@@ -32,6 +34,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
     _parameter_names: tuple[str, ...]
     _groups: dict[str, tuple[int, ...]]
+    _contents: tuple[tuple[Content, ...], ...] = ()
     _core: AffineCore
     _basis: Array | None = None
     _is_quiet = False
@@ -69,6 +72,25 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
     def groups(self) -> dict[str, tuple[int, ...]]:
         """Damage groups and the positions of the stiffness terms that each scales."""
         return dict(self._groups)
+
+    @property
+    def parameter_terms(self) -> dict[str, tuple[int, ...]]:
+        """Parameters and the positions of the stiffness terms that each scales; none for a parameter of the mass."""
+        exponents = self._full_core.stiffness.exponents
+        return {
+            name: tuple(np.flatnonzero(column).tolist())
+            for name, column in zip(self._parameter_names, exponents.T, strict=True)
+        }
+
+    @property
+    def contents(self) -> tuple[tuple[Content, ...], ...]:
+        """Members of a `Structure` and their properties whose matrices each stiffness term sums; empty if unknown."""
+        return self._contents
+
+    @property
+    def stiffness_terms(self) -> list[scipy.sparse.csc_array]:
+        """Matrices of the stiffness terms in N/m, without the parameters and severities that multiply them."""
+        return [scipy.sparse.csc_array(matrix) for matrix in self._full_core.stiffness.each_matrix]
 
     @property
     def rows_per_chunk(self) -> int:
@@ -379,6 +401,60 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         bounds = np.tile(1 + range_of, (len(masses), 1))
         return self._changed(lambda core: core.with_mass_factors(matrices), names, bounds)
 
+    def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
+        """A new model of the same matrices with further damage groups, each of which scales parts of stiffness terms.
+
+        `Structure.divide` finds the parts that belong to members.
+
+        Parameters
+        ----------
+        parts : mapping of str to mapping of int to matrix
+            Damage group -> position of a stiffness term -> the matrix (n_dof, n_dof), a part of that term, which the
+            group scales. What is left of a term still belongs to the groups that it is in, and so do its parts.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            With the same parameters and frequencies. A reduced model is checked anew.
+
+        Raises
+        ------
+        ValueError
+            If a group exists already or has no part, a term is unknown, or a matrix has the wrong shape or is not
+            symmetric.
+
+        Examples
+        --------
+        Two springs in a row, of which one parameter is the stiffness of both:
+
+        >>> import numpy as np
+        >>> from skthermo.fem import AffineModel
+        >>> model = AffineModel({("k",): [[800.0, -400.0], [-400.0, 400.0]]}, mass=np.eye(2), n_modes=2)
+        >>> divided = model.with_parts({"first": {0: [[400.0, 0.0], [0.0, 0.0]]}})
+        >>> divided.groups
+        {'k': (0, 1), 'first': (1,)}
+        >>> divided.damaged({"first": 0.5}).frequencies([[1.0]]).round(3)
+        array([[1.49 , 4.807]])
+        """
+        n_terms = len(self._full_core.stiffness.factors)
+        groups, divided = dict(self._groups), []
+        for name, of_terms in parts.items():
+            if name in self._groups or not isinstance(of_terms, Mapping) or not of_terms:
+                raise ValueError(f"part {name!r} is {of_terms!r:.200}; expected a new name, and matrices by position")
+            unknown = [position for position in of_terms if position not in range(n_terms)]
+            if unknown:
+                raise ValueError(f"part {name!r} is of terms {unknown}; expected positions from 0 to {n_terms - 1}")
+            first = n_terms + len(divided)
+            new = dict(zip(of_terms, range(first, first + len(of_terms)), strict=True))
+            for group, inside in groups.items():
+                groups[group] = (*inside, *(new[position] for position in inside if position in new))
+            groups[name] = tuple(new.values())
+            divided += [
+                (position, read_matrix(part, f"part {name!r}", self.n_dof)) for position, part in of_terms.items()
+            ]
+        twin = self._changed(lambda core: core.with_divided_stiffness(divided), groups=groups)
+        return twin._twin(_contents=())
+
     def quiet(self) -> Self:
         return self._twin(_is_quiet=True)
 
@@ -404,8 +480,9 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
+        groups: dict[str, tuple[int, ...]] | None = None,
     ) -> Self:
-        """A model like this one with a changed full core, these parameter names, and bounds of the new ones."""
+        """A model like this one with a changed full core, these parameter names, bounds of the new ones, and groups."""
 
     @property
     @abstractmethod

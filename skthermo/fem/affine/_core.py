@@ -160,6 +160,17 @@ class AffineCore:
         solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
         return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
 
+    def with_divided_stiffness(self, parts: Sequence[tuple[int, Matrix]]) -> "AffineCore":
+        """The core with parts of its stiffness terms, each with its term's position, taken out as further terms."""
+        matrices = self.stiffness.each_matrix
+        for position, part in parts:
+            matrices[position] = matrices[position] - part
+        origin = [*range(len(matrices)), *(position for position, _ in parts)]
+        terms = [*matrices, *(part for _, part in parts)]
+        stiffness = self.stiffness.from_matrices(terms, self.stiffness.exponents[origin])
+        stiffness = stiffness.scaled(self.stiffness.factors[origin])
+        return replace(self, stiffness=stiffness, solver=eigen_solver(stiffness, self.mass))
+
     def projected(self, basis: Array, widest_spectrum: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes."""
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
