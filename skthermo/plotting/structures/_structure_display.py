@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from skthermo._arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes, legend_columns
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, ORANGE, drawing, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
     add_lines,
     add_points,
@@ -28,6 +28,7 @@ from skthermo.plotting.structures._members import (
 from skthermo.plotting.structures._view import View
 
 WIDTH, THIN = 2.5, 0.8
+DAMAGE_COLOURS = ["#BFC5CC", "#F0C04A", ORANGE, "#7A0019"]  # from grey, as nothing there asks for attention
 LABELS = {
     "probability": "probability of damage",
     "severity": "mean loss of stiffness",
@@ -150,7 +151,8 @@ class StructureDisplay:
         """
         if quantity not in LABELS:
             raise ValueError(f"quantity is {quantity!r}; expected one of {list(LABELS)}")
-        options = {"cmap": "YlOrRd", "limits": (0.0, 1.0)} | options
+        cmap = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("damage", DAMAGE_COLOURS)
+        options = {"cmap": cmap, "limits": (0.0, 1.0)} | options
         return cls.from_structure(located.structure, located.table[quantity], label=LABELS[quantity], **options)
 
     def plot(

@@ -19,13 +19,17 @@ Effects = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Curves:
-    """Change of each observation, (n_causes, n_severities, n_observed), and its slopes by ``PLACES``."""
+    """Change of each observation, (n_causes, n_severities, n_observed), and its slopes by ``PLACES``.
+
+    ``rotation`` leads to the coordinates in which errors of the observations are independent, with unit variance.
+    """
 
     changes: Array
     slopes: Array
+    rotation: Array
 
     @classmethod
-    def of(cls, effects: Effects, incidence: NDArray[np.bool_]) -> Curves:
+    def of(cls, effects: Effects, incidence: NDArray[np.bool_], rotation: Array) -> Curves:
         """Of causes that each damage some groups by one severity; incidence is (n_causes, n_groups)."""
         sets = incidence[:, np.newaxis] * SEVERITIES[:, np.newaxis]
         sets = np.vstack([np.zeros((1, incidence.shape[1])), sets[:, 1:].reshape(-1, incidence.shape[1])])
@@ -37,18 +41,34 @@ class Curves:
         return cls(
             np.concatenate([np.zeros_like(changes[:, :1]), changes], axis=1),
             np.concatenate([at_zero, (damaged * inner).sum(axis=-1)], axis=1),
+            rotation,
         )
 
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Changes, (..., n_observed), and derivatives, (..., n_observed, n_causes), by severities (..., n_causes)."""
-        place = -np.log1p(-amounts)
+        changes, slopes = self.single(np.arange(amounts.shape[-1]), amounts)
+        return changes.sum(axis=-2), np.moveaxis(slopes, -2, -1)
+
+    def at(self, sets: NDArray[np.intp], amounts: Array) -> tuple[Array, Array, Array]:
+        """Changes of sets (n_sets, k) with severities (n_sets, n, k), derivatives, and variances of the model's errors.
+
+        They are in the coordinates of what was observed, (n_sets, n, n_observed), and derivatives have the axis k more.
+        """
+        changes, slopes = self.single(sets[:, np.newaxis], amounts)
+        rotated = np.moveaxis(slopes @ self.rotation.T, -2, -1)
+        variances = (changes**2).sum(axis=-2) @ (self.rotation**2).T
+        return changes.sum(axis=-2) @ self.rotation.T, rotated, variances
+
+    def single(self, causes: NDArray[np.intp], severities: Array) -> tuple[Array, Array]:
+        """Changes by causes (...,) of some severities (...,), and their derivatives, both (..., n_observed)."""
+        place = -np.log1p(-severities)
         left = np.clip(np.searchsorted(PLACES, place, side="right") - 1, 0, len(PLACES) - 2)
         width = (PLACES[left + 1] - PLACES[left])[..., np.newaxis]
         x = (place - PLACES[left])[..., np.newaxis] / width
-        cause = np.arange(amounts.shape[-1])
-        low, high = self.changes[cause, left], self.changes[cause, left + 1]
-        start, end = self.slopes[cause, left] * width, self.slopes[cause, left + 1] * width
-        rise, square, cube = high - low, 2 * start + end, start + end
-        changes = low + x * (start + x * (3 * rise - square + x * (cube - 2 * rise)))
-        slopes = (start + x * (2 * (3 * rise - square) + x * 3 * (cube - 2 * rise))) / width
-        return changes.sum(axis=-2), np.moveaxis(slopes / (1 - amounts[..., np.newaxis]), -2, -1)
+        low, high = self.changes[causes, left], self.changes[causes, left + 1]
+        start, end = self.slopes[causes, left] * width, self.slopes[causes, left + 1] * width
+        rise = high - low
+        square, cube = 3 * rise - 2 * start - end, start + end - 2 * rise
+        changes = low + x * (start + x * (square + x * cube))
+        slopes = (start + x * (2 * square + x * 3 * cube)) / (width * (1 - severities[..., np.newaxis]))
+        return changes, slopes

@@ -48,7 +48,9 @@ class Division:
     def finer(self, chosen: Sequence[bool]) -> Division:
         """The division with the chosen pieces cut into halves."""
         flags = iter(chosen)
-        lines = [[half for piece in line for half in (_cut(piece, 2) if next(flags) else [piece])] for line in self.lines]
+        lines = [
+            [half for piece in line for half in (_cut(piece, 2) if next(flags) else [piece])] for line in self.lines
+        ]
         return Division(self.group, tuple(map(tuple, lines)))
 
     def stretches(self) -> Iterator[tuple[tuple[int, ...], float, float]]:

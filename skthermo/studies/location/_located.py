@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._arguments import check_probability
 from skthermo._formatting import SPACE, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
@@ -93,7 +92,7 @@ class LocatedDamage:
         """
         if group is not None and group not in self.places:
             raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
-        return fewest(self._sets(group), check_probability(probability, "probability"))[0]
+        return fewest(self._sets(group), probability)[0]
 
     def answer(self) -> list[str]:
         """Where the structure is damaged, and how surely.
@@ -141,7 +140,12 @@ class LocatedDamage:
             return
         (small, in_small), (wide, in_wide) = (fewest(self._sets(group), level) for level in (PROBABLE, LIKELY))
         if len(small) == len(places.members):
-            yield f"{damaged}; these records do not say where in it."
+            whole = self._share_of_whole(group)
+            yield damaged + (
+                f", probably all {len(small)} elements alike ({share_text(whole)})."
+                if whole >= PROBABLE
+                else "; these records do not say where in it."
+            )
             return
         yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({share_text(in_small)})."
         if len(wide) == len(places.members):
@@ -153,6 +157,11 @@ class LocatedDamage:
             yield f"The rest of {group} is unlikely."
         if group in self.alike:
             yield f"These modes cannot tell {self.alike[group]} from each other."
+
+    def _share_of_whole(self, group: str) -> float:
+        """Probability that all of a group is damaged alike, given that it is damaged."""
+        sets, everything = self._sets(group), frozenset(self.places[group].members)
+        return sum(share for members, share in sets if members == everything) / sum(share for _, share in sets)
 
     def __repr__(self) -> str:
         best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
