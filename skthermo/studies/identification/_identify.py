@@ -20,6 +20,7 @@ from skthermo.studies.identification._compared import ComparedRecords, left_out_
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
+from skthermo.studies.identification._measured_shapes import ShapeShift
 from skthermo.studies.identification._separability import VISIBLE, errors_alone, merge_confused
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from skthermo.studies.identification._shift import measured_shift
@@ -146,7 +147,7 @@ def identify_damage(
     def compared(effects: FrequencyEffects) -> Comparison:
         parts = [Part(remembered(effects), shift.mean, shift.covariance)]
         if shapes is not None:
-            parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
+            parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
         return Comparison(parts, incidence, labels, of_model)
 
     effects = FrequencyEffects.of(fem, theta, frequencies, Changes.of_damage(fem.model, of_model))
@@ -184,15 +185,14 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
     return frequencies
 
 
-def _of_shapes(
-    fem: Any, theta: Array, groups: Sequence[str], shapes: Any, dofs: ArrayLike | None, noise: ArrayLike
-) -> Part:
+def _of_shapes(effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, noise: ArrayLike) -> Part:
     """Measured changes of mode shapes, and the effects of the groups on them."""
     if dofs is None:
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
-    effects = ShapeEffects.of(fem, theta, groups, dofs)
-    change, deviations = effects.measured(shapes, noise)
-    return Part(remembered(effects), change, np.diag(deviations**2))
+    structure = effects.structure
+    of_shapes = ShapeEffects.of(structure, effects.theta, dofs)
+    shift = ShapeShift.of(of_shapes, shapes, noise, structure.fem.mode_names_)
+    return Part(remembered(shift.effects), shift.change, np.diag(shift.variances))
 
 
 def _named_as_in_fit(fem: Any, T: Any) -> Any:
