@@ -12,20 +12,12 @@ from skthermo._formatting import SPACE, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
 from skthermo.studies.location._places import Places
+from skthermo.studies.location._weighing import Answer, Explained
 
 LIKELY, PROBABLE = 0.9, 0.5
 """Probabilities with which a summary says where damage is: almost surely, and more likely than not."""
 
 WORTH_TELLING = 0.1  # probability of a group from which on a summary says where in it
-
-
-@dataclass(frozen=True)
-class Explained:
-    """One explanation: the damaged members and the severity of each group in it, and its probability."""
-
-    probability: float
-    members: Mapping[str, frozenset[Hashable]]
-    severities: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +48,7 @@ class LocatedDamage:
     probability_of_else : float
         Probability that something else shifted the frequencies, beside damage or alone.
     alike : mapping of str to str
-        Group -> parts of it of which these modes cannot tell one from the other.
+        Group -> two places in it that these modes cannot tell apart, in words.
     """
 
     table: pd.DataFrame
@@ -69,6 +61,60 @@ class LocatedDamage:
     alike: Mapping[str, str]
     explained: Sequence[Explained] = field(repr=False)
     places: Mapping[str, Places] = field(repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        answer: Answer,
+        found: IdentifiedDamage,
+        places: Mapping[str, Places],
+        pieces: Mapping[str, int],
+        levels: pd.DataFrame,
+    ) -> LocatedDamage:
+        """From the explanations of the finest division, and the number of pieces of each group that was divided."""
+        explained = answer.explained
+        total = sum(one.probability for one in explained)
+        sets = [(frozenset().union(*one.members.values()), one.probability) for one in explained if one.members]
+        likely, rows = set(fewest(sets, LIKELY)[0]), {}
+        for group, where in places.items():
+            for member, number in where.numbers.items():
+                if member not in rows:
+                    shares = [
+                        (one.probability / total, one.severities[name])
+                        for one in explained
+                        for name, inside in one.members.items()
+                        if member in inside
+                    ]
+                    rows[member] = _averages(shares) | {"group": group, "element": number, "is_likely": member in likely}
+        columns = ["group", "element", "probability", "severity", "if_damaged", "is_likely"]
+        table = pd.DataFrame(list(rows.values()), pd.Index(list(rows), tupleize_cols=False, name="member"), columns)
+        by_group = {}
+        for group, where in places.items():
+            inside = [one for one in explained if group in one.members]
+            of_group = [(one.members[group], one.probability) for one in inside]
+            by_group[group] = _averages([(one.probability / total, one.severities[group]) for one in inside]) | {
+                "elements": len(where.members),
+                "pieces": pieces.get(group, 1),
+                "likely": len(fewest(of_group, LIKELY)[0]),
+            }
+        groups = pd.DataFrame.from_dict(by_group, orient="index")
+        alike = {
+            group: " from ".join(places[group].text(members) for members in pair)
+            for group, pair in answer.alike.items()
+            if pieces.get(group, 1) > 1
+        }
+        return cls(
+            table=table,
+            groups=groups,
+            levels=levels,
+            found=found,
+            structure=next(iter(places.values())).structure,
+            probability_of_damage=sum(share for _, share in sets) / total,
+            probability_of_else=sum(one.probability for one in explained if one.has_else) / total,
+            alike=alike,
+            explained=explained,
+            places=places,
+        )
 
     def likely_members(self, probability: float = LIKELY, group: str | None = None) -> list[Hashable]:
         """The fewest members that hold all damaged ones with a probability, given that there are any.
@@ -156,7 +202,7 @@ class LocatedDamage:
         else:
             yield f"The rest of {group} is unlikely."
         if group in self.alike:
-            yield f"These modes cannot tell {self.alike[group]} from each other."
+            yield f"These modes cannot tell {self.alike[group]}."
 
     def _share_of_whole(self, group: str) -> float:
         """Probability that all of a group is damaged alike, given that it is damaged."""
@@ -166,6 +212,17 @@ class LocatedDamage:
     def __repr__(self) -> str:
         best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
         return f"LocatedDamage({', '.join(f'{group} {share:.0%}' for group, share in best.items())})"
+
+
+def _averages(shares: Sequence[tuple[float, float]]) -> dict[str, float]:
+    """Probability, mean severity where the rest counts as 0, and mean severity where there is damage."""
+    probability = sum(share for share, _ in shares)
+    mean = sum(share * severity for share, severity in shares)
+    return {
+        "probability": probability,
+        "severity": mean,
+        "if_damaged": mean / probability if probability > 0 else float("nan"),
+    }
 
 
 def fewest(sets: Collection[tuple[frozenset[Hashable], float]], probability: float) -> tuple[list[Hashable], float]:
