@@ -101,3 +101,12 @@ def limits(found: Any) -> Iterator[str]:
 
 def _percent(share: float) -> str:
     return percent(share, ".1f")
+
+
+def warnings(found: Any) -> Iterator[tuple[str, str]]:
+    """What is doubtful, by kind and text."""
+    if found.confused:
+        sets = "; ".join(" and ".join(group) for group in found.confused)
+        yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
+    if found.unseen:
+        yield "unseen groups", f"groups that these modes hardly show: {', '.join(found.unseen)}"
