@@ -110,3 +110,9 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
         yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
     if found.unseen:
         yield "unseen groups", f"groups that these modes hardly show: {', '.join(found.unseen)}"
+
+
+def explanation_text(causes: tuple[str, ...], amounts: Any) -> str:
+    """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
+    parts = [f"{cause} {percent(amount, '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    return ", ".join([*parts, *causes[len(amounts) :]]) or "no damage"
