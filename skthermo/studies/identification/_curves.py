@@ -39,7 +39,7 @@ class Curves:
         return cls(nodes, rotated, own @ observed.rotation.T, errors)
 
     def at(self, sets: Array, amounts: Array) -> tuple[Array, Array, Array]:
-        """Changes of sets (n_sets, k) with amounts (n_sets, n_sizes, k), their derivatives, and the model's variances."""
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), derivatives, and variances of the model."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, variance, slopes = np.zeros(shape), np.zeros(shape), []
         for i in range(sets.shape[-1]):

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, MatrixLike, as_random_state
+from skthermo._arrays import MatrixLike, as_random_state
 from skthermo._frequency_effects import FrequencyEffects
 from skthermo._warnings import warn_each
 from skthermo.studies.identification._causes import read_causes
