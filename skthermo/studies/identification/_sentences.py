@@ -101,3 +101,18 @@ def limits(found: Any) -> Iterator[str]:
 
 def _percent(share: float) -> str:
     return percent(share, ".1f")
+
+
+def warnings(found: Any) -> Iterator[tuple[str, str]]:
+    """What is doubtful, by kind and text."""
+    if found.confused:
+        sets = "; ".join(" and ".join(group) for group in found.confused)
+        yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
+    if found.unseen:
+        yield "unseen groups", f"groups that these modes hardly show: {', '.join(found.unseen)}"
+
+
+def explanation_text(causes: tuple[str, ...], amounts: Any) -> str:
+    """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
+    parts = [f"{cause} {percent(amount, '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    return ", ".join([*parts, *causes[len(amounts) :]]) or "no damage"
