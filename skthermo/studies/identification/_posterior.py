@@ -143,7 +143,12 @@ class Posterior:
         mean = float(weight @ inside / weight.sum()) if weight.sum() > 0 else float("nan")
         highest = _summary(inside, weight)["highest"] if weight.sum() > 0 else float("nan")
         all_values, all_weights = np.append(inside, 0.0), np.append(weight, max(everything - weight.sum(), 0.0))
-        return {"probability": probability, **_summary(all_values, all_weights), "if_damaged": mean, "highest_if_damaged": highest}
+        return {
+            "probability": probability,
+            **_summary(all_values, all_weights),
+            "if_damaged": mean,
+            "highest_if_damaged": highest,
+        }
 
 
 def _summary(values: Array, weights: Array) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -11,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import as_random_state
 from skthermo._frequency_effects import read_groups
-from skthermo._warnings import told_around
 from skthermo.fem import Structure
-from skthermo.studies.identification import DamagePrior, IdentifiedDamage, compared_records, identify_damage
+from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division
 from skthermo.studies.location._lines import lines_of
 from skthermo.studies.location._located import LIKELY, LocatedDamage, fewest
@@ -124,11 +124,13 @@ def locate_damage(
     random = as_random_state(random_state)
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
     found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
-    with told_around(MEASURED_BEFORE):
-        shift, _, theta, frequencies = compared_records(fem, T, F, noise)
-    is_compared = ~np.isnan(frequencies).all(axis=1)
-    mean = theta[is_compared].mean(axis=0, keepdims=True)
-    question = MeasuredShift(fem, structure, contents, shift, mean, found.prior, plausible_together(found), **measured)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # identify_damage has given them
+        seen = observe(fem, T, F, noise)
+    mean = seen.theta[~np.isnan(seen.frequencies).all(axis=1)].mean(axis=0, keepdims=True)
+    question = MeasuredShift(
+        fem, structure, contents, seen.shift, mean, found.prior, plausible_together(found), **measured
+    )
     lines = {group: lines_of(structure, members_of(fem.model, own)) for group, own in contents.items()}
     places = {group: Places(structure, of_group) for group, of_group in lines.items()}
     most = MOST_SLOW_PIECES if getattr(fem.model, "prefer", "processes") == "processes" else MOST_PIECES

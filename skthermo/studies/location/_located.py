@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import SPACE, percent, share_text
+from skthermo._formatting import SPACE, listed, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
 from skthermo.studies.location._places import Places
@@ -85,7 +85,11 @@ class LocatedDamage:
                         for name, inside in one.members.items()
                         if member in inside
                     ]
-                    rows[member] = _averages(shares) | {"group": group, "element": number, "is_likely": member in likely}
+                    rows[member] = _averages(shares) | {
+                        "group": group,
+                        "element": number,
+                        "is_likely": member in likely,
+                    }
         columns = ["group", "element", "probability", "severity", "if_damaged", "is_likely"]
         table = pd.DataFrame(list(rows.values()), pd.Index(list(rows), tupleize_cols=False, name="member"), columns)
         by_group = {}
@@ -167,7 +171,8 @@ class LocatedDamage:
         return [(frozenset().union(*e.members.values()), e.probability) for e in self.explained if e.members]
 
     def _answer(self) -> Iterator[str]:
-        probable = self.groups[self.groups["probability"] >= WORTH_TELLING]
+        is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unseen)
+        probable = self.groups[is_told]
         if probable.empty:
             yield (
                 f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "
@@ -176,10 +181,12 @@ class LocatedDamage:
         for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
             yield from self._of_group(str(group), row)
         if self.probability_of_else >= WORTH_TELLING:
-            yield f"Something else may have shifted the frequencies ({share_text(self.probability_of_else)})."
+            yield f"Something else may have shifted the frequencies ({_share(self.probability_of_else)})."
+        if self.found.unseen:
+            yield f"Damage in {listed(self.found.unseen)} would hardly show in these modes."
 
     def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
-        damaged = f"{group} is damaged with a probability of {share_text(row['probability'])}"
+        damaged = f"{group} is damaged with a probability of {_share(row['probability'])}"
         places = self.places[group]
         if row["pieces"] == 1:
             yield damaged + (", of one element." if row["elements"] == 1 else "; it was not divided.")
@@ -188,17 +195,17 @@ class LocatedDamage:
         if len(small) == len(places.members):
             whole = self._share_of_whole(group)
             yield damaged + (
-                f", probably all {len(small)} elements alike ({share_text(whole)})."
+                f", probably all {len(small)} elements alike ({_share(whole)})."
                 if whole >= PROBABLE
                 else "; these records do not say where in it."
             )
             return
-        yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({share_text(in_small)})."
+        yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({_share(in_small)})."
         if len(wide) == len(places.members):
             yield f"The rest of {group} cannot be excluded."
         elif set(wide) != set(small):
             where = places.text(wide, alternatives=True)
-            yield f"It lies in {where} with {share_text(in_wide)}; the rest of {group} is unlikely."
+            yield f"It lies in {where} with {_share(in_wide)}; the rest of {group} is unlikely."
         else:
             yield f"The rest of {group} is unlikely."
         if group in self.alike:
@@ -223,6 +230,11 @@ def _averages(shares: Sequence[tuple[float, float]]) -> dict[str, float]:
         "severity": mean,
         "if_damaged": mean / probability if probability > 0 else float("nan"),
     }
+
+
+def _share(probability: float) -> str:
+    """A probability in percent, which is never quite 100."""
+    return share_text(min(probability, 1 - 1e-6))
 
 
 def fewest(sets: Collection[tuple[frozenset[Hashable], float]], probability: float) -> tuple[list[Hashable], float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from skthermo._arrays import Array
 from skthermo.fem import Structure
-from skthermo.studies.identification._prior import DamagePrior
+from skthermo.studies.identification import DamagePrior
 from skthermo.studies.location._division import Division
 
 PLAUSIBLE = 0.01  # probability of several groups together from which on each of them is divided in turn

@@ -12,20 +12,22 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects
-from skthermo._warnings import warnings_once
+from skthermo._warnings import told_around
 from skthermo.fem import Structure
 from skthermo.studies.identification import (
     SOMETHING_ELSE,
     Cause,
+    Comparison,
     DamagePrior,
     Observed,
+    Part,
     Posterior,
     Scale,
     ShapeEffects,
     ShapeShift,
-    weigh,
+    Shift,
+    screen,
 )
-from skthermo.studies.identification._shift import Shift
 from skthermo.studies.location._curves import Curves
 from skthermo.studies.location._division import Division
 from skthermo.studies.location._question import Question, on_pieces
@@ -76,12 +78,10 @@ class MeasuredShift:
         question = Question.of(self.fem.model, self.contents, divisions)
         observed, curves = self._curves(question)
         labels = [f"{stretch.group} [{number}]" for number, stretch in enumerate(question.stretches)]
-        causes = [
-            Cause(label, scale=stretch.scale) for label, stretch in zip(labels, question.stretches, strict=True)
-        ]
+        causes = [Cause(label, scale=stretch.scale) for label, stretch in zip(labels, question.stretches, strict=True)]
         scale = Scale(observed, curves, causes, self.prior, curves)
         sets, logs = zip(*question.explanations(self.prior, self.together), strict=True)
-        posterior = Posterior.of(scale, weigh(scale, sets, logs), np.array(logs), random)
+        posterior = Posterior.of(scale, screen(scale, sets, logs), np.array(logs), random)
         stretch_of = dict(zip(labels, question.stretches, strict=True))
         explained = []
         for one in posterior.explanations:
@@ -100,28 +100,18 @@ class MeasuredShift:
     def _curves(self, question: Question) -> tuple[Observed, Curves]:
         """What was measured, and the effects of all stretches on it."""
         twin = on_pieces(self.fem, self.structure, question.parts)
-        changes, is_known = Changes.of_damage(twin.model, question.names), ~np.isnan(self.shift.mean)
-        of_frequencies = FrequencyEffects.of(twin, self.theta, np.where(is_known, 1.0, np.nan)[np.newaxis], changes)
-        known = np.ix_(is_known, is_known)
-        parts = [(self.shift.mean[is_known], self.shift.covariance[known], np.ones(is_known.sum()), self.shift.freedom)]
-        of_shapes = None
+        changes = Changes.of_damage(twin.model, question.names)
+        mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
+        effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
+        parts = [Part(effects, self.shift.mean, self.shift.covariance, self.shift.freedom)]
         if self.shapes is not None:
-            with warnings_once():
-                effects = ShapeEffects.of(of_frequencies.structure, of_frequencies.theta, self.dofs)
-                shift = ShapeShift.of(effects, self.shapes, self.shape_noise, self.shift.modes)
-            of_shapes = shift.effects
-            parts.append((shift.change, np.diag(shift.variances), np.ones(len(shift.change)), np.inf))
-
-        def together(severities: Array) -> tuple[Array, Array]:
-            change, slopes = of_frequencies(severities)
-            change, slopes = change[..., is_known], slopes[..., is_known, :]
-            if of_shapes is None:
-                return change, slopes
-            further, d_further = of_shapes(severities)
-            return np.concatenate([change, further], axis=-1), np.concatenate([slopes, d_further], axis=-2)
-
-        observed = Observed.of(parts)
-        return observed, Curves.of(together, question.incidence, observed.rotation)
+            with told_around(["foreign mode shapes"]):
+                of_shapes = ShapeEffects.of(effects.structure, effects.theta, self.dofs)
+                shift = ShapeShift.of(of_shapes, self.shapes, self.shape_noise, self.shift.modes)
+            parts.append(Part(shift.effects, shift.change, np.diag(shift.variances)))
+        comparison = Comparison(parts)
+        observed = comparison.observed()
+        return observed, Curves.of(comparison.effects, question.incidence, observed.rotation)
 
 
 def alike(question: Question, curves: Curves, probable: NDArray) -> dict[str, tuple[frozenset, frozenset]]:
