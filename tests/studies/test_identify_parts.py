@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._bounded_fit import (
@@ -33,7 +34,9 @@ def differences(function, at, step=1e-4):
 def test_effects_are_the_changes_of_simulated_records(fem):
     F = fem.simulate(WEATHER).to_numpy(copy=True)
     F[::2, 1], F[:, 4] = np.nan, np.nan
-    effects = FrequencyEffects.of(fem, fem.predict_parameters(WEATHER).to_numpy(), F, GROUPS)
+    effects = FrequencyEffects.of(
+        fem, fem.predict_parameters(WEATHER).to_numpy(), F, Changes.of_damage(fem.model, GROUPS)
+    )
     change, slopes = effects(AT)
     damaged = fem.simulate(WEATHER, damage=dict(zip(GROUPS, AT, strict=True))).to_numpy()
     ratios = np.log(damaged / fem.simulate(WEATHER).to_numpy())

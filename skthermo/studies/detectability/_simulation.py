@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._frames import column_names, frame_like
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
@@ -39,6 +40,23 @@ class Records:
 
 
 @dataclass(frozen=True, eq=False)
+class Measurement:
+    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`."""
+
+    noise: Any
+    gaps: Any = None
+    outliers: Any = None
+
+    def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
+        """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
+        noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
+        if not isinstance(self.gaps, str):
+            return noise, T
+        missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
+        return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
+
+
+@dataclass(frozen=True, eq=False)
 class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
     every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
@@ -48,7 +66,7 @@ class Simulation:
     scenarios: Sequence[BaseScenario]
     T: Any
     clean: Mapping[str, Sequence[Array]]
-    noise: Any
+    measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
     def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
@@ -86,11 +104,11 @@ class Simulation:
         return judgement
 
     def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
-        """Records of scenarios from every source, one after the other, all with the same noise."""
-        factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
+        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
+        noise, T = self.measurement.of(self.fem, self.T, int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * factors, self.T, self.T)
+            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * (1 + noise), T, self.T)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 shape = as_columns(values).shape

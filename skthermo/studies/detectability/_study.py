@@ -25,6 +25,7 @@ from skthermo.studies.detectability._pod_curve import PODCurve, check_probabilit
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
+    Measurement,
     Simulation,
     clean_frequencies,
 )
@@ -58,10 +59,15 @@ class DetectabilityStudy(BaseEstimator):
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
         Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
+    gaps : float or "fitted", optional
+        Values that are missing in the simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`. With
+        "fitted", detectors that see temperatures also see them with the gaps of the training records.
+    outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
+        Values that are far off, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats. Results do not depend on it.
     random_state : int, RandomState or None, default=None
-        Seed of the noise, and of parts of detectors without a seed of their own.
+        Seed of noise, gaps and outliers, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are
         done.
@@ -101,9 +107,9 @@ class DetectabilityStudy(BaseEstimator):
 
     Notes
     -----
-    All scenarios and sources have the same weather, and repeat r has the same noise in all scenarios (common random
-    numbers), and all detectors judge the same records, so that differences between scenarios or detectors are more
-    certain than each rate. A detector's rates do not depend on which others are in the study.
+    All scenarios and sources have the same weather, and repeat r has the same noise, gaps and outliers in all scenarios
+    (common random numbers), and all detectors judge the same records, so that differences between scenarios or
+    detectors are more certain than each rate. A detector's rates do not depend on which others are in the study.
 
     The intervals are those of a rate over noise, for this weather, this baseline and this model: another year, another
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
@@ -148,6 +154,8 @@ class DetectabilityStudy(BaseEstimator):
         *,
         n_repeats: int = 20,
         noise: ArrayLike | Literal["fitted"] = "fitted",
+        gaps: float | Literal["fitted"] | None = None,
+        outliers: ArrayLike | Literal["fitted"] | None = None,
         uncertainty: Sequence[str] = ("noise",),
         models: Sequence[Any] | None = None,
         n_worlds: int = 20,
@@ -160,6 +168,8 @@ class DetectabilityStudy(BaseEstimator):
         self.scenarios = scenarios
         self.n_repeats = n_repeats
         self.noise = noise
+        self.gaps = gaps
+        self.outliers = outliers
         self.uncertainty = uncertainty
         self.models = models
         self.n_worlds = n_worlds
@@ -246,7 +256,8 @@ class DetectabilityStudy(BaseEstimator):
         with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
-            simulation = Simulation(self.fem, candidates, scenarios, T, clean, self.noise, function)
+            measurement = Measurement(self.noise, self.gaps, self.outliers)
+            simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
                 simulation.first_repeat(judgement, measured, seeds[0])
         with stages.stage(f"other {n_repeats - 1} repeats"):

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_floats, as_random_state, is_real
+from skthermo._changes import Changes
 from skthermo._frames import check_same_rows
 from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo._validation import check_array
@@ -148,7 +149,7 @@ def identify_damage(
             parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
         return Comparison(parts, incidence, labels, of_model)
 
-    effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
+    effects = FrequencyEffects.of(fem, theta, frequencies, Changes.of_damage(fem.model, of_model))
     every, nominal = compared(effects), compared(effects.nominal())
     alone = errors_alone(every.slopes())
     seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
