@@ -48,6 +48,14 @@ def probability_text(value: float) -> str:
     return "less than 0.001" if value < 0.001 else f"{value:.2g}"
 
 
+def chance_text(probability: float) -> str:
+    """A probability in percent; one of nearly 0 or 1 is said to be below or above."""
+    for limit, word, is_beyond in ((0.001, "below", probability < 0.001), (0.999, "above", probability > 0.999)):
+        if is_beyond:
+            return f"{word} {percent(limit)}"
+    return share_text(probability)
+
+
 def counted(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun."""
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
