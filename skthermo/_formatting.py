@@ -49,11 +49,10 @@ def probability_text(value: float) -> str:
 
 
 def chance_text(probability: float) -> str:
-    """A probability in percent; one of nearly 0 or 1 is said to be below or above."""
-    for limit, word, is_beyond in ((0.001, "below", probability < 0.001), (0.999, "above", probability > 0.999)):
-        if is_beyond:
-            return f"{word} {percent(limit)}"
-    return share_text(probability)
+    """A probability in percent without more digits than it deserves; one of nearly 0 or 1 is below or above a limit."""
+    if probability < 0.001 or probability > 0.999:
+        return f"below {percent(0.001)}" if probability < 0.001 else f"above {percent(0.999)}"
+    return percent(probability, ".0f" if 0.0095 <= probability < 0.995 else ".1f")
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from skthermo._arguments import seem_rad_per_s
-from skthermo._arrays import Array
 from skthermo._formatting import SPACE, chance_text, listed, percent
 from skthermo.studies.identification._causes import HIGHEST_SEVERITY
 from skthermo.studies.identification._told import Amount, either, told
@@ -26,16 +25,23 @@ EVEN = 0.1  # relative scatter of shifts up to which they count as even
 
 def answer(found: Any) -> Iterator[str]:
     """What is most probable, how probable, what else could be."""
-    first, *others = told(found)
-    yield f"Most probable: {first.phrase(with_bands=True)}, probability {chance_text(first.probability)}."
-    if first.is_else:
-        yield f"{_departure(found)}."
-        yield f"Likely causes: {likely_cause(found)}."
+    explanations = told(found)
+    first, *others = explanations
+    shown = " that these modes show" if found.unseen else ""
+    yield (
+        f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
+        f"{chance_text(first.probability)}."
+    )
+    if first.has_else:
+        what = "No damage of these groups" if first.is_else else "Damage of these groups alone hardly"
+        yield f"{what} explains the shifts; {_departure(found)}."
+        yield f"Likely causes: {likely_causes(found)}."
     named = [one for one in others if not one.is_healthy and one.probability >= NAMED][:MOST_NAMED]
     if named:
         yield f"It could also be: {'; '.join(f'{one.phrase()} ({chance_text(one.probability)})' for one in named)}."
     if not first.is_healthy:
-        yield f"The probability that nothing has changed is {chance_text(1 - found.probability_of_damage)}."
+        unchanged = sum(one.probability for one in explanations if one.is_healthy)
+        yield f"The probability that nothing has changed{shown} is {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
         yield from _averages(found)
     if first.is_healthy:
@@ -44,18 +50,20 @@ def answer(found: Any) -> Iterator[str]:
 
 def _averages(found: Any) -> Iterator[str]:
     """Causes that are likely over all explanations together."""
-    table = found.table[found.table["probability"] >= LIKELY].sort_values("probability", ascending=False, kind="stable")
+    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unseen)]
     named = []
-    for cause, row in table.head(MOST_NAMED).iterrows():
+    for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
         amount = Amount(str(cause), row["kind"], row["severity"], row["lowest"], row["highest"])
-        named.append(f"{cause} {chance_text(row['probability'])}, {amount.size} on average ({amount.band})")
+        word = "damaged" if row["kind"] == "damage" else "changed"
+        probability = f"{word} with probability {chance_text(row['probability'])}"
+        named.append(f"{cause} {amount.size} ({amount.band}; {probability})")
     if named:
-        yield f"Over all explanations together, each has changed with a probability of: {'; '.join(named)}."
+        yield f"Averaged over all explanations: {'; '.join(named)}."
 
 
 def _unnoticed(found: Any) -> Iterator[str]:
     """What could be damaged all the same."""
-    table = found.table[found.table["kind"] == "damage"]
+    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unseen)]
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
         yield f"A loss of stiffness of up to {listed(losses)} could have gone unseen."
@@ -71,11 +79,11 @@ def limits(found: Any) -> Iterator[str]:
     if best.is_healthy and found.p_value < RARE:
         yield f"Yet a healthy structure shows such shifts with a probability of only {chance_text(found.p_value)}."
     if np.isnan(found.misfit_p_value):
-        yield "There are no more shifts than changes to find, so that any shift can be explained: the fit proves little."
+        yield "There are no more shifts than causes, so that any shift can be explained: the fit proves little."
     elif found.misfit_p_value < RARE and not best.has_else:
         yield (
-            f"The most probable explanation does not explain all (probability by chance "
-            f"{chance_text(found.misfit_p_value)}). {_departure(found)}."
+            "The most probable explanation leaves something unexplained (probability by chance "
+            f"{chance_text(found.misfit_p_value)}): {_departure(found)}."
         )
     if found.rest >= NAMED:
         yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
@@ -94,53 +102,52 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
     highest = [str(cause) for cause in found.most_probable if found.severities.get(cause, 0.0) >= HIGHEST_SEVERITY]
     if highest:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
-    if best.is_else or found.misfit_p_value < RARE:
-        chance = found.probability_of_else if best.has_else else found.misfit_p_value
+    if best.has_else or found.misfit_p_value < RARE:
+        doubt = (
+            f"something else has a probability of {chance_text(found.probability_of_else)}"
+            if best.has_else
+            else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
+        )
         yield (
             "unexplained shifts",
-            f"damage of these groups does not explain the shifts (probability {chance_text(chance)}): "
-            f"{likely_cause(found)}",
+            f"damage of these groups does not explain the shifts ({doubt}); likely causes: {likely_causes(found)}",
         )
 
 
 def _departure(found: Any) -> str:
     """The mode that damage explains least, in standard errors."""
     shifts = found.shifts
-    worst = int(np.nanargmax(np.abs(unexplained(found))))
+    worst = int(np.nanargmax(np.abs(found.unexplained)))
     measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))
     error = float(shifts["standard_error"].iloc[worst])
     return (
-        f"Mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
+        f"mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
         f"{100 * error:.2f}{SPACE}%), of which damage of these groups explains {_signed(explained)}"
     )
 
 
-def unexplained(found: Any) -> Array:
-    """Measured less explained shift of each mode in standard errors; NaN for a mode that was not measured."""
-    shifts = found.shifts
-    return ((shifts["measured"] - shifts["explained"]) / shifts["standard_error"]).to_numpy(dtype=float)
-
-
-def likely_cause(found: Any) -> str:
-    """What may have shifted the frequencies where damage does not: what the shifts suggest, else all that is usual."""
-    known = found.shifts[found.shifts["measured"].notna()]
+def likely_causes(found: Any) -> str:
+    """What may have shifted the frequencies where damage does not: what the shifts suggest, then what is usual."""
+    known, rest = found.shifts[found.shifts["measured"].notna()], found.unexplained
     measured, error = (known[name].to_numpy(dtype=float) for name in ("measured", "standard_error"))
     if seem_rad_per_s(1 + measured, NEAR_2_PI):
-        return "the measured frequencies are about 2 pi times the predicted ones, perhaps in rad/s; expected Hz"
-    rest, rose, mean = unexplained(found), measured > CLEAR * error, float(measured.mean())
-    worst = int(np.nanargmax(np.abs(rest)))
-    usual = "damage outside these groups, a change of mass or of a support, a wrong sensor, or a wrong model"
+        return "frequencies in rad/s: the measured ones are about 2 pi times the predicted ones; expected Hz"
+    n_rose, mean, worst = int((measured > CLEAR * error).sum()), float(measured.mean()), int(np.nanargmax(np.abs(rest)))
+    causes = []
     if len(known) > 2 and measured.std() < EVEN * abs(mean):
-        return f"all frequencies moved by about {_signed(mean)}, as by another clock of the logger; else {usual}"
-    if rose.any() and rest[worst] > 0 and not found.table["kind"].eq("stiffening").any():
-        return (
-            f"{rose.sum()} of {len(known)} frequencies rose, that of mode {found.shifts.index[worst]} by "
-            f"{_signed(found.shifts['measured'].iloc[worst])}, and strengthening was not sought (stiffening=...); "
-            f"else {usual}"
+        causes.append(
+            f"another clock of the logger, or mass or stiffness all over the structure: all frequencies moved by about "
+            f"{_signed(mean)}"
         )
-    if (np.abs(rest) > CLEAR).sum() == 1:
-        return f"another mode was taken for mode {found.shifts.index[worst]}, which alone departs; else {usual}"
-    return usual
+    elif n_rose and rest[worst] > 0 and not found.table["kind"].eq("stiffening").any():
+        causes.append(
+            f"strengthening, which was not sought (stiffening=...): {n_rose} of {len(known)} frequencies rose, that "
+            f"of mode {found.shifts.index[worst]} by {_signed(found.shifts['measured'].iloc[worst])}"
+        )
+    elif (np.abs(rest) > CLEAR).sum() == 1:
+        causes.append(f"another mode taken for mode {found.shifts.index[worst]}, which alone departs")
+    usual = "damage outside these groups, a change of mass or of a support, a wrong sensor, or a wrong model"
+    return "; or ".join([*causes, usual])
 
 
 def _signed(shift: float) -> str:

@@ -14,8 +14,8 @@ from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
 
 ALIKE = 0.95  # cosine between effects from which on causes that are confused are said together
 TOLD = {
-    "damage": ("a loss of {size} of stiffness in {name}", "of {size} in {name}"),
-    "stiffening": ("a gain of {size} of stiffness in {name}", "of {size} in {name}"),
+    "damage": ("a loss of {size}{of stiffness} in {name}", "of {size} in {name}"),
+    "stiffening": ("a gain of {size}{of stiffness} in {name}", "of {size} in {name}"),
     "parameter": ("a change of {size} in {name}", "of {size} in {name}"),
     "mass": ("added mass of {size} times {name}", "of {size} times {name}"),
 }
@@ -92,35 +92,43 @@ class Told:
         parts = [f"{either([one.cause for one in amounts])} {amounts[0].size}" for amounts in self.changes]
         return ", ".join(parts + [SOMETHING_ELSE] * self.has_else) or NO_DAMAGE
 
-    def phrase(self, with_bands: bool = False) -> str:
-        """Causes with their amounts as part of a sentence."""
+    def phrase(self, in_full: bool = False) -> str:
+        """Causes with their amounts as part of a sentence; in full with what is lost, and the bands."""
+        if self.is_else:
+            return "something else than damage of these groups"
         said, kinds = [], set()
         for amounts in self.changes:
-            said.append(_phrase(amounts, amounts[0].kind in kinds, with_bands))
+            said.append(_phrase(amounts, amounts[0].kind in kinds, in_full))
             kinds.add(amounts[0].kind)
-        if self.has_else:
-            said.append("something that no damage of these groups explains")
-        return " and ".join(said).rstrip(",") or NO_DAMAGE
+        return " and ".join(said + [SOMETHING_ELSE] * self.has_else).rstrip(",") or NO_DAMAGE
 
 
-def _phrase(amounts: Sequence[Amount], is_further: bool, with_bands: bool) -> str:
+def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
     """One cause, or several that cannot be told apart; those whose amounts agree share them."""
     first, texts = amounts[0], []
     shared = [one for one in amounts if first.agrees(one)]
     for one in [first, *(one for one in amounts if one not in shared)]:
         saying = TOLD[one.kind][is_further or (one is not first and one.kind == first.kind)]
         names = either([other.cause for other in (shared if one is first else [one])])
-        texts.append(saying.format(size=one.size, name=names) + (f" ({one.band})" if with_bands else ""))
+        text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
+        texts.append(text + (f" ({one.band})" if in_full else ""))
     return " or ".join(texts) + (", which these modes cannot tell apart," if len(amounts) > 1 else "")
 
 
 def told(found: Any) -> list[Told]:
-    """Explanations, the most probable first; those that differ only in causes that look alike are one."""
+    """Explanations, the most probable first; those that these modes cannot tell apart are one.
+
+    They differ only in causes that look alike, or in causes that these modes do not show.
+    """
     sets = alike_sets(found.confused, found.similarity)
     together: dict[frozenset[Any], list[tuple[float, tuple[str, ...]]]] = {}
+    listed: set[tuple[str, ...]] = set()
     for name, probability in found.explanations["probability"].items():
         causes = causes_of(found, str(name))
-        key = frozenset(next((group for group in sets if cause in group), cause) for cause in causes)
+        seen = tuple(cause for cause in causes if cause not in found.unseen)
+        shown = seen if seen in listed else causes
+        listed.add(causes)
+        key = frozenset(next((group for group in sets if cause in group), cause) for cause in shown)
         together.setdefault(key, []).append((float(probability), causes))
     said = [_joined(found, members, sets) for members in together.values()]
     return sorted(said, key=lambda one: -one.probability)
@@ -168,3 +176,9 @@ def alike_sets(confused: Sequence[Sequence[str]], similarity: pd.DataFrame) -> l
                 joined = frozenset({one, other}).union(*touched)
                 sets = [group for group in sets if group not in touched] + [joined]
     return sets
+
+
+def explanation_text(causes: Sequence[Any], amounts: Sequence[float]) -> str:
+    """The causes of an explanation with their amounts, for a table."""
+    sizes = [Amount(one.name, one.kind, amount, 0.0, 1.0).size for one, amount in zip(causes, amounts, strict=True)]
+    return ", ".join(f"{one.name} {size}" for one, size in zip(causes, sizes, strict=True)).replace(SPACE, " ")
