@@ -138,7 +138,7 @@ class IdentifiedDamage:
     def told(self) -> pd.DataFrame:
         """Explanations as they are told, those that these modes cannot tell apart as one, the most probable first.
 
-        By ``label``, such as "pier 1 or pier 2 12 %": ``probability``, and ``text``, part of a sentence with 90 % bands.
+        By ``label``, such as "pier 1 or pier 2 12 %": ``probability``; ``text``, part of a sentence with 90 % bands.
         """
         rows = [(one.label, one.probability, one.phrase(in_full=True)) for one in told(self)]
         return pd.DataFrame(rows, columns=["label", "probability", "text"]).set_index("label")

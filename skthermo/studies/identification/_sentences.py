@@ -122,7 +122,7 @@ def _departure(found: Any) -> str:
     error = float(shifts["standard_error"].iloc[worst])
     return (
         f"mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
-        f"{100 * error:.2f}{SPACE}%), of which damage of these groups explains {_signed(explained)}"
+        f"{100 * error:.2f}{SPACE}%), of which these groups explain {_signed(explained)}"
     )
 
 
