@@ -1,25 +1,35 @@
 """Measured shifts beside the effects of damage, in standard errors."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._bounded_fit import BoundedFit, Effects, fit_severities
+from skthermo.studies.identification._evidence import Observed
+
+Effects = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class Part:
     """Shifts of one kind, of frequencies or of mode shapes: NaN where nothing was measured; (n_observed,) each.
 
-    Effects are a function from severities of the model's groups to the change and its derivatives.
+    Effects are a function from severities of the model's groups to the change and its derivatives. ``sizes`` is what
+    a relative shift of 1 is; errors follow Student's law with ``freedom``.
     """
 
     effects: Effects
     measured: Array
     covariance: Array
+    sizes: Array
+    freedom: float = np.inf
+
+    @property
+    def is_known(self) -> NDArray[np.bool_]:
+        return ~np.isnan(self.measured)
 
 
 def remembered(effects: Effects) -> Effects:
@@ -47,12 +57,6 @@ class Comparison:
     names: Sequence[str] = ()
     of_model: Sequence[str] = ()
 
-    def of(self, columns: list[list[int]]) -> "Comparison":
-        """The comparison for some groups, each of one or several joined."""
-        incidence = np.array([self.incidence[:, joined].max(axis=1) for joined in columns])
-        names = [" + ".join(self.names[column] for column in joined) for joined in columns] if self.names else ()
-        return replace(self, incidence=incidence.reshape(len(columns), len(self.incidence)).T, names=names)
-
     @property
     def contents(self) -> dict[str, list[str]]:
         """The model's groups that each group contains."""
@@ -65,10 +69,14 @@ class Comparison:
         """Effects of small severities in standard errors, (n_observed, n_groups)."""
         return self.whitening @ self.effects(np.zeros(self.incidence.shape[1]))[1]
 
-    def fit(self) -> BoundedFit:
-        """Severities that explain the shifts best."""
-        measured = np.concatenate([part.measured[~np.isnan(part.measured)] for part in self.parts])
-        return fit_severities(self.effects, measured, self.whitening, self.incidence.shape[1])
+    def observed(self) -> Observed:
+        """What was measured."""
+        return Observed.of(
+            [
+                (p.measured[p.is_known], p.covariance[np.ix_(p.is_known, p.is_known)], p.sizes[p.is_known], p.freedom)
+                for p in self.parts
+            ]
+        )
 
     def members(self, severities: Array) -> Array:
         """Severities of the model's groups, (..., n_model_groups), by those of the groups, (..., n_groups)."""

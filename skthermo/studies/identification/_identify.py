@@ -9,17 +9,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag
-from skthermo._arrays import Array, as_floats, as_random_state, is_real
+from skthermo._arrays import Array, as_floats, as_random_state
 from skthermo._frames import check_same_rows
 from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo._validation import check_array
 from skthermo._warnings import warn_each, warn_user, warnings_once
+from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
+from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._separability import VISIBLE, errors_alone, merge_confused
+from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._prior import DamagePrior
+from skthermo.studies.identification._separability import VISIBLE, errors_alone
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from skthermo.studies.identification._shift import measured_shift
 from skthermo.studies.scenarios import check_chain
@@ -32,11 +35,10 @@ def identify_damage(
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     *,
     noise: ArrayLike | Literal["fitted"] = "fitted",
-    merge: bool = False,
+    prior: DamagePrior | None = None,
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: ArrayLike | None = None,
     shape_noise: ArrayLike = 0.01,
-    significance: float = 0.05,
     random_state: int | np.random.RandomState | None = None,
 ) -> IdentifiedDamage:
     """Severities of damage groups that explain how measured frequencies have shifted.
@@ -55,8 +57,8 @@ def identify_damage(
     noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
         Where the error of the mean shift comes from: the residuals of the training records, with their correlations
         from mode to mode and from record to record; or independent records with a relative standard deviation.
-    merge : bool, default=False
-        Whether groups that cannot be told apart get one severity together.
+    prior : DamagePrior, optional
+        What is thought of damage before; by default `DamagePrior()`.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
         complex ones are rotated to be real; NaN where a component was not measured.
@@ -64,8 +66,6 @@ def identify_damage(
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of a component of a measured shape, relative to the shape's largest component.
-    significance : float, default=0.05
-        Probability with which any group of a healthy structure is called damaged.
     random_state : int, RandomState or None, default=None
         Seed of the draws behind standard errors and p-values.
 
@@ -123,9 +123,9 @@ def identify_damage(
     {'top': 0.0, 'diagonal': 0.1}
     """
     check_chain(fem)
-    check_flag(merge, "merge")
-    if not is_real(significance) or not 0 < significance < 1:
-        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    prior = DamagePrior() if prior is None else prior
+    if not isinstance(prior, DamagePrior):
+        raise ValueError(f"prior is {prior!r}; expected a DamagePrior")
     if shapes is None and dofs is not None:
         raise ValueError("dofs came without shapes; expected both or neither")
     frequencies, members = _read_frequencies(fem, T, F), read_groups(fem.model, groups)
@@ -143,7 +143,7 @@ def identify_damage(
     incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
 
     def compared(effects: FrequencyEffects) -> Comparison:
-        parts = [Part(remembered(effects), shift.mean, shift.covariance)]
+        parts = [Part(remembered(effects), shift.mean, shift.covariance, np.ones(len(shift.mean)), shift.freedom)]
         if shapes is not None:
             parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
         return Comparison(parts, incidence, labels, of_model)
@@ -151,17 +151,16 @@ def identify_damage(
     effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
     every, nominal = compared(effects), compared(effects.nominal())
     alone = errors_alone(every.slopes())
-    seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
-    if not seen:
+    if alone.min() > VISIBLE:
         errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
         raise ValueError(
             f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
             f"{errors}. More records or other modes would lower them"
         )
-    joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
-    unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
-    random = as_random_state(random_state)
-    found = findings(every.of(joined), nominal.of(joined), shift, records, unseen, significance, random)
+    random, causes = as_random_state(random_state), [Cause(label) for label in labels]
+    scale = Scale.of(every.observed(), every.effects, causes, prior)
+    posterior = Posterior.of(scale, *explanations(scale), random)
+    found = findings(posterior, every, nominal, shift, records, causes, prior, random)
     warn_each(found.warnings())
     return found
 
@@ -191,7 +190,8 @@ def _of_shapes(
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
     effects = ShapeEffects.of(fem, theta, groups, dofs)
     change, deviations = effects.measured(shapes, noise)
-    return Part(remembered(effects), change, np.diag(deviations**2))
+    sizes = np.tile(np.abs(effects.reference).max(axis=0), len(effects.dofs))
+    return Part(remembered(effects), change, np.diag(deviations**2), sizes)
 
 
 def _named_as_in_fit(fem: Any, T: Any) -> Any:
