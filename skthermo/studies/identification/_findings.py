@@ -55,9 +55,7 @@ def findings(
             index=[one.name for one in listed],
         ),
         estimates=estimates,
-        table=table[
-            ["probability", "severity", "standard_error", "lowest", "highest", "if_damaged", "error_alone", "kind"]
-        ],
+        table=table,
         shifts=_shift_table(shift, posterior.explained(), factor),
         rest=max(1 - sum(one.probability for one in listed), 0.0),
         most_probable=best.causes,

@@ -37,7 +37,8 @@ class IdentifiedDamage:
     table : DataFrame
         One row a cause: ``probability`` that it is among the causes; ``severity``, its mean over all explanations,
         where those without it count as 0, with ``standard_error``; ``lowest`` and ``highest``, which hold it with a
-        probability of 90 %; ``if_damaged``, its mean where it is among the causes; ``error_alone``, the standard error
+        probability of 90 %; ``if_damaged``, its mean where it is among the causes, and ``highest_if_damaged``, which it
+        then does not exceed with a probability of 95 %; ``error_alone``, the standard error
         if nothing else could have changed and the amount could have either sign; ``kind``: "damage", "stiffening",
         "parameter" or "mass".
     shifts : DataFrame

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._formatting import SPACE, chance_text, listed, percent
-from skthermo.studies.identification._causes import HIGHEST_SEVERITY
+from skthermo.studies.identification._causes import HIGHEST_SEVERITY, NO_DAMAGE
 from skthermo.studies.identification._told import Amount, either, told
 
 NAMED, MOST_NAMED = 0.01, 4
@@ -152,3 +152,9 @@ def likely_causes(found: Any) -> str:
 
 def _signed(shift: float) -> str:
     return f"{100 * shift:+.2f}{SPACE}%"
+
+
+def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
+    """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
+    parts = [f"{cause} {percent(abs(amount), '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE

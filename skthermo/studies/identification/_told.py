@@ -176,9 +176,3 @@ def alike_sets(confused: Sequence[Sequence[str]], similarity: pd.DataFrame) -> l
                 joined = frozenset({one, other}).union(*touched)
                 sets = [group for group in sets if group not in touched] + [joined]
     return sets
-
-
-def explanation_text(causes: Sequence[Any], amounts: Sequence[float]) -> str:
-    """The causes of an explanation with their amounts, for a table."""
-    sizes = [Amount(one.name, one.kind, amount, 0.0, 1.0).size for one, amount in zip(causes, amounts, strict=True)]
-    return ", ".join(f"{one.name} {size}" for one, size in zip(causes, sizes, strict=True)).replace(SPACE, " ")
