@@ -3,10 +3,6 @@
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
-
-from skthermo._changes import Changes
-from skthermo._frequency_effects import FrequencyEffects, read_groups
-from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._bounded_fit import (
     fit_severities,
     p_of_damage,
@@ -15,6 +11,10 @@ from skthermo.studies.identification._bounded_fit import (
     redrawn,
     widening_of,
 )
+
+from skthermo._changes import Changes
+from skthermo._frequency_effects import FrequencyEffects, read_groups
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._comparison import Comparison, Part
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone, merge_confused
 from skthermo.studies.identification._shift import measured_shift
