@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix
 
@@ -60,18 +61,62 @@ class Changes:
         ends = 1 + self.directions * level * self.bounds.T[:, :, np.newaxis]
         return np.column_stack([ends.min(axis=0).prod(axis=0), ends.max(axis=0).prod(axis=0)])
 
-    def are_exact(self, model: Any) -> bool:
-        """Whether a model takes all of the columns."""
-        return (not self.groups or hasattr(model, "with_damage_parameters")) and (
-            not self.masses or hasattr(model, "with_mass_parameters")
-        )
+    def severities(self, amounts: Array) -> Array:
+        """Severities of the model's groups, (..., n_groups)."""
+        return 1 - self.factors(amounts)[..., self.n_parameters :][..., : len(self.groups)]
 
-    def simulator(self, simulator: Any, amounts: Array) -> Any:
-        """The simulator of the structure with one set of amounts, for the model's own columns of theta."""
-        factors = self.factors(amounts)[self.n_parameters :]
-        severities = 1 - factors[: len(self.groups)]
-        damage = {group: float(s) for group, s in zip(self.groups, severities, strict=True) if s}
-        changed = simulator.damaged(damage)
-        for times, mass in zip(factors[len(self.groups) :] - 1, self.masses.values(), strict=True):
-            changed = changed.changed("with_added", mass=times * mass) if times else changed
-        return changed
+
+@dataclass(frozen=True)
+class ChangedStructure:
+    """A fitted chain's model with further columns of theta for the amounts of changes.
+
+    Simulators are kept by the highest level that their reduced model covers.
+    """
+
+    fem: Any
+    changes: Changes
+    simulators: dict[float, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the model takes all of the columns."""
+        groups, masses, model = self.changes.groups, self.changes.masses, self.fem.model
+        has_groups = not groups or hasattr(model, "with_damage_parameters")
+        return has_groups and (not masses or hasattr(model, "with_mass_parameters"))
+
+    def linearise(self, theta: Array, sets: Array, dofs: NDArray[np.intp] | None = None) -> list[Array]:
+        """Frequencies for some sets of amounts, (n_sets, n_rows, n_modes), and derivatives of ln f by the amounts.
+
+        With ``dofs``, also the shapes there, (n_sets, n_rows, n_dofs, n_modes), and their derivatives.
+        """
+        rows, levels = self.changes.rows(theta, sets), self.changes.levels(sets)
+        results: list[Array] = []
+        for level in np.unique(levels):
+            own = levels == level
+            flat = rows[own].reshape(-1, rows.shape[2])
+            solved = self._simulator(level).linearise(flat, self.fem.n_jobs, dofs, relative=True)
+            results = results or [np.empty((*rows.shape[:2], *array.shape[1:])) for array in solved]
+            for result, array in zip(results, solved, strict=True):
+                result[own] = array.reshape(-1, *result.shape[1:])
+        inner = self.changes.slopes(sets)[:, np.newaxis]
+        results[1] = results[1] @ inner
+        if dofs is not None:
+            results[3] = results[3] @ inner[:, np.newaxis]
+        return results
+
+    def with_amounts(self, theta: Array, amounts: Array) -> tuple[Any, Array]:
+        """The simulator of the structure with one set of amounts, and its own rows of theta."""
+        factors = self.changes.factors(amounts)
+        times = factors[self.changes.n_parameters + len(self.changes.groups) :] - 1
+        severities = zip(self.changes.groups, self.changes.severities(amounts).tolist(), strict=True)
+        simulator = self.fem.simulator_.damaged({group: severity for group, severity in severities if severity})
+        for number, mass in zip(times, self.changes.masses.values(), strict=True):
+            simulator = simulator.changed("with_added", mass=number * mass) if number else simulator
+        return simulator, theta * factors[: theta.shape[1]]
+
+    def _simulator(self, level: float) -> Any:
+        """The simulator that has the amounts as further columns of theta."""
+        if level not in self.simulators:
+            groups, masses, ranges = self.changes.groups, self.changes.masses, self.changes.ranges(level)
+            self.simulators[level] = self.fem.simulator_.with_columns(groups, masses, ranges)
+        return self.simulators[level]

@@ -1,14 +1,14 @@
 """Effects of changes of a structure on its frequencies, averaged over the weather of some records."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from skthermo._arguments import check_names
 from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._changes import Changes
+from skthermo._changes import ChangedStructure, Changes
 
 MOST_ROWS, MOST_SLOW_ROWS = 100, 24
 """Number of records over which effects are averaged; fewer for models that are slow to solve."""
@@ -21,16 +21,13 @@ STEP = 1e-3  # step of differences in amounts, for models without parameters for
 class FrequencyEffects:
     """Mean change of the logarithms of the measured frequencies that some amounts of change cause.
 
-    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes). Simulators with
-    parameters for the amounts are kept by the highest level that their reduced model covers.
+    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes).
     """
 
-    fem: Any
+    structure: ChangedStructure
     theta: Array
     weights: Array
-    changes: Changes
     healthy: Array
-    simulators: dict[float, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, fem: Any, theta: Array, F: Array, changes: Changes) -> "FrequencyEffects":
@@ -43,7 +40,8 @@ class FrequencyEffects:
         healthy = np.log(healthy_frequencies(fem, theta[rows]))
         weights = np.where(np.isnan(healthy), 0.0, present[rows])
         weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
-        return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), changes, healthy)
+        weights = weights / np.maximum(weights.sum(axis=0), 1)
+        return cls(ChangedStructure(fem, changes), theta[rows], weights, healthy)
 
     def nominal(self) -> "FrequencyEffects":
         """The same effects at the model's nominal state.
@@ -52,8 +50,8 @@ class FrequencyEffects:
         symmetric and mirrored groups would seem to differ.
         """
         theta = np.ones((1, self.theta.shape[1]))
-        healthy = np.log(healthy_frequencies(self.fem, theta))
-        return FrequencyEffects(self.fem, theta, np.ones_like(healthy), self.changes, healthy)
+        healthy = np.log(healthy_frequencies(self.structure.fem, theta))
+        return FrequencyEffects(self.structure, theta, np.ones_like(healthy), healthy)
 
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).
@@ -66,50 +64,26 @@ class FrequencyEffects:
         return (change[0], slopes[0]) if np.ndim(amounts) == 1 else (change, slopes)
 
     def _changed(self, sets: Array) -> tuple[Array, Array]:
-        solve = self._linearised if self.changes.are_exact(self.fem.model) else self._differenced
-        frequencies, slopes = solve(sets)
+        solve = self.structure.linearise if self.structure.is_exact else self._differenced
+        frequencies, slopes = solve(self.theta, sets)
         measured, elasticity = self._measured(frequencies)
         change = self._mean(np.log(measured) - self.healthy)
         return change, self._mean(elasticity[..., np.newaxis] * slopes)
 
-    def _linearised(self, sets: Array) -> tuple[Array, Array]:
-        """Frequencies, (n_sets, n_rows, n_modes), and exact derivatives of their logarithms by the amounts."""
-        rows = self.changes.rows(self.theta, sets)
-        frequencies = np.empty((*rows.shape[:2], self.healthy.shape[1]))
-        jacobian = np.empty((*frequencies.shape, rows.shape[2]))
-        levels = self.changes.levels(sets)
-        for level in np.unique(levels):
-            own = levels == level
-            simulator, flat = self._simulator(level), rows[own].reshape(-1, rows.shape[2])
-            solved = simulator.linearise(flat, self.fem.n_jobs, relative=True)
-            frequencies[own], jacobian[own] = (
-                found.reshape(-1, *array.shape[1:])
-                for found, array in zip(solved, (frequencies, jacobian), strict=True)
-            )
-        return frequencies, jacobian @ self.changes.slopes(sets)[:, np.newaxis]
+    def _differenced(self, theta: Array, sets: Array) -> list[Array]:
+        def at(amounts: Array) -> Array:
+            simulator, rows = self.structure.with_amounts(theta, amounts)
+            return simulator.frequencies(rows, self.structure.fem.n_jobs, warn=False)
 
-    def _simulator(self, level: float) -> Any:
-        """The simulator that has the amounts as further columns of theta."""
-        if level not in self.simulators:
-            groups, masses, ranges = self.changes.groups, self.changes.masses, self.changes.ranges(level)
-            self.simulators[level] = self.fem.simulator_.with_columns(groups, masses, ranges)
-        return self.simulators[level]
-
-    def _differenced(self, sets: Array) -> tuple[Array, Array]:
-        frequencies = np.stack([self._frequencies(amounts) for amounts in sets])
-        slopes = np.stack([central_differences(self._frequencies, amounts) for amounts in sets])
-        return frequencies, slopes / frequencies[..., np.newaxis]
-
-    def _frequencies(self, amounts: Array) -> Array:
-        factors = self.changes.factors(amounts)[: self.theta.shape[1]]
-        simulator = self.changes.simulator(self.fem.simulator_, amounts)
-        return simulator.frequencies(self.theta * factors, self.fem.n_jobs, warn=False)
+        frequencies = np.stack([at(amounts) for amounts in sets])
+        slopes = np.stack([central_differences(at, amounts) for amounts in sets])
+        return [frequencies, slopes / frequencies[..., np.newaxis]]
 
     def _measured(self, frequencies: Array) -> tuple[Array, Array]:
         """Frequencies in the measured domain, and their relative change per relative change of the model's."""
         flat = frequencies.reshape(-1, frequencies.shape[-1])
         lower, middle, higher = (
-            as_floats(self.fem.aligner_.inverse_transform(flat * (1 + step))).reshape(frequencies.shape)
+            as_floats(self.structure.fem.aligner_.inverse_transform(flat * (1 + step))).reshape(frequencies.shape)
             for step in (-STEP, 0, STEP)
         )
         return middle, (higher - lower) / (2 * STEP * middle)

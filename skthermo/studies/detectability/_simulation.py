@@ -89,13 +89,13 @@ class Simulation:
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
         for records in self.records(self.scenarios, 0, seeds):
-            self._judge(records, judgement, with_indices=True)
+            self.judge(records, judgement, with_indices=True)
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
                 records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
-                self._judge(records, judgement, with_indices=True)
+                self.judge(records, judgement, with_indices=True)
         with without_warnings():
             self._calibrate(judgement, 0, seeds)
 
@@ -113,7 +113,7 @@ class Simulation:
         judgement = Judgement()
         with without_warnings(), single_blas_thread():
             for records in self.records(self.scenarios, number, seeds):
-                self._judge(records, judgement)
+                self.judge(records, judgement)
             self._calibrate(judgement, number, seeds)
         return judgement
 
@@ -141,7 +141,7 @@ class Simulation:
         with without_warnings():
             return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
 
-    def _judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
+    def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
         """Add the decisions of every detector and, if asked, its damage indices."""
 
         def judged(name: str) -> tuple[Any, Array, Array | None]:
@@ -167,15 +167,18 @@ class Simulation:
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
         for records in self.records(healthy, repeat, others) if healthy else ():
             found = Judgement(errors=judgement.errors)
-            self._judge(records, found)
+            self.judge(records, found)
             judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
 
 
-def clean_frequencies(fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take."""
+def clean_frequencies(
+    fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int, first: int = 0
+) -> dict[str, list[Array]]:
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
     clean = {}
     for scenario in scenarios:
-        changes = [scenario.changes(T, draw) for draw in range(min(scenario.n_draws, n_repeats))]
+        draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
+        changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
             clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
         else:

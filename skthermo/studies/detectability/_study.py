@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -19,6 +20,7 @@ from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._families import Family, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
+from skthermo.studies.detectability._parts import bands_in_words, table_of_parts
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._simulation import (
@@ -28,7 +30,9 @@ from skthermo.studies.detectability._simulation import (
     clean_frequencies,
 )
 from skthermo.studies.detectability._waits import waits_table
+from skthermo.studies.detectability._world_rates import WorldRates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.studies.worlds import Worlds
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -156,6 +160,9 @@ class DetectabilityStudy(BaseEstimator):
         noise: ArrayLike | Literal["fitted"] = "fitted",
         gaps: float | Literal["fitted"] | None = None,
         outliers: ArrayLike | Literal["fitted"] | None = None,
+        uncertainty: Sequence[str] = ("noise",),
+        models: Sequence[Any] | None = None,
+        n_worlds: int = 20,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
         verbose: bool | int = 0,
@@ -167,13 +174,16 @@ class DetectabilityStudy(BaseEstimator):
         self.noise = noise
         self.gaps = gaps
         self.outliers = outliers
+        self.uncertainty = uncertainty
+        self.models = models
+        self.n_worlds = n_worlds
         self.n_jobs = n_jobs
         self.random_state = random_state
         self.verbose = verbose
 
     def run(
         self,
-        T: ArrayLike,
+        T: ArrayLike | Sequence[ArrayLike],
         baseline: ArrayLike | None = None,
         *,
         reference: Reference | None = None,
@@ -239,7 +249,9 @@ class DetectabilityStudy(BaseEstimator):
         scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        judgement, stages = Judgement(), Stages(self, 4)
+        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, int(seeds[0, 0]))
+        T = worlds.years[0]
+        judgement, stages = Judgement(), Stages(self, 4 + bool(worlds.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
             candidates = judgement.ask(
@@ -254,6 +266,13 @@ class DetectabilityStudy(BaseEstimator):
                 simulation.first_repeat(judgement, measured, seeds[0])
         with stages.stage(f"other {n_repeats - 1} repeats"):
             simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
+        self.worlds_ = None
+        if worlds.parts:
+            with stages.stage(f"{len(worlds.seeds)} worlds"):
+                left = replace(
+                    simulation, candidates={k: v for k, v in candidates.items() if k not in judgement.errors}
+                )
+                self.worlds_ = WorldRates.of(left, worlds, self.n_jobs, verbose=max(self.verbose - 1, 0))
         rows = judgement.ask(
             candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
         )
@@ -269,7 +288,9 @@ class DetectabilityStudy(BaseEstimator):
         self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
         table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
         columns = list(next(iter(rows.values()))[0])
-        self.results_ = pd.DataFrame([row for some in table for row in some], columns=columns)
+        results = pd.DataFrame([row for some in table for row in some], columns=columns)
+        self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
+        self.uncertainty_ = None if self.worlds_ is None else table_of_parts(self.worlds_)
         self._warn_of_many_false_alarms()
         return self.results_
 
@@ -304,7 +325,9 @@ class DetectabilityStudy(BaseEstimator):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        return self._family(family, source, detector).curve(log)
+        found = self._family(family, source, detector)
+        curves = [] if self.worlds_ is None else self.worlds_.curves(found, log)
+        return replace(found.curve(log), worlds=tuple(curves))
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -357,7 +380,11 @@ class DetectabilityStudy(BaseEstimator):
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
         names = ["detector", "family", "source"][-len(next(iter(found))) :]
         index = pd.MultiIndex.from_tuples(list(found), names=names)
-        return pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
+        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
+        if self.worlds_ is None:
+            return table
+        bands = [self.worlds_.smallest(one, level, method, self.confidence_) for one in families.values()]
+        return table.assign(**dict(zip(["band_lowest", "band_highest"], np.transpose(bands), strict=True)))
 
     def time_to_find(
         self,
@@ -443,6 +470,11 @@ class DetectabilityStudy(BaseEstimator):
         bottom 10 %  0.23  0.82       0.77        0.86        0.11
         bottom 20 %  0.91  1.00       1.00        1.00        0.11
         >>> waits[["median", "reliable"]]
+                     median reliable
+        scenario
+        healthy     42 days 151 days
+        bottom 10 %  3 days  13 days
+        bottom 20 %  1 days   2 days
         """
         results = self._results()
         check_probability(level, "level")
@@ -622,7 +654,12 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             As `ranking`.
         """
-        return in_words(self.ranking(max_false_alarms, source), max_false_alarms)
+        ranking = self.ranking(max_false_alarms, source)
+        told = in_words(ranking, max_false_alarms)
+        if self.worlds_ is None or source != SIMULATED:
+            return told
+        bands = bands_in_words(self.results_, self.uncertainty_, ranking.index[0], self.confidence_)
+        return "\n".join([told, *bands])
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.
