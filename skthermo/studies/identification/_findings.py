@@ -21,17 +21,6 @@ from skthermo.studies.identification._shift import Shift
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
-COLUMNS = (
-    "probability",
-    "severity",
-    "standard_error",
-    "lowest",
-    "highest",
-    "if_damaged",
-    "highest_if_damaged",
-    "error_alone",
-    "kind",
-)
 OF_GROUPS = ("damage", "stiffening")
 
 
@@ -70,7 +59,7 @@ def findings(
             index=[one.name for one in listed],
         ),
         estimates=estimates,
-        table=table[[*COLUMNS]],
+        table=table,
         shifts=_shift_table(shift, posterior.explained(), factor),
         rest=max(1 - sum(one.probability for one in listed), 0.0),
         most_probable=best.causes,

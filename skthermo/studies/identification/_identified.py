@@ -12,6 +12,7 @@ from skthermo._formatting import SPACE
 from skthermo.studies.identification._compared import ComparedRecords
 from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._sentences import answer, limits, warnings
+from skthermo.studies.identification._told import told
 from skthermo.studies.scenarios import UncertainDamage
 
 UNLIKELY = 0.05  # probability of a misfit by chance below which it is said
@@ -36,8 +37,8 @@ class IdentifiedDamage:
     table : DataFrame
         One row a cause: ``probability`` that it is among the causes; ``severity``, its mean over all explanations,
         where those without it count as 0, with ``standard_error``; ``lowest`` and ``highest``, which hold it with a
-        probability of 90 %; ``if_damaged``, its mean where it is among the causes, and ``highest_if_damaged``, which it is below with
-        a probability of 95 % then; ``error_alone``, the standard error
+        probability of 90 %; ``if_damaged``, its mean where it is among the causes, and ``highest_if_damaged``, which it
+        then does not exceed with a probability of 95 %; ``error_alone``, the standard error
         if nothing else could have changed and the amount could have either sign; ``kind``: "damage", "stiffening",
         "parameter" or "mass".
     shifts : DataFrame
@@ -135,6 +136,15 @@ class IdentifiedDamage:
         return ((shifts["measured"] - shifts["explained"]) / shifts["standard_error"]).to_numpy(dtype=float)
 
     @property
+    def told(self) -> pd.DataFrame:
+        """Explanations as they are told, those that these modes cannot tell apart as one, the most probable first.
+
+        By ``label``, such as "pier 1 or pier 2 12 %": ``probability``; ``text``, part of a sentence with 90 % bands.
+        """
+        rows = [(one.label, one.probability, one.phrase(in_full=True)) for one in told(self)]
+        return pd.DataFrame(rows, columns=["label", "probability", "text"]).set_index("label")
+
+    @property
     def damage(self) -> dict[str, float]:
         """Severities of the model's groups in the most probable explanation, as `simulate` of the chain takes them."""
         found: dict[str, float] = {}
@@ -160,27 +170,29 @@ class IdentifiedDamage:
         return UncertainDamage(name, self.draws)
 
     def answer(self) -> list[str]:
-        """Whether something has changed, where, and how surely.
+        """What is most probable, how probable, and what else could be.
 
         Returns
         -------
         list of str
-            Sentences. The first says whether there is a change, and with which probability it would be chance.
+            Sentences. The first names the most probable explanation; those that these modes cannot tell apart are told
+            together.
         """
         return list(answer(self))
 
     def limits(self) -> list[str]:
-        """What cannot be said.
+        """What cannot be told: causes that look alike or cannot be seen, and what no explanation explains.
 
         Returns
         -------
         list of str
-            Sentences; none if damage explains all shifts and all groups can be seen and told apart.
+            Sentences; none if the most probable explanation explains all shifts, and all causes can be seen and told
+            apart.
         """
         return list(limits(self))
 
     def summary(self) -> str:
-        """What was found, what cannot be said, and which records were compared.
+        """What is most probable and what else could be, what cannot be told, and which records were left out.
 
         Returns
         -------

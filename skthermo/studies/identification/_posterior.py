@@ -140,15 +140,11 @@ class Posterior:
         inside, weight = np.concatenate([*values, np.zeros(0)]), np.concatenate([*weights, np.zeros(0)])
         everything = sum(one.probability for one in self.explanations)
         probability = weight.sum() / everything
-        mean = float(weight @ inside / weight.sum()) if weight.sum() > 0 else float("nan")
-        highest = _summary(inside, weight)["highest"] if weight.sum() > 0 else float("nan")
+        present = _summary(inside, weight) if weight.sum() > 0 else {"severity": np.nan, "highest": np.nan}
         all_values, all_weights = np.append(inside, 0.0), np.append(weight, max(everything - weight.sum(), 0.0))
-        return {
-            "probability": probability,
-            **_summary(all_values, all_weights),
-            "if_damaged": mean,
-            "highest_if_damaged": highest,
-        }
+        averages = _summary(all_values, all_weights)
+        extremes = {"if_damaged": present["severity"], "highest_if_damaged": present["highest"]}
+        return {"probability": probability, **averages, **extremes}
 
 
 def _summary(values: Array, weights: Array) -> dict[str, float]:
