@@ -211,7 +211,7 @@ class StructureDisplay:
         nodes = view.nodes
         of_member = dict(zip(self.structure.members, values, strict=True))
         points, lines, surfaces = sort_members(
-            self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m]))
+            self.structure, sorted(of_member, key=lambda m: np.nan_to_num(of_member[m], nan=-np.inf))
         )
         surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
         for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import as_random_state
 from skthermo._frequency_effects import read_groups
+from skthermo._warnings import told_around, warn_user
 from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division
@@ -29,6 +30,10 @@ MOST_LEVELS = 4
 WORTH_DIVIDING = 0.05  # probability of a group, and of a piece of a damaged group, from which on it is divided further
 CANNOT_TELL = 0.75  # share of a group's pieces that may be worth it before dividing them would tell nothing
 WORTH_ASKING = 0.02  # probability of a whole group from which on it is divided at all
+MOSTLY_ELSE = 0.5  # probability of something else from which on a warning says so
+OF_WHOLE_GROUPS = ("unexplained shifts", "confused groups")
+"""Warnings that hold for whole groups, and may not hold for parts of them."""
+
 SOME_ELSE = 0.1  # probability of something else from which on every group is divided: a part of one may be behind it
 
 COLUMNS = ["level", "group", "pieces", "stretches", "probability", "likely"]
@@ -89,7 +94,7 @@ def locate_damage(
     Warns
     -----
     UserWarning
-        As in `identify_damage`.
+        As in `identify_damage`; that shifts are not explained, if no damage of neighbouring members explains them.
 
     Notes
     -----
@@ -110,11 +115,12 @@ def locate_damage(
     >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
     >>> structure, model = truss_structure(), make_truss()
     >>> fem = DataInformedFEM(model, random_state=0).fit(year.temperatures, year.frequencies)
-    >>> divided = structure.divide(model, {"diagonal": {"one bay": ["10", "12"]}})
-    >>> healthy, damaged = (m.frequencies([[1.0] * 4]) for m in (divided, divided.damaged({"one bay": 0.4})))
-    >>> located = locate_damage(fem, structure, later.temperatures, later.frequencies * damaged / healthy)
-    >>> located.likely_members()
-    []
+    >>> divided = structure.divide(model, {"diagonal": {"two bays": ["10", "22"]}})
+    >>> healthy, damaged = (m.frequencies([[1.0] * 4]) for m in (divided, divided.damaged({"two bays": 0.4})))
+    >>> F = later.frequencies * damaged / healthy
+    >>> located = locate_damage(fem, structure, later.temperatures, F, ["top", "diagonal"], random_state=0)
+    >>> sorted(located.likely_members())
+    ['10', '22']
     """
     check_chain(fem)
     if not isinstance(structure, Structure):
@@ -123,7 +129,8 @@ def locate_damage(
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
-    found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
+    with told_around(OF_WHOLE_GROUPS):
+        found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # identify_damage has given them
         seen = observe(fem, T, F, noise)
@@ -136,18 +143,26 @@ def locate_damage(
     most = MOST_SLOW_PIECES if getattr(fem.model, "prefer", "processes") == "processes" else MOST_PIECES
     divisions = {group: Division.of(group, lines[group], most) for group in asked(found, places)}
     levels: list[dict[str, Any]] = []
+    pieces: dict[str, int] = {}
     for level in range(1, MOST_LEVELS + 1):
         answer, finer = question.explained(divisions, random), {}
         for group, division in divisions.items():
             row, chosen = next_pieces(division, answer.explained)
             levels.append({"level": level, "group": group, **row})
-            if chosen.any():
+            if row["probability"] >= WORTH_ASKING:
                 finer[group] = division.finer(chosen)
-        if not finer or level == MOST_LEVELS:
+        pieces |= {group: len(division.pieces) for group, division in divisions.items()}
+        if level == MOST_LEVELS or not any(len(finer[group].pieces) > pieces[group] for group in finer):
             break
-        divisions |= finer
-    pieces = {group: len(division.pieces) for group, division in divisions.items()}
-    return LocatedDamage.of(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
+        divisions = finer  # groups that have become improbable stay whole
+    located = LocatedDamage.of(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
+    if located.probability_of_else >= MOSTLY_ELSE:
+        warn_user(
+            "no damage of neighbouring members explains the shifts (something else has a probability of "
+            f"{located.probability_of_else:.0%})",
+            "unexplained shifts",
+        )
+    return located
 
 
 def plausible_together(found: IdentifiedDamage) -> list[tuple[str, ...]]:
@@ -159,7 +174,7 @@ def plausible_together(found: IdentifiedDamage) -> list[tuple[str, ...]]:
 
 
 def asked(found: IdentifiedDamage, places: Mapping[str, Places]) -> list[str]:
-    """Groups of several members that are divided: those that are probable, or all if these do not explain the shifts."""
+    """Groups of several members that are divided: probable ones, or all if whole groups do not explain the shifts."""
     is_open = found.is_unexplained or found.probability_of_else > SOME_ELSE
     probable = found.table["probability"]
     several = [group for group, where in places.items() if len(where.members) > 1]

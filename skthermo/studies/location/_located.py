@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from skthermo._arrays import is_real
 from skthermo._formatting import SPACE, listed, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
@@ -142,6 +143,8 @@ class LocatedDamage:
         """
         if group is not None and group not in self.places:
             raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
+        if not is_real(probability) or not 0 < probability < 1:
+            raise ValueError(f"probability is {probability!r}; expected a number between 0 and 1, such as 0.9")
         return fewest(self._sets(group), probability)[0]
 
     def answer(self) -> list[str]:
