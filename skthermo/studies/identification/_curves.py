@@ -11,6 +11,8 @@ from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._comparison import Effects
 from skthermo.studies.identification._evidence import Observed
 
+FARTHEST = 0.3  # amount up to which effects are tabulated; beyond, they are computed where they matter
+
 
 @dataclass(frozen=True)
 class Curves:
@@ -28,19 +30,16 @@ class Curves:
     @classmethod
     def of(cls, effects: Effects, causes: list[Cause], observed: Observed) -> Curves:
         """Curves of exact effects."""
-        nodes, values, slopes = [], [], []
-        for column, cause in enumerate(causes):
-            amounts = cause.nodes()
-            solved = [effects(amount * np.eye(len(causes))[column]) for amount in amounts]
-            nodes.append(amounts)
-            values.append([change for change, _ in solved])
-            slopes.append([slope[:, column] for _, slope in solved])
-        rotated = np.array(values) @ observed.rotation.T
-        errors = np.sqrt(np.array(values) ** 2 @ (observed.rotation**2).T)
-        return cls(np.array(nodes), rotated, np.array(slopes) @ observed.rotation.T, errors)
+        nodes = np.array([_nodes(cause.lowest, cause.highest) for cause in causes])
+        sets = (nodes[:, :, np.newaxis] * np.eye(len(causes))[:, np.newaxis]).reshape(-1, len(causes))
+        values, slopes = (found.reshape(*nodes.shape, *found.shape[1:]) for found in effects(sets))
+        own = np.stack([slopes[column, :, :, column] for column in range(len(causes))])
+        rotated = values @ observed.rotation.T
+        errors = np.sqrt(values**2 @ (observed.rotation**2).T)
+        return cls(nodes, rotated, own @ observed.rotation.T, errors)
 
     def at(self, sets: Array, amounts: Array) -> tuple[Array, Array, Array]:
-        """Changes of sets (n_sets, k) with amounts (n_sets, n_sizes, k), their derivatives, and the model's variances."""
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), derivatives, and variances of the model."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, variance, slopes = np.zeros(shape), np.zeros(shape), []
         for i in range(sets.shape[-1]):
@@ -71,3 +70,8 @@ class Curves:
             errors = self.errors[column, left], self.errors[column, left + 1]
             variance += (errors[0] + share * (errors[1] - errors[0])) ** 2
         return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0)), variance
+
+
+def _nodes(lowest: float, highest: float) -> tuple[float, float, float]:
+    lowest, highest = max(lowest, -FARTHEST), min(highest, FARTHEST)
+    return lowest, (lowest + highest) / 2, highest

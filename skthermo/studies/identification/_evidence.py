@@ -36,15 +36,15 @@ class Observed:
     log_scales: Array
 
     @classmethod
-    def of(cls, parts: list[tuple[Array, Array, Array, float]]) -> Observed:
-        """Of parts with measured shifts, their covariance, the sizes of relative shifts of 1, and the freedom."""
+    def of(cls, parts: list[tuple[Array, Array, float]]) -> Observed:
+        """Of parts with measured shifts, their covariance, and the freedom of their errors."""
         rotations, variances = [], []
-        for _, covariance, sizes, _ in parts:
-            values, vectors = np.linalg.eigh(covariance / np.outer(sizes, sizes))
-            rotations.append((vectors / np.sqrt(values)).T / sizes)
+        for _, covariance, _ in parts:
+            values, vectors = np.linalg.eigh(covariance)
+            rotations.append((vectors / np.sqrt(values)).T)
             variances.append(1 / values)
-        is_scaled = np.concatenate([np.full(len(part[0]), np.isfinite(part[3])) for part in parts])
-        freedom = min(part[3] for part in parts)
+        is_scaled = np.concatenate([np.full(len(part[0]), np.isfinite(part[2])) for part in parts])
+        freedom = min(part[2] for part in parts)
         scales, log_scales = student_scales(freedom, int(is_scaled.sum()))
         rotation = block_diag(*rotations)
         measured = rotation @ np.concatenate([part[0] for part in parts])

@@ -143,10 +143,8 @@ class Scale:
         """Whether tabulated effects are not those of its most probable amounts."""
         if len(weight.causes) > 1:
             return True
-        return any(
-            not self.causes[c].nodes()[0] <= a <= self.causes[c].nodes()[-1]
-            for c, a in zip(weight.causes, weight.best[0])
-        )
+        nodes, amount = self.curves.nodes[list(weight.causes)], weight.best[0]
+        return bool((amount < nodes[:, 0]).any() or (amount > nodes[:, -1]).any())
 
 
 def weigh(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> list[Weight]:
@@ -210,6 +208,5 @@ def explanations(scale: Scale) -> tuple[list[Weight], Array]:
 
 
 def is_possible(causes: Set, all_causes: Sequence[Cause]) -> bool:
-    """Whether no group is both damaged and stiffened."""
-    groups = [all_causes[cause].of for cause in causes if all_causes[cause].of]
-    return len(set(groups)) == len(groups)
+    """Whether no two of the causes oppose each other."""
+    return not any(all_causes[a].opposes(all_causes[b]) for a, b in combinations(causes, 2))

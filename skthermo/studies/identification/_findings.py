@@ -7,6 +7,7 @@ import pandas as pd
 from scipy import stats
 
 from skthermo._arrays import Array
+from skthermo._changes import Changes
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._compared import ComparedRecords
 from skthermo.studies.identification._comparison import Comparison
@@ -20,6 +21,7 @@ from skthermo.studies.identification._shift import Shift
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
+OF_GROUPS = ("damage", "stiffening")
 
 
 def findings(
@@ -29,6 +31,7 @@ def findings(
     shift: Shift,
     records: ComparedRecords,
     causes: list[Cause],
+    changes: Changes,
     prior: DamagePrior,
     random: np.random.RandomState,
 ) -> IdentifiedDamage:
@@ -37,12 +40,13 @@ def findings(
     The comparisons are with the effects of the causes in the weather of the records and at the model's nominal state.
     """
     names, observed = [cause.name for cause in causes], comparison.observed()
-    factor, slopes, at_nominal = two_errors(shift.freedom), comparison.slopes(), nominal.slopes()
+    factor, slopes, at_nominal = two_errors(shift.freedom), comparison.slopes(len(causes)), nominal.slopes(len(causes))
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)
     groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
     table = posterior.table(names)
     table["error_alone"], table["kind"] = alone, [cause.kind for cause in causes]
+    first, factors = changes.n_parameters, changes.factors(posterior.drawn(names, N_DRAWS, random))
     estimates, best = posterior.estimates(LISTED), posterior.explanations[0]
     listed = [one for one in posterior.explanations if one.probability >= LISTED] or [best]
     return IdentifiedDamage(
@@ -64,10 +68,8 @@ def findings(
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
         confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
         unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
-        members=comparison.contents,
-        draws=pd.DataFrame(
-            comparison.members(posterior.drawn(names, N_DRAWS, random)), columns=list(comparison.of_model)
-        ),
+        members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
+        draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
         p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
         misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
         records=records,
