@@ -178,8 +178,8 @@ def test_three_causes_are_listed():
     three = {"a": (0.1, 0.006), "b": (0.05, 0.006), "c": (0.03, 0.006)}
     (first, *_) = said(identified({"a + b + c + something else": (0.95, three), "no damage": (0.05, {})}))
     assert first == (
-        "Most probable: a loss of 10.0 % of stiffness in a (between 9.0 and 11.0 %), of 5.0 % in b (between 4.0 and 6.0 "
-        "%), of 3.0 % in c (between 2.0 and 4.0 %) and something else, probability 95 %."
+        "Most probable: a loss of 10.0 % of stiffness in a (between 9.0 and 11.0 %), of 5.0 % in b (between 4.0 and "
+        "6.0 %), of 3.0 % in c (between 2.0 and 4.0 %) and something else, probability 95 %."
     )
 
 

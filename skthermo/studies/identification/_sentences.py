@@ -41,7 +41,7 @@ def answer(found: Any) -> Iterator[str]:
         yield f"It could also be: {'; '.join(f'{one.phrase()} ({chance_text(one.probability)})' for one in named)}."
     if not first.is_healthy:
         unchanged = sum(one.probability for one in explanations if one.is_healthy)
-        nothing = f"of no change{shown}" if shown else "that nothing has changed"
+        nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
         yield f"The probability {nothing} is {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
         yield from _averages(found)
