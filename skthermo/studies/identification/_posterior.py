@@ -133,10 +133,13 @@ class Posterior:
         inside, weight = np.concatenate([*values, np.zeros(0)]), np.concatenate([*weights, np.zeros(0)])
         everything = sum(one.probability for one in self.explanations)
         probability = weight.sum() / everything
-        present = _summary(inside, weight) if weight.sum() > 0 else {"severity": np.nan, "highest": np.nan}
+        present = (
+            _summary(inside, weight) if weight.sum() > 0 else dict.fromkeys(("severity", "lowest", "highest"), np.nan)
+        )
         all_values, all_weights = np.append(inside, 0.0), np.append(weight, max(everything - weight.sum(), 0.0))
         averages = _summary(all_values, all_weights)
-        extremes = {"if_damaged": present["severity"], "highest_if_damaged": present["highest"]}
+        farthest = present["lowest" if present["severity"] < 0 else "highest"]
+        extremes = {"if_damaged": present["severity"], "highest_if_damaged": farthest}
         return {"probability": probability, **averages, **extremes}
 
 
