@@ -33,7 +33,7 @@ class FrequencyEffects:
     @classmethod
     def of(cls, fem: Any, theta: Array, F: Array, changes: Changes) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
-        known = ~np.isnan(theta).any(axis=1)
+        known = ~(np.isnan(theta).any(axis=1) | np.isnan(F).all(axis=1))
         present = ~np.isnan(F[known])
         few, weights = typical_rows(theta[known], np.where(present.any(axis=0), present, True))
         healthy = np.log(healthy_frequencies(fem, few))
