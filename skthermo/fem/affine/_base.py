@@ -19,7 +19,7 @@ from skthermo._warnings import warn_user
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.affine._read_terms import check_different, check_modes, read_matrix
+from skthermo.fem.affine._read_terms import check_different, check_modes, read_mass, read_matrix
 from skthermo.fem.modal import LocalModes
 
 Content = tuple[Hashable, tuple[str, ...]]
@@ -350,15 +350,56 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         >>> bool(heavier.frequencies([[1, 1, 1, 1]])[0, 0] < truss.frequencies([[1, 1, 1, 1]])[0, 0])
         True
         """
-        if mass is not None and not scipy.sparse.issparse(mass) and real_array(mass, "added mass").ndim == 1:
-            if np.shape(mass) != (self.n_dof,):
-                raise ValueError(f"mass has shape {np.shape(mass)}; expected ({self.n_dof},) or a matrix")
-            mass = scipy.sparse.diags_array(real_array(mass, "added mass")).tocsc()
-        added = [
-            None if matrix is None else read_matrix(matrix, f"added {what}", self.n_dof)
-            for matrix, what in ((stiffness, "stiffness"), (mass, "mass"))
-        ]
-        return self._changed(lambda core: core.with_added(*added))
+        stiff = None if stiffness is None else read_matrix(stiffness, "added stiffness", self.n_dof)
+        heavy = None if mass is None else read_mass(mass, "added mass", self.n_dof)
+        return self._changed(lambda core: core.with_added(stiff, heavy))
+
+    def with_mass_parameters(
+        self, masses: Mapping[str, MatrixLike], *, amounts: tuple[float, float] = (0.0, 2.0)
+    ) -> Self:
+        """A new model with one more parameter for each pattern of added mass: 1 + how many times it is added.
+
+        At theta = 1 nothing is added. Each row of theta may have its own amounts, and the Jacobian holds exact
+        derivatives by them.
+
+        Parameters
+        ----------
+        masses : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,)
+            Names and masses in kg; a vector holds lumped masses.
+        amounts : (float, float), default=(0.0, 2.0)
+            Smallest and largest amount that a reduced model covers, above -1; a full model has no bounds.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            Its last parameters are named ``1 + NAME``.
+
+        Raises
+        ------
+        ValueError
+            If a mass has the wrong shape, is not symmetric, or holds values that are not finite, if the name of a
+            parameter is taken, or the amounts are no range above -1.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss()
+        >>> loaded = truss.with_mass_parameters({"asphalt": np.full(truss.n_dof, 100.0)})
+        >>> loaded.parameter_names
+        ('bottom', 'top', 'diagonal', 'vertical', '1 + asphalt')
+        >>> loaded.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 1.5]])[:, 0].round(3)
+        array([7.485, 7.269])
+        """
+        if not isinstance(masses, Mapping) or not masses:
+            raise ValueError(f"masses is {masses!r:.200}; expected a mapping of name to mass in kg")
+        names = check_different([*self.parameter_names, *(f"1 + {name}" for name in masses)])
+        matrices = [read_mass(mass, f"mass {name!r}", self.n_dof) for name, mass in masses.items()]
+        range_of = real_array(amounts, "amounts")
+        if range_of.shape != (2,) or not -1 < range_of[0] < range_of[1] < np.inf:
+            raise ValueError(f"amounts is {amounts!r:.200}; expected the smallest and the largest, above -1")
+        bounds = np.tile(1 + range_of, (len(masses), 1))
+        return self._changed(lambda core: core.with_mass_factors(matrices), names, bounds)
 
     def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
         """A new model of the same matrices with further damage groups, each of which scales parts of stiffness terms.

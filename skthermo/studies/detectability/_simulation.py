@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._frames import column_names, frame_like
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
+from skthermo.studies.detectability._waits import damaged_rows, transitions_of
 from skthermo.studies.scenarios import BaseScenario
 
 LARGEST_SEED = np.iinfo(np.int32).max
@@ -23,19 +26,48 @@ LARGEST_SEED = np.iinfo(np.int32).max
 @dataclass(frozen=True, eq=False)
 class Records:
     """Records of a scenario from one source: simulated frequencies of all modes at the temperatures T, or others, which
-    may have temperatures of their own; ``rows`` are those whose times they have."""
+    may have temperatures of their own; ``rows`` are those whose times they have. ``healthy`` are simulated frequencies
+    of the healthy structure with the same noise."""
 
     scenario: BaseScenario
     source: str
     values: Any
     T: Any
     rows: Any
+    healthy: Array | None = None
+
+    @property
+    def has_onsets(self) -> bool:
+        """Whether damage that is there from the beginning may be thought to begin at any record."""
+        return self.source == SIMULATED and not self.scenario.is_healthy and self.scenario.onset is None
+
+    def beginning(self, memory: int) -> "Records":
+        """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
+        damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
+        return replace(self, values=np.where(damaged, self.values, self.healthy))
 
     def seen_by(self, candidate: Candidate) -> Any:
         """The columns that a detector sees."""
         if self.source == SIMULATED:
             return candidate.view.table(self.T, self.values)
         return candidate.view.reference(self.values, self.T, self.scenario.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`."""
+
+    noise: Any
+    gaps: Any = None
+    outliers: Any = None
+
+    def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
+        """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
+        noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
+        if not isinstance(self.gaps, str):
+            return noise, T
+        missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
+        return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +80,7 @@ class Simulation:
     scenarios: Sequence[BaseScenario]
     T: Any
     clean: Mapping[str, Sequence[Array]]
-    noise: Any
+    measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
     def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
@@ -57,13 +89,13 @@ class Simulation:
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
         for records in self.records(self.scenarios, 0, seeds):
-            self._judge(records, judgement, with_indices=True)
+            self.judge(records, judgement, with_indices=True)
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
                 records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
-                self._judge(records, judgement, with_indices=True)
+                self.judge(records, judgement, with_indices=True)
         with without_warnings():
             self._calibrate(judgement, 0, seeds)
 
@@ -81,16 +113,17 @@ class Simulation:
         judgement = Judgement()
         with without_warnings(), single_blas_thread():
             for records in self.records(self.scenarios, number, seeds):
-                self._judge(records, judgement)
+                self.judge(records, judgement)
             self._calibrate(judgement, number, seeds)
         return judgement
 
     def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
-        """Records of scenarios from every source, one after the other, all with the same noise."""
-        factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
+        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
+        noise, T = self.measurement.of(self.fem, self.T, int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * factors, self.T, self.T)
+            values, healthy = draws[repeat % len(draws)] * (1 + noise), self._healthy * (1 + noise)
+            yield Records(scenario, SIMULATED, values, T, self.T, healthy)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 shape = as_columns(values).shape
@@ -101,17 +134,30 @@ class Simulation:
                     )
                 yield Records(scenario, REFERENCE, values, self.T, self.T)
 
-    def _judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
+    @cached_property
+    def _healthy(self) -> Array:
+        """Frequencies of the healthy structure before noise."""
+        names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
+        with without_warnings():
+            return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
+
+    def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
         """Add the decisions of every detector and, if asked, its damage indices."""
 
-        def judged(name: str) -> tuple[Any, Array]:
+        def judged(name: str) -> tuple[Any, Array, Array | None]:
             candidate = self.candidates[name]
-            seen = records.seen_by(candidate)
-            return candidate.damage_index(seen, records.rows) if with_indices else None, candidate.decisions(seen)
+            seen, memory, during = records.seen_by(candidate), candidate.memory, None
+            if memory > 1 and records.has_onsets:
+                with without_warnings():
+                    during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
+            index = candidate.damage_index(seen, records.rows) if with_indices else None
+            return index, candidate.decisions(seen), during
 
-        for name, (index, decisions) in judgement.ask(self.candidates, judged).items():
+        for name, (index, decisions, during) in judgement.ask(self.candidates, judged).items():
             key = name, records.scenario.name, records.source
             judgement.decisions[key] = [decisions]
+            if during is not None:
+                judgement.transitions[key] = [during]
             if with_indices:
                 judgement.indices[key] = index
 
@@ -121,15 +167,18 @@ class Simulation:
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
         for records in self.records(healthy, repeat, others) if healthy else ():
             found = Judgement(errors=judgement.errors)
-            self._judge(records, found)
+            self.judge(records, found)
             judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
 
 
-def clean_frequencies(fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take."""
+def clean_frequencies(
+    fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int, first: int = 0
+) -> dict[str, list[Array]]:
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
     clean = {}
     for scenario in scenarios:
-        changes = [scenario.changes(T, draw) for draw in range(min(scenario.n_draws, n_repeats))]
+        draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
+        changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
             clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
         else:
