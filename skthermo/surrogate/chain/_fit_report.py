@@ -37,13 +37,14 @@ LEFT_BY_CALIBRATION = 0.3  # percent by which a calibrated model was found to mi
 COMMON = 10.0
 """Standard deviation in percent of a factor common to all modes: it hardly changes what damage does to them."""
 
-MOST_UNEXPLAINED = 0.85
+MOST_UNEXPLAINED, MOST_WITHOUT_DATES, MOST_OF_FEW_MONTHS = 0.85, 1.5, 3.0
 """Hidden offsets, root mean square in units of what weather, a common factor and calibration leave, above which a
-warning is given: 0.1 to 0.8 for right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in several
-groups."""
+warning is given: a year's are 0.1 to 0.7 for right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in
+several groups; those of two months are 0.5 to 2.6 for right models."""
 
-MOST_OF_SHORT_RECORDS = 3.0  # the same for records of less than `FEW_DAYS`, of right models 0.5 to 2.6
-FEW_DAYS = 300  # below which the mean weather of the records may be far from that of the model's nominal state
+MOST_OF_A_YEAR, MONTH = 10, pd.Timedelta(days=30)
+"""Number of months with records below which their mean weather may be far from that of the model's nominal state."""
+
 TOLD_OFFSET = 0.3  # smallest offset in percent that the warning names
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
@@ -341,8 +342,10 @@ def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any) -> float:
     weather = np.cov(100 * np.log(known.T)) if len(known) > 1 else np.zeros(1)
     covariance = np.atleast_2d(weather) + COMMON**2 + LEFT_BY_CALIBRATION**2 * np.eye(len(offsets))
     size = np.sqrt(offsets @ np.linalg.solve(covariance, offsets) / len(offsets))
-    is_short = has_stamps(T) and T.index.max() - T.index.min() < pd.Timedelta(days=FEW_DAYS)
-    return float(size / (MOST_OF_SHORT_RECORDS if is_short else MOST_UNEXPLAINED))
+    if not has_stamps(T):
+        return float(size / MOST_WITHOUT_DATES)
+    n_months = ((T.index - T.index.min()) // MONTH).nunique()
+    return float(size / (MOST_UNEXPLAINED if n_months >= MOST_OF_A_YEAR else MOST_OF_FEW_MONTHS))
 
 
 def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
