@@ -42,7 +42,7 @@ MOST_UNEXPLAINED, MOST_WITHOUT_DATES, MOST_OF_FEW_MONTHS = 0.85, 1.5, 3.0
 warning is given: a year's are 0.1 to 0.7 for right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in
 several groups; those of two months are 0.5 to 2.6 for right models."""
 
-MOST_OF_A_YEAR, MONTH = 10, pd.Timedelta(days=30)
+MOST_OF_A_YEAR, MONTH = 11, pd.Timedelta(days=30)
 """Number of months with records below which their mean weather may be far from that of the model's nominal state."""
 
 TOLD_OFFSET = 0.3  # smallest offset in percent that the warning names
