@@ -49,15 +49,13 @@ class Curves:
         changes, slopes = self.single(np.arange(amounts.shape[-1]), amounts)
         return changes.sum(axis=-2), np.moveaxis(slopes, -2, -1)
 
-    def at(self, sets: NDArray[np.intp], amounts: Array) -> tuple[Array, Array, Array]:
-        """Changes of sets (n_sets, k) with severities (n_sets, n, k), derivatives, and variances of the model's errors.
+    def at(self, sets: NDArray[np.intp], amounts: Array) -> tuple[Array, Array]:
+        """Changes of sets (n_sets, k) with severities (n_sets, n, k), and derivatives, with the axis k more.
 
-        They are in the coordinates of what was observed, (n_sets, n, n_observed), and derivatives have the axis k more.
+        They are in the coordinates of what was observed, (n_sets, n, n_observed).
         """
         changes, slopes = self.single(sets[:, np.newaxis], amounts)
-        rotated = np.moveaxis(slopes @ self.rotation.T, -2, -1)
-        variances = (changes**2).sum(axis=-2) @ (self.rotation**2).T
-        return changes.sum(axis=-2) @ self.rotation.T, rotated, variances
+        return changes.sum(axis=-2) @ self.rotation.T, np.moveaxis(slopes @ self.rotation.T, -2, -1)
 
     def single(self, causes: NDArray[np.intp], severities: Array) -> tuple[Array, Array]:
         """Changes by causes (...,) of some severities (...,), and their derivatives, both (..., n_observed)."""

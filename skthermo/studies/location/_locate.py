@@ -17,7 +17,7 @@ from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division
 from skthermo.studies.location._lines import lines_of
-from skthermo.studies.location._located import LIKELY, LocatedDamage, fewest
+from skthermo.studies.location._located import LIKELY, LocatedDamage, fewest, located_damage
 from skthermo.studies.location._places import Places
 from skthermo.studies.location._question import PLAUSIBLE, members_of
 from skthermo.studies.location._weighing import Explained, MeasuredShift
@@ -155,7 +155,7 @@ def locate_damage(
         if level == MOST_LEVELS or not any(len(finer[group].pieces) > pieces[group] for group in finer):
             break
         divisions = finer  # groups that have become improbable stay whole
-    located = LocatedDamage.of(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
+    located = located_damage(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
     if located.probability_of_else >= MOSTLY_ELSE:
         warn_user(
             "no damage of neighbouring members explains the shifts (something else has a probability of "

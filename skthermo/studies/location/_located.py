@@ -31,7 +31,8 @@ class LocatedDamage:
         One row a member of a group: ``group``; ``element``, its number along the group; ``probability`` that it is
         among the damaged members; ``severity``, its mean over all explanations, where those without it count as 0;
         ``if_damaged``, its mean where it is damaged; ``is_likely``, whether it is in the smallest set that holds all
-        damaged members with a probability of 90 %, given that there are any.
+        damaged members with a probability of 90 %, given that there are any, and but for groups that these modes do not
+        show.
     groups : DataFrame
         One row a group: ``probability`` that a part of it is damaged, or all; ``severity``, ``elements``, their number;
         ``pieces``, into how many it was divided; ``likely``, how many elements hold its damage with a probability of
@@ -50,6 +51,29 @@ class LocatedDamage:
         Probability that something else shifted the frequencies, beside damage or alone.
     alike : mapping of str to str
         Group -> two places in it that these modes cannot tell apart, in words.
+    explained : sequence of explanations
+        Those of the finest division, each with its ``probability``, and the damaged ``members`` and the ``severities``
+        by group.
+    places : mapping of str to places
+        Group -> its members, line by line.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
+    >>> from skthermo.studies import locate_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+    >>> structure, model = truss_structure(), make_truss()
+    >>> fem = DataInformedFEM(model, random_state=0).fit(year.temperatures, year.frequencies)
+    >>> divided = structure.divide(model, {"top": {"middle": ["13"]}})
+    >>> healthy, damaged = (m.frequencies([[1.0] * 4]) for m in (divided, divided.damaged({"middle": 0.4})))
+    >>> F = later.frequencies * damaged / healthy
+    >>> located = locate_damage(fem, structure, later.temperatures, F, ["top", "diagonal"], random_state=0)
+    >>> print(located.summary())
+    top is damaged with a probability of over 99.9 %, probably in element 3 of 5 (x = 10.4 to 15.6 m) (over 99.9 %).
+    The rest of top is unlikely.
+    >>> located.table.loc["13", "severity"].round(1)
+    np.float64(0.4)
     """
 
     table: pd.DataFrame
@@ -63,64 +87,6 @@ class LocatedDamage:
     explained: Sequence[Explained] = field(repr=False)
     places: Mapping[str, Places] = field(repr=False)
 
-    @classmethod
-    def of(
-        cls,
-        answer: Answer,
-        found: IdentifiedDamage,
-        places: Mapping[str, Places],
-        pieces: Mapping[str, int],
-        levels: pd.DataFrame,
-    ) -> LocatedDamage:
-        """From the explanations of the finest division, and the number of pieces of each group that was divided."""
-        explained = answer.explained
-        total = sum(one.probability for one in explained)
-        sets = [(frozenset().union(*one.members.values()), one.probability) for one in explained if one.members]
-        likely, rows = set(fewest(sets, LIKELY)[0]), {}
-        for group, where in places.items():
-            for member, number in where.numbers.items():
-                if member not in rows:
-                    shares = [
-                        (one.probability / total, one.severities[name])
-                        for one in explained
-                        for name, inside in one.members.items()
-                        if member in inside
-                    ]
-                    rows[member] = _averages(shares) | {
-                        "group": group,
-                        "element": number,
-                        "is_likely": member in likely,
-                    }
-        columns = ["group", "element", "probability", "severity", "if_damaged", "is_likely"]
-        table = pd.DataFrame(list(rows.values()), pd.Index(list(rows), tupleize_cols=False, name="member"), columns)
-        by_group = {}
-        for group, where in places.items():
-            inside = [one for one in explained if group in one.members]
-            of_group = [(one.members[group], one.probability) for one in inside]
-            by_group[group] = _averages([(one.probability / total, one.severities[group]) for one in inside]) | {
-                "elements": len(where.members),
-                "pieces": pieces.get(group, 1),
-                "likely": len(fewest(of_group, LIKELY)[0]),
-            }
-        groups = pd.DataFrame.from_dict(by_group, orient="index")
-        alike = {
-            group: " from ".join(places[group].text(members) for members in pair)
-            for group, pair in answer.alike.items()
-            if pieces.get(group, 1) > 1
-        }
-        return cls(
-            table=table,
-            groups=groups,
-            levels=levels,
-            found=found,
-            structure=next(iter(places.values())).structure,
-            probability_of_damage=sum(share for _, share in sets) / total,
-            probability_of_else=sum(one.probability for one in explained if one.has_else) / total,
-            alike=alike,
-            explained=explained,
-            places=places,
-        )
-
     def likely_members(self, probability: float = LIKELY, group: str | None = None) -> list[Hashable]:
         """The fewest members that hold all damaged ones with a probability, given that there are any.
 
@@ -129,7 +95,7 @@ class LocatedDamage:
         probability : float, default=0.9
             Between 0 and 1.
         group : str, optional
-            Only damage in this group. By default in any.
+            Only damage in this group. By default in any that these modes show.
 
         Returns
         -------
@@ -171,7 +137,7 @@ class LocatedDamage:
         """Sets of damaged members and their probabilities."""
         if group is not None:
             return [(e.members[group], e.probability) for e in self.explained if group in e.members]
-        return [(frozenset().union(*e.members.values()), e.probability) for e in self.explained if e.members]
+        return visible_sets(self.explained, self.found.unseen)
 
     def _answer(self) -> Iterator[str]:
         is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unseen)
@@ -222,6 +188,72 @@ class LocatedDamage:
     def __repr__(self) -> str:
         best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
         return f"LocatedDamage({', '.join(f'{group} {share:.0%}' for group, share in best.items())})"
+
+
+def located_damage(
+    answer: Answer,
+    found: IdentifiedDamage,
+    places: Mapping[str, Places],
+    pieces: Mapping[str, int],
+    levels: pd.DataFrame,
+) -> LocatedDamage:
+    """From the explanations of the finest division, and the number of pieces of each group that was divided."""
+    explained = answer.explained
+    total = sum(one.probability for one in explained)
+    likely, rows = set(fewest(visible_sets(explained, found.unseen), LIKELY)[0]), {}
+    for group, where in places.items():
+        for member, number in where.numbers.items():
+            if member not in rows:
+                shares = [
+                    (one.probability / total, one.severities[name])
+                    for one in explained
+                    for name, inside in one.members.items()
+                    if member in inside
+                ]
+                rows[member] = _averages(shares) | {
+                    "group": group,
+                    "element": number,
+                    "is_likely": member in likely,
+                }
+    columns = ["group", "element", "probability", "severity", "if_damaged", "is_likely"]
+    table = pd.DataFrame(list(rows.values()), pd.Index(list(rows), tupleize_cols=False, name="member"), columns)
+    by_group = {}
+    for group, where in places.items():
+        inside = [one for one in explained if group in one.members]
+        of_group = [(one.members[group], one.probability) for one in inside]
+        by_group[group] = _averages([(one.probability / total, one.severities[group]) for one in inside]) | {
+            "elements": len(where.members),
+            "pieces": pieces.get(group, 1),
+            "likely": len(fewest(of_group, LIKELY)[0]),
+        }
+    groups = pd.DataFrame.from_dict(by_group, orient="index")
+    alike = {
+        group: " from ".join(places[group].text(members) for members in pair)
+        for group, pair in answer.alike.items()
+        if pieces.get(group, 1) > 1
+    }
+    return LocatedDamage(
+        table=table,
+        groups=groups,
+        levels=levels,
+        found=found,
+        structure=next(iter(places.values())).structure,
+        probability_of_damage=sum(one.probability for one in explained if one.members) / total,
+        probability_of_else=sum(one.probability for one in explained if one.has_else) / total,
+        alike=alike,
+        explained=explained,
+        places=places,
+    )
+
+
+def visible_sets(explained: Sequence[Explained], unseen: Sequence[str]) -> list[tuple[frozenset[Hashable], float]]:
+    """Sets of damaged members and their probabilities, less groups of which the modes show nothing."""
+    found = []
+    for one in explained:
+        members = [inside for group, inside in one.members.items() if group not in unseen]
+        if members:
+            found.append((frozenset().union(*members), one.probability))
+    return found
 
 
 def _averages(shares: Sequence[tuple[float, float]]) -> dict[str, float]:

@@ -110,7 +110,7 @@ class MeasuredShift:
                 shift = ShapeShift.of(of_shapes, self.shapes, self.shape_noise, self.shift.modes)
             parts.append(Part(shift.effects, shift.change, np.diag(shift.variances)))
         comparison = Comparison(parts)
-        observed = comparison.observed()
+        observed = comparison.observed(self.prior.model_error)
         return observed, Curves.of(comparison.effects, question.incidence, observed.rotation)
 
 
