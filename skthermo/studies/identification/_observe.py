@@ -19,10 +19,11 @@ from skthermo.studies.identification._shift import Shift, measured_shift
 
 @dataclass(frozen=True)
 class Observation:
-    """Records that were compared: their shift, parameters theta, and frequencies, NaN where a record was left out."""
+    """Records that were compared: their shift, temperatures, parameters theta, and frequencies; NaN where left out."""
 
     shift: Shift
     records: ComparedRecords
+    temperatures: Any
     theta: Array
     frequencies: Array
 
@@ -38,7 +39,7 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
     with warnings_once():
         shift = measured_shift(fem, T, theta, frequencies, noise)
     records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
-    return Observation(shift, records, theta, frequencies)
+    return Observation(shift, records, T, theta, frequencies)
 
 
 def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
