@@ -156,7 +156,9 @@ def identify_damage(
         return Comparison(parts)
 
     every, nominal = compared(effects), compared(effects.nominal())
-    alone = errors_alone(every.slopes(len(causes)))
+    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+    whitened = every.observed().rotation @ scale.curves.first
+    alone = errors_alone(whitened)
     if alone.min() > VISIBLE:
         errors = ", ".join(f"{cause.name} {error:.2g}" for cause, error in zip(causes, alone, strict=True))
         raise ValueError(
@@ -164,7 +166,6 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     random = as_random_state(random_state)
-    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     if models is None:
         posterior = Posterior.of(scale, *explanations(scale), random)
     else:
@@ -182,7 +183,7 @@ def identify_damage(
         seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
         jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
         posterior = Posterior.mean(Parallel(n_jobs=n_jobs)(jobs))
-    found = findings(posterior, every, nominal, seen.shift, seen.records, causes, changes, prior, random)
+    found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
 
