@@ -65,6 +65,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "studies.detectability": {"studies.scenarios", "studies.worlds"},
     "studies.extension": {"studies.detectability", "studies.scenarios", "studies.worlds"},
     "studies.identification": {"studies.scenarios", "studies.worlds"},
+    "studies.location": {"studies.identification", "studies.scenarios"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))
