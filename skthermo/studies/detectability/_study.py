@@ -20,7 +20,6 @@ from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._families import Family, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
-from skthermo.studies.detectability._parts import bands_in_words, table_of_parts
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._simulation import (
@@ -30,7 +29,7 @@ from skthermo.studies.detectability._simulation import (
     clean_frequencies,
 )
 from skthermo.studies.detectability._waits import waits_table
-from skthermo.studies.detectability._world_rates import WorldRates
+from skthermo.studies.detectability._world_rates import WorldRates, bands_in_words
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.worlds import Worlds
 
@@ -160,7 +159,7 @@ class DetectabilityStudy(BaseEstimator):
         noise: ArrayLike | Literal["fitted"] = "fitted",
         gaps: float | Literal["fitted"] | None = None,
         outliers: ArrayLike | Literal["fitted"] | None = None,
-        uncertainty: Sequence[str] = ("noise",),
+        uncertainty: Literal["all"] | Sequence[str] = "all",
         models: Sequence[Any] | None = None,
         n_worlds: int = 20,
         n_jobs: int | None = None,
@@ -290,7 +289,7 @@ class DetectabilityStudy(BaseEstimator):
         columns = list(next(iter(rows.values()))[0])
         results = pd.DataFrame([row for some in table for row in some], columns=columns)
         self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
-        self.uncertainty_ = None if self.worlds_ is None else table_of_parts(self.worlds_)
+        self.uncertainty_ = None if self.worlds_ is None else self.worlds_.table()
         self._warn_of_many_false_alarms()
         return self.results_
 
