@@ -50,7 +50,7 @@ class WorldRates:
         if len(errors) > MOST_FAILURES * len(outcomes):
             raise ValueError(
                 f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}; expected chains that can "
-                "be refitted, or uncertainty=('noise',)"
+                "be refitted, or uncertainty='noise'"
             )
         if errors:
             warn_user(

@@ -45,7 +45,7 @@ class Worlds:
         if models is not None:
             models = checked_models(fem, models)
         elif "model" in asked:
-            models = _models_of(fem, number, int(seeds[-1]), is_needed=uncertainty != ALL)
+            models = _models_of(fem, number, int(seeds[-1]), is_needed=not _is_all(uncertainty))
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
@@ -80,9 +80,14 @@ def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
 
 def checked_parts(uncertainty: Any) -> list[str]:
     """What varies, or an error."""
-    if isinstance(uncertainty, str) and uncertainty == ALL:
+    if _is_all(uncertainty):
         return list(PARTS)
-    asked = [] if isinstance(uncertainty, str) or not isinstance(uncertainty, Iterable) else list(uncertainty)
+    is_one = isinstance(uncertainty, str) or not isinstance(uncertainty, Iterable)
+    asked = [uncertainty] if is_one else list(uncertainty)
     if not asked or any(part not in PARTS for part in asked):
         raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'all', or some of {list(PARTS)}")
     return asked
+
+
+def _is_all(uncertainty: Any) -> bool:
+    return isinstance(uncertainty, str) and uncertainty == ALL
