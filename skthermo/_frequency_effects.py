@@ -10,8 +10,9 @@ from skthermo._arguments import check_names
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._changes import ChangedStructure, Changes
 
-MOST_ROWS, MOST_SLOW_ROWS = 100, 24
-"""Number of records over which effects are averaged; fewer for models that are slow to solve."""
+MOST_ROWS, MOST_SLOW_ROWS = 32, 12
+"""Number of records over which effects are averaged; fewer for models that are slow to solve. Those of one record are
+those of another within a few percent."""
 
 MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
 STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency

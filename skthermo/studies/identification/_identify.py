@@ -145,7 +145,9 @@ def identify_damage(
         return Comparison(parts)
 
     every, nominal = compared(effects), compared(effects.nominal())
-    alone = errors_alone(every.slopes(len(causes)))
+    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+    whitened = every.observed().rotation @ scale.curves.first
+    alone = errors_alone(whitened)
     if alone.min() > VISIBLE:
         errors = ", ".join(f"{cause.name} {error:.2g}" for cause, error in zip(causes, alone, strict=True))
         raise ValueError(
@@ -153,9 +155,8 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     random = as_random_state(random_state)
-    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     posterior = Posterior.of(scale, *explanations(scale), random)
-    found = findings(posterior, every, nominal, seen.shift, seen.records, causes, changes, prior, random)
+    found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
 
