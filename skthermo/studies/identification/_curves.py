@@ -39,7 +39,7 @@ class Curves:
         return cls(nodes, values @ observed.rotation.T, own @ observed.rotation.T, none)
 
     def at(self, sets: Array, amounts: Array) -> tuple[Array, Array]:
-        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), and their derivatives."""
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_errors, k), and their derivatives."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, slopes = np.zeros(shape), []
         for i in range(sets.shape[-1]):
