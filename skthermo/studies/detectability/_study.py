@@ -704,8 +704,30 @@ class DetectabilityStudy(BaseEstimator):
         told = in_words(ranking, max_false_alarms)
         if self.worlds_ is None or source != SIMULATED:
             return told
-        bands = bands_in_words(self.results_, self.uncertainty_, ranking.index[0], self.confidence_)
-        return "\n".join([told, *bands])
+        return f"{told}\n{self.uncertainty_summary(ranking.index[0])}"
+
+    def uncertainty_summary(self, detector: str | None = None) -> str:
+        """What the bands hold, and which part of the widest one is the largest, in plain sentences.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        str
+            A line on what the bands hold, one on the scenario with the widest band, and one on rates that are outside
+            their bands, as those of a model that the training records contradict are.
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
+        return bands_in_words(self.results_, self.uncertainty_, self.detector_name(detector), self.confidence_)
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.
