@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from skthermo._changes import ChangedStructure
-from skthermo.datasets import make_truss
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import mac
-from skthermo.studies.identification._causes import read_causes
+from skthermo.studies import identify_damage
+from skthermo.studies.identification._causes import Cause, read_causes
 from skthermo.studies.identification._measured_shapes import ShapeShift
+from skthermo.studies.identification._separability import precision
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from tests.studies.test_identify_causes import OnlyDamaged, differences
 
@@ -82,7 +84,7 @@ def test_models_without_exact_derivatives(fem, effects):
     np.testing.assert_allclose(other(AT)[1] * signs[:, np.newaxis], exact[1], rtol=1e-4, atol=1e-4)
 
 
-def noisy(shapes, n_records, deviation=0.01):
+def noisy(shapes, n_records, deviation=0.01, random=random):
     largest = np.abs(shapes).max(axis=0)
     return shapes + deviation * largest * random.standard_normal((n_records, *shapes.shape))
 
@@ -140,3 +142,41 @@ def test_shapes_of_another_mode_are_left_out_with_a_warning(effects):
 def test_errors_of_shapes(effects, shapes, noise, message):
     with pytest.raises(ValueError, match=message):
         ShapeShift.of(effects, shapes, noise, MODES)
+
+
+@pytest.fixture(scope="module")
+def later():
+    return make_truss_campaign(damage={"vertical": 0.3}, samples_per_year=120, random_state=1)
+
+
+def test_shapes_find_what_frequencies_hardly_show(fem, later):
+    """The vertical members of the truss: their damage moves no frequency by as much as the noise."""
+    records, seed = (later.temperatures, later.frequencies), np.random.RandomState(2)
+    states = (TRUSS, TRUSS.damaged({"vertical": 0.3}))
+    shapes = tuple(noisy(model.modes(THETA)[1][0][DOFS], 8, random=seed) for model in states)
+    with pytest.warns(UserWarning, match="vertical"):
+        without = identify_damage(fem, *records, random_state=0)
+    found = identify_damage(fem, *records, shapes=shapes, dofs=DOFS, shape_noise="fitted", random_state=0)
+    assert found.most_probable == ("vertical",)
+    assert found.probability > max(0.9, without.probability)
+    bands = [table.loc["vertical", ["lowest", "highest"]] for table in (found.table, without.table)]
+    assert bands[0]["lowest"] < 0.3 < bands[0]["highest"]
+    assert np.diff(bands[0]) < 0.5 * np.diff(bands[1])
+    precision = found.precision
+    np.testing.assert_allclose(precision["together_without_shapes"], without.precision["together"], rtol=1e-9)
+    assert list(without.precision.columns) == ["alone", "together"]
+    for name in ("alone", "together"):
+        assert (precision[name] < precision[f"{name}_without_shapes"]).all()
+    assert precision.loc["vertical", "alone"] < 0.3 * precision.loc["vertical", "alone_without_shapes"]
+
+
+def test_least_errors_are_those_of_the_information():
+    slopes, causes = random.standard_normal((5, 3)), [Cause("a"), Cause("b", of=("b",)), Cause("c", scale=5.0)]
+    stiffer = Cause("b stiffer", "stiffening", -1.0, 0.0, of=("b",))
+    least = precision(slopes, 5, causes, 0.2)
+    np.testing.assert_allclose(least["alone"], 1 / np.linalg.norm(slopes, axis=0))
+    covariance = np.linalg.inv(slopes.T @ slopes + np.diag([25.0, 25.0, 1.0]))
+    np.testing.assert_allclose(least["together"], np.sqrt(np.diag(covariance)))
+    more = precision(slopes[:, [0, 1, 2, 1]], 3, [*causes, stiffer], 0.2)
+    assert more.loc["b stiffer", "together"] == pytest.approx(least.loc["b", "together"])
+    assert more.columns.tolist() == ["alone", "alone_without_shapes", "together", "together_without_shapes"]
