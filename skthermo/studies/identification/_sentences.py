@@ -93,7 +93,6 @@ def limits(found: Any) -> Iterator[str]:
 def warnings(found: Any) -> Iterator[tuple[str, str]]:
     """What is doubtful, by kind and text."""
     best = told(found)[0]
-    yield from found.records.warnings()
     if found.confused:
         sets = "; ".join(" and ".join(causes) for causes in found.confused)
         yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
@@ -111,7 +110,8 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
         )
         yield (
             "unexplained shifts",
-            f"damage of these groups does not explain the shifts ({doubt}); likely causes: {likely_causes(found)}",
+            f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
+            f"{likely_causes(found)}",
         )
 
 
