@@ -16,6 +16,7 @@ from skthermo.studies.identification._comparison import Effects
 from skthermo.studies.identification._curves import Curves
 from skthermo.studies.identification._evidence import (
     ELSE_SIZES,
+    ERROR_FACTORS,
     Amounts,
     Observed,
     most_probable,
@@ -27,7 +28,7 @@ MOST_SETS = 5000  # sets of as many causes that are all weighed; beyond it, only
 AT_ONCE = 400  # sets in memory
 N_PARENTS = 50  # smaller sets that are extended then
 STEPS = 8  # Gauss-Newton steps on tabulated effects
-EXACT_STEPS, SETTLED = 10, 1e-5  # on exact effects, and the change of an amount that ends them
+EXACT_STEPS, SETTLED = 10, 0.05  # on exact effects, and the change of an amount, in standard errors, that ends them
 MATTERS = 1e-3  # probability of an explanation from which on its effects are computed exactly
 
 Set = tuple[int, ...]
@@ -35,10 +36,10 @@ Set = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Weight:
-    """One set of causes: ``log_evidence`` by size of something else, the first of which is 0, and scale (Student).
+    """One set of causes: ``log_evidence`` by errors (`Scale.variances`) and scale (Student).
 
-    ``means`` and ``covariances`` of the amounts have one or two axes more; ``best`` are the most probable ones by size,
-    (n_sizes, k), and ``change`` (n_sizes, n_observed) and ``variances`` the effects and variances there.
+    ``means`` and ``covariances`` of the amounts have one or two axes more; ``best``, (n_errors, k), are the most
+    probable ones by errors, and ``change`` and ``variances``, (n_errors, n_observed), the effects and variances there.
     """
 
     causes: Set
@@ -48,6 +49,20 @@ class Weight:
     best: Array
     change: Array
     variances: Array
+
+    def amounts(self, log_errors: Array) -> Array:
+        """The most probable amounts with the most probable errors."""
+        return self.best[self._likely(log_errors)]
+
+    def is_as(self, other: Weight, log_errors: Array) -> bool:
+        """Whether the amounts differ from others by much less than their standard errors."""
+        errors = self._likely(log_errors)
+        variances = np.diagonal(self.covariances[errors, self.log_evidence[errors].argmax()], axis1=-2, axis2=-1)
+        change = self.amounts(log_errors) - other.amounts(log_errors)
+        return bool((np.abs(change) < SETTLED * np.sqrt(variances)).all())
+
+    def _likely(self, log_errors: Array) -> int:
+        return int((logsumexp(self.log_evidence, axis=-1) + log_errors).argmax())
 
 
 @dataclass(frozen=True)
@@ -75,11 +90,20 @@ class Scale:
         return cls(observed, effects, causes, prior, Curves.of(effects, list(causes), observed))
 
     @property
-    def log_sizes(self) -> Array:
-        """Logarithms of the prior probabilities of the sizes of something else, the first of which is 0."""
-        some = self.prior.something_else
+    def log_errors(self) -> Array:
+        """Logarithms of the prior probabilities of `errors`."""
+        some, alone, beside = self.prior.something_else, len(ERROR_FACTORS), len(ELSE_SIZES)
         with np.errstate(divide="ignore"):
-            return np.log(np.append(1 - some, np.full(len(ELSE_SIZES), some / len(ELSE_SIZES))))
+            return np.log(np.repeat([(1 - some) / alone, some / beside], [alone, beside]))
+
+    @property
+    def variances(self) -> Array:
+        """Variances of what was observed, (n_errors, n_observed).
+
+        First without something else and with different errors of the model, then with something else of different size.
+        """
+        nothing, usual = np.zeros(len(ERROR_FACTORS)), np.ones(len(ELSE_SIZES))
+        return self.observed.variances(np.append(nothing, ELSE_SIZES), np.append(ERROR_FACTORS, usual))
 
     def law(self, sets: Array) -> Amounts:
         """Law of the amounts of sets of causes (n_sets, k) before the records are seen."""
@@ -93,11 +117,11 @@ class Scale:
 
     def weigh(self, sets: Array, log_prior: Array, corrections: Sequence[Correction] | None = None) -> list[Weight]:
         """Weights of sets of causes (n_sets, k), by tabulated effects that may be corrected."""
-        law, sizes = self.law(sets), np.append(0.0, ELSE_SIZES)
-        amounts = np.zeros((len(sets), len(sizes), sets.shape[1]))
-        other = 1 + sizes[:, np.newaxis] ** 2 * self.observed.elsewhere
+        law = self.law(sets)
+        variances = np.broadcast_to(self.variances, (len(sets), *self.variances.shape))
+        amounts = np.zeros((*variances.shape[:2], sets.shape[1]))
         for step in range(STEPS if sets.shape[1] else 1):
-            change, slopes, variances = self.curves.at(sets, amounts)
+            change, slopes = self.curves.at(sets, amounts)
             if corrections is not None:
                 centre, offset, slope = (
                     np.stack([getattr(one, name) for one in corrections])[:, np.newaxis]
@@ -105,11 +129,10 @@ class Scale:
                 )
                 change = change + offset + (slope @ (amounts - centre)[..., np.newaxis])[..., 0]
                 slopes = slopes + slope
-            variances = other + self.prior.model_error**2 * variances
             target = self.observed.measured - change + (slopes @ amounts[..., np.newaxis])[..., 0]
             if step < STEPS - 1:
                 amounts = most_probable(slopes, target, variances, law)
-        found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_sizes)
+        found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_errors)
         return [
             Weight(tuple(causes.tolist()), *parts)
             for causes, *parts in zip(
@@ -117,27 +140,19 @@ class Scale:
             )
         ]
 
-    def refined(self, weight: Weight, log_prior: float) -> Weight:
-        """The same set by its exact effects at its most probable amounts."""
-        sets = np.array([weight.causes], dtype=int)
-        before = None
-        for _ in range(EXACT_STEPS):
-            size = int((logsumexp(weight.log_evidence, axis=-1) + self.log_sizes).argmax())
-            amounts = weight.best[size]
-            if before is not None and np.abs(amounts - before).max(initial=0.0) < SETTLED:
-                break
-            before = amounts
-            full = np.zeros(len(self.causes))
-            full[list(weight.causes)] = amounts
-            change, slopes = self.effects(full)
-            tabulated, tangents, _ = self.curves.at(sets, amounts[np.newaxis, np.newaxis])
-            correction = Correction(
-                amounts,
-                self.observed.rotation @ change - tabulated[0, 0],
-                self.observed.rotation @ slopes[:, list(weight.causes)] - tangents[0, 0],
-            )
-            weight = self.weigh(sets, np.array([log_prior]), [correction])[0]
-        return weight
+    def exact(self, weights: Sequence[Weight]) -> list[Correction]:
+        """Exact less tabulated effects of sets of causes at their most probable amounts."""
+        full = np.zeros((len(weights), len(self.causes)))
+        for row, weight in zip(full, weights, strict=True):
+            row[list(weight.causes)] = weight.amounts(self.log_errors)
+        changes, slopes = self.effects(full)
+        changes, slopes = changes @ self.observed.rotation.T, self.observed.rotation @ slopes
+        found = []
+        for row, change, slope, weight in zip(full, changes, slopes, weights, strict=True):
+            columns = list(weight.causes)
+            tabulated, tangents = self.curves.at(np.array([columns], dtype=int), row[columns][np.newaxis, np.newaxis])
+            found.append(Correction(row[columns], change - tabulated[0, 0], slope[:, columns] - tangents[0, 0]))
+        return found
 
     def needs_refinement(self, weight: Weight) -> bool:
         """Whether tabulated effects are not those of its most probable amounts."""
@@ -152,33 +167,43 @@ def weigh(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> lis
     return refine(scale, screen(scale, sets, log_priors), log_priors)
 
 
-def screen(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> list[Weight]:
-    """Weights of sets of causes by tabulated effects."""
+def screen(
+    scale: Scale, sets: Sequence[Set], log_priors: Sequence[float], corrections: Sequence[Correction] | None = None
+) -> list[Weight]:
+    """Weights of sets of causes by tabulated effects, which may be corrected."""
     found: list[Weight] = [None] * len(sets)  # type: ignore[list-item]
     for size in sorted({len(one) for one in sets}):
         places = [place for place, one in enumerate(sets) if len(one) == size]
         for first in range(0, len(places), AT_ONCE):
             some = places[first : first + AT_ONCE]
             columns = np.array([sets[place] for place in some], dtype=int).reshape(len(some), size)
-            for place, weight in zip(some, scale.weigh(columns, np.array([log_priors[p] for p in some])), strict=True):
+            corrected = None if corrections is None else [corrections[place] for place in some]
+            weights = scale.weigh(columns, np.array([log_priors[place] for place in some]), corrected)
+            for place, weight in zip(some, weights, strict=True):
                 found[place] = weight
     return found
 
 
 def refine(scale: Scale, found: list[Weight], log_priors: Sequence[float]) -> list[Weight]:
-    """The same weights, exact for the sets that matter."""
-    found = list(found)
-    logs = np.array([log_prior + total(scale, weight) for weight, log_prior in zip(found, log_priors, strict=True)])
-    probable = np.exp(logs - logsumexp(logs))
-    for place in np.flatnonzero(probable > MATTERS):
-        if scale.needs_refinement(found[place]):
-            found[place] = scale.refined(found[place], log_priors[place])
+    """The same weights, with exact effects of the sets that matter at their most probable amounts."""
+    found, settled = list(found), np.zeros(len(found), dtype=bool)
+    for _ in range(EXACT_STEPS):
+        logs = np.array([log_prior + total(scale, weight) for weight, log_prior in zip(found, log_priors, strict=True)])
+        matter = np.flatnonzero((logs - logsumexp(logs) > np.log(MATTERS)) & ~settled)
+        unsettled = [place for place in matter if scale.needs_refinement(found[place])]
+        if not unsettled:
+            break
+        before = [found[place] for place in unsettled]
+        priors = [log_priors[place] for place in unsettled]
+        after = screen(scale, [weight.causes for weight in before], priors, scale.exact(before))
+        for place, old, new in zip(unsettled, before, after, strict=True):
+            found[place], settled[place] = new, new.is_as(old, scale.log_errors)
     return found
 
 
 def total(scale: Scale, weight: Weight) -> float:
     """Log evidence of a set of causes, with or without something else."""
-    return float(logsumexp(weight.log_evidence + scale.log_sizes[:, np.newaxis]))
+    return float(logsumexp(weight.log_evidence + scale.log_errors[:, np.newaxis]))
 
 
 def explanations(scale: Scale) -> tuple[list[Weight], Array]:
