@@ -22,10 +22,11 @@ FAR_FROM_OTHERS = "far from the other records"
 
 @dataclass(frozen=True)
 class Observation:
-    """Records that were compared: their shift, parameters theta, and frequencies, NaN where a record was left out."""
+    """Records that were compared: their shift, temperatures, parameters theta, and frequencies; NaN where left out."""
 
     shift: Shift
     records: ComparedRecords
+    temperatures: Any
     theta: Array
     frequencies: Array
 
@@ -45,7 +46,7 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
         frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
         shift = measured_shift(fem, T, shifts, noise)
     records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values), latest(T, outliers))
-    return Observation(shift, records, theta, frequencies)
+    return Observation(shift, records, T, theta, frequencies)
 
 
 def latest(T: Any, rows: NDArray[np.bool_]) -> int:
