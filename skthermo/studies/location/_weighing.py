@@ -17,15 +17,12 @@ from skthermo.fem import Structure
 from skthermo.studies.identification import (
     SOMETHING_ELSE,
     Cause,
-    Comparison,
     DamagePrior,
     Observed,
-    Part,
     Posterior,
     Scale,
-    ShapeEffects,
-    ShapeShift,
     Shift,
+    compared,
     screen,
 )
 from skthermo.studies.location._curves import Curves
@@ -103,13 +100,8 @@ class MeasuredShift:
         changes = Changes.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
-        parts = [Part(effects, self.shift.mean, self.shift.covariance, self.shift.freedom)]
-        if self.shapes is not None:
-            with told_around(["foreign mode shapes"]):
-                of_shapes = ShapeEffects.of(effects.structure, effects.theta, self.dofs)
-                shift = ShapeShift.of(of_shapes, self.shapes, self.shape_noise, self.shift.modes)
-            parts.append(Part(shift.effects, shift.change, np.diag(shift.variances)))
-        comparison = Comparison(parts)
+        with told_around(["foreign mode shapes"]):
+            comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)
         return observed, Curves.of(comparison.effects, question.incidence, observed.rotation)
 
