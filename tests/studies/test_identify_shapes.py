@@ -160,7 +160,7 @@ def test_shapes_find_what_frequencies_hardly_show(fem, later):
     """The vertical members of the truss: their damage moves no frequency by as much as the noise."""
     records, seed = (later.temperatures, later.frequencies), np.random.RandomState(2)
     states = (TRUSS, TRUSS.damaged({"vertical": 0.3}))
-    shapes = tuple(noisy(model.modes(THETA)[1][0][DOFS], 8, random=seed) for model in states)
+    shapes = tuple(noisy(model.modes(np.ones((1, 4)))[1][0][DOFS], 8, random=seed) for model in states)
     with pytest.warns(UserWarning, match="vertical"):
         without = identify_damage(fem, *records, random_state=0)
     found = identify_damage(fem, *records, shapes=shapes, dofs=DOFS, shape_noise="fitted", random_state=0)
