@@ -29,7 +29,7 @@ from skthermo.studies.detectability._simulation import (
     clean_frequencies,
 )
 from skthermo.studies.detectability._waits import waits_table
-from skthermo.studies.detectability._world_rates import WorldRates, bands_in_words
+from skthermo.studies.detectability._world_rates import WorldRates, sentences
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.worlds import Worlds
 
@@ -726,7 +726,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there are several detectors and none is named, or the one that is named has no results.
         """
-        return bands_in_words(self.results_, self.uncertainty_, self.detector_name(detector), self.confidence_)
+        return sentences(self.results_, self.uncertainty_, self.detector_name(detector), self.confidence_)
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.

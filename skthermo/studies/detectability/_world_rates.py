@@ -194,12 +194,12 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
     return found
 
 
-def bands_in_words(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:
+def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:
     """What the bands of a detector hold, the widest one and its parts, and which rates are outside."""
     if parts is None:
         return "Bands hold the noise alone: neither other weather or training records nor an error of the model."
     names = [column for column in parts.columns if column in NAMES]
-    lines = [f"Bands hold {_listed([NAMES[name] for name in names])}."]
+    lines = [f"Bands of {confidence:.0%} hold {_listed([NAMES[name] for name in names])}."]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["band_highest"] - rows["band_lowest"])[rows["measure"] == "POD"].dropna()
     if len(width) and (detector, width.idxmax()) in parts.index:
@@ -207,11 +207,12 @@ def bands_in_words(results: pd.DataFrame, parts: pd.DataFrame | None, detector: 
         shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
         told = shares[shares >= SMALL].sort_values(ascending=False)
         causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
+        band = f"{widest['band_lowest']:.1%} to {widest['band_highest']:.1%}"
         lines.append(
-            f"A measured campaign of {widest.name!r} should show {widest['band_lowest']:.1%} to "
-            f"{widest['band_highest']:.1%} of its records in alarm ({confidence:.0%} band, the widest)"
-            + (f"; of its variance come {causes}." if causes else ".")
+            f"A measured campaign of {widest.name!r} should show {band} of its records in alarm, the widest band."
         )
+        if causes:
+            lines.append(f"Of its variance come {causes}.")
     outside = rows[(rows["rate"] < rows["band_lowest"]) | (rows["rate"] > rows["band_highest"])]
     if len(outside):
         shares = [
