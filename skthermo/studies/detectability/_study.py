@@ -249,7 +249,7 @@ class DetectabilityStudy(BaseEstimator):
         scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, int(seeds[0, 0]))
+        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, seeds[0])
         T = worlds.years[0]
         judgement, stages = Judgement(), Stages(self, 4 + bool(worlds.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
