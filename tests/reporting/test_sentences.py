@@ -31,12 +31,13 @@ def test_times_are_said_in_fitting_units():
         pd.Timedelta("20min"),
         pd.Timedelta("5h"),
         pd.Timedelta("1h"),
+        pd.Timedelta("24h"),
         pd.Timedelta("93.5D"),
         pd.NaT,
         12.0,
         np.nan,
     ]
-    said = ["first record", "20 minutes", "5 hours", "1 hour", "94 days", "no alarm", "12 records", "no alarm"]
+    said = ["first record", "20 minutes", "5 hours", "1 hour", "1 day", "94 days", "no alarm", "12 records", "no alarm"]
     assert [duration_text(wait) for wait in waits] == said
 
 
