@@ -73,7 +73,7 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
     }
     study = DetectabilityStudy(None, None, [])
     study.results_ = pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True)
-    study.confidence_ = 0.95
+    study.confidence_, study.worlds_ = 0.95, None
     return findings_of(study)
 
 
