@@ -518,9 +518,9 @@ class DetectabilityStudy(BaseEstimator):
         >>> waits[["1D", "7D", "7D lowest", "7D highest", "7D healthy"]].round(2)
                        1D    7D  7D lowest  7D highest  7D healthy
         scenario
-        healthy      0.02  0.11       0.07        0.15        0.11
+        healthy      0.02  0.11       0.08        0.14        0.11
         bottom 10 %  0.23  0.82       0.77        0.86        0.11
-        bottom 20 %  0.91  1.00       1.00        1.00        0.11
+        bottom 20 %  0.91  1.00       0.99        1.00        0.11
         >>> waits[["median", "reliable"]]
                      median reliable
         scenario
@@ -657,6 +657,8 @@ class DetectabilityStudy(BaseEstimator):
         'Mahalanobis' finds 22.9% of the damaged records at 1.6% false alarms.
         Clearly worse: 'forest' (17.8% at 1.3%).
         This holds the noise alone: other weather, another baseline or an error of the model may change the order.
+        'healthy' raises a false alarm within 1 day in 2, within 7 days in 11, within 30 days in 38 of 100 cases.
+        'bottom 10 %' is found within 13 days in 95 of 100 cases; a healthy structure alarms by then in 19 of 100.
         """
         rows = self._results()
         limit = check_probability(max_false_alarms, "max_false_alarms")

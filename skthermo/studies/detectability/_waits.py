@@ -225,9 +225,9 @@ def _in_words(waits: Waits, false: Waits | None, level: float) -> str:
         return f"is not found in {cases} within the {clock.text(clock.n_steps)} of the records"
     text = f"is found within {clock.text(number)} in {cases}"
     if false is None:
-        return f"{text}; how often a healthy structure raises an alarm in this time is not known"
+        return f"{text}; how often a healthy structure alarms by then is not known"
     by_chance = false.found(min(int(number), clock.n_steps), level)[0]
-    text = f"{text}; a healthy structure raises an alarm in this time in {_cases(by_chance)} of 100"
+    text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
     return f"{text}, so that such an alarm tells little" if by_chance > TELLS_LITTLE else text
 
 
