@@ -14,17 +14,19 @@ from skthermo._arguments import check_jobs
 from skthermo._arrays import MatrixLike, as_floats, as_random_state
 from skthermo._frequency_effects import FrequencyEffects
 from skthermo._warnings import warn_each, without_warnings
-from skthermo.studies.identification._causes import read_causes
-from skthermo.studies.identification._comparison import Comparison, Part
-from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._measured_shapes import ShapeShift
-from skthermo.studies.identification._observe import observe
-from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._separability import VISIBLE, errors_alone
-from skthermo.studies.identification._shape_effects import ShapeEffects
+from skthermo.studies.identification.measured import ShapeEffects, ShapeShift, Shift, observe
+from skthermo.studies.identification.weighing import (
+    Comparison,
+    DamagePrior,
+    Part,
+    Posterior,
+    Scale,
+    explanations,
+    read_causes,
+)
 from skthermo.studies.scenarios import check_chain
 from skthermo.studies.worlds import checked_models
 
@@ -72,9 +74,9 @@ def identify_damage(
     added_mass : mapping of str to array-like, optional
         Patterns of mass that may have been added, in kg at the degrees of freedom, such as ballast.
     shapes : (array-like, array-like), optional
-        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), or (n_records,
-        n_dofs, n_modes) for several records, of any scale; complex ones are rotated to be real; NaN where a component
-        was not measured.
+        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), or
+        (n_records, n_dofs, n_modes) for several records, of any scale; complex ones are rotated to be real; NaN where
+        a component was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float, array-like of shape (n_modes,) or "fitted", default=0.01
@@ -164,14 +166,7 @@ def identify_damage(
     causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
     seen = observe(fem, T, F, noise)
     effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
-
-    def compared(effects: FrequencyEffects) -> Comparison:
-        parts = [Part(effects, seen.shift.mean, seen.shift.covariance, seen.shift.freedom)]
-        if shapes is not None:
-            parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
-        return Comparison(parts)
-
-    every = compared(effects)
+    every = compared(effects, seen.shift, shapes, dofs, shape_noise)
     nominal = Comparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
     scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     whitened = every.observed().rotation @ scale.curves.first
@@ -191,7 +186,8 @@ def identify_damage(
             with without_warnings():  # the chain itself has given them
                 chain = fem.refitted(model=model)
                 theta = as_floats(chain.predict_parameters(seen.temperatures))
-                other = compared(FrequencyEffects.of(chain, theta, seen.frequencies, changes))
+                of_chain = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
+                other = compared(of_chain, seen.shift, shapes, dofs, shape_noise)
                 scale = Scale.of(other.observed(prior.model_error), other.effects, causes, prior)
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 
@@ -203,6 +199,20 @@ def identify_damage(
     found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
+
+
+def compared(
+    effects: FrequencyEffects,
+    shift: Shift,
+    shapes: Any,
+    dofs: ArrayLike | None,
+    shape_noise: ArrayLike | Literal["fitted"],
+) -> Comparison:
+    """Measured shifts of frequencies, and of shapes if there are any, beside the effects of causes."""
+    parts = [Part(effects, shift.mean, shift.covariance, shift.freedom)]
+    if shapes is not None:
+        parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
+    return Comparison(parts)
 
 
 def _of_shapes(
