@@ -48,6 +48,13 @@ def probability_text(value: float) -> str:
     return "less than 0.001" if value < 0.001 else f"{value:.2g}"
 
 
+def chance_text(probability: float) -> str:
+    """A probability in percent without more digits than it deserves; one of nearly 0 or 1 is below or above a limit."""
+    if probability < 0.001 or probability > 0.999:
+        return f"below {percent(0.001)}" if probability < 0.001 else f"above {percent(0.999)}"
+    return percent(probability, ".0f" if 0.0095 <= probability < 0.995 else ".1f")
+
+
 def counted(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun."""
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"

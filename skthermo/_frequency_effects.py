@@ -1,38 +1,36 @@
-"""Effects of damage groups on the frequencies, averaged over the weather of some records."""
+"""Effects of changes of a structure on its frequencies, averaged over the weather of some records."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from skthermo._arguments import check_names
 from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._changes import ChangedStructure, Changes
 
 MOST_ROWS, MOST_SLOW_ROWS = 100, 24
 """Number of records over which effects are averaged; fewer for models that are slow to solve."""
 
-STEP = 1e-3  # step of differences in severity, for models without damage parameters, and in ln frequency
-LEVELS = (0.3, 0.6, 1.0)  # highest severities for which reduced models are made, each when it is needed
+MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
+STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
 
 
 @dataclass(frozen=True)
 class FrequencyEffects:
-    """Mean change of the logarithms of the measured frequencies that severities cause.
+    """Mean change of the logarithms of the measured frequencies that some amounts of change cause.
 
-    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes). Simulators with
-    damage parameters are kept by the highest severity that their reduced model covers.
+    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes).
     """
 
-    fem: Any
+    structure: ChangedStructure
     theta: Array
     weights: Array
-    groups: Sequence[str]
     healthy: Array
-    simulators: dict[float, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, fem: Any, theta: Array, F: Array, groups: Sequence[str]) -> "FrequencyEffects":
+    def of(cls, fem: Any, theta: Array, F: Array, changes: Changes) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
         is_slow = fem.simulator_.reduced is None and getattr(fem.model, "prefer", "processes") == "processes"
         present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
@@ -42,7 +40,8 @@ class FrequencyEffects:
         healthy = np.log(healthy_frequencies(fem, theta[rows]))
         weights = np.where(np.isnan(healthy), 0.0, present[rows])
         weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
-        return cls(fem, theta[rows], weights / np.maximum(weights.sum(axis=0), 1), groups, healthy)
+        weights = weights / np.maximum(weights.sum(axis=0), 1)
+        return cls(ChangedStructure(fem, changes), theta[rows], weights, healthy)
 
     def nominal(self) -> "FrequencyEffects":
         """The same effects at the model's nominal state.
@@ -51,46 +50,49 @@ class FrequencyEffects:
         symmetric and mirrored groups would seem to differ.
         """
         theta = np.ones((1, self.theta.shape[1]))
-        healthy = np.log(healthy_frequencies(self.fem, theta))
-        return FrequencyEffects(self.fem, theta, np.ones_like(healthy), self.groups, healthy)
+        healthy = np.log(healthy_frequencies(self.structure.fem, theta))
+        return FrequencyEffects(self.structure, theta, np.ones_like(healthy), healthy)
 
-    def __call__(self, severities: Array) -> tuple[Array, Array]:
-        """Change of each mode, (n_modes,), and its derivatives by the severities, (n_modes, n_groups)."""
-        exact = hasattr(self.fem.model, "with_damage_parameters")
-        frequencies, slopes = (self._linearised if exact else self._differenced)(severities)
+    def __call__(self, amounts: Array) -> tuple[Array, Array]:
+        """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).
+
+        Many sets of amounts together take less time than one by one.
+        """
+        sets = np.atleast_2d(amounts)
+        results = [self._changed(part) for part in np.array_split(sets, 1 + len(sets) * len(self.theta) // MOST_SOLVED)]
+        change, slopes = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
+        return (change[0], slopes[0]) if np.ndim(amounts) == 1 else (change, slopes)
+
+    def _changed(self, sets: Array) -> tuple[Array, Array]:
+        solve = self.structure.linearise if self.structure.is_exact else self._differenced
+        frequencies, slopes = solve(self.theta, sets)
         measured, elasticity = self._measured(frequencies)
         change = self._mean(np.log(measured) - self.healthy)
-        relative = elasticity[:, :, np.newaxis] * slopes
-        return change, np.stack([self._mean(column) for column in np.moveaxis(relative, 2, 0)], axis=1)
+        return change, self._mean(elasticity[..., np.newaxis] * slopes)
 
-    def _linearised(self, severities: Array) -> tuple[Array, Array]:
-        """Frequencies, and exact derivatives of their logarithms by the severities."""
-        level = next(level for level in LEVELS if severities.max() <= level)
-        if level not in self.simulators:
-            self.simulators[level] = self.fem.simulator_.with_damage_parameters(self.groups, 0.0, level)
-        simulator = self.simulators[level]
-        theta = np.hstack([self.theta, np.tile(1 - severities, (len(self.theta), 1))])
-        frequencies, jacobian = simulator.linearise(theta, self.fem.n_jobs, relative=True)
-        return frequencies, -jacobian[:, :, -len(self.groups) :] / (1 - severities)
+    def _differenced(self, theta: Array, sets: Array) -> list[Array]:
+        def at(amounts: Array) -> Array:
+            simulator, rows = self.structure.with_amounts(theta, amounts)
+            return simulator.frequencies(rows, self.structure.fem.n_jobs, warn=False)
 
-    def _differenced(self, severities: Array) -> tuple[Array, Array]:
-        frequencies = self._damaged(severities)
-        return frequencies, central_differences(self._damaged, severities) / frequencies[:, :, np.newaxis]
-
-    def _damaged(self, severities: Array) -> Array:
-        damage = dict(zip(self.groups, severities.tolist(), strict=True))
-        return self.fem.simulator_.damaged(damage).frequencies(self.theta, self.fem.n_jobs, warn=False)
+        frequencies = np.stack([at(amounts) for amounts in sets])
+        slopes = np.stack([central_differences(at, amounts) for amounts in sets])
+        return [frequencies, slopes / frequencies[..., np.newaxis]]
 
     def _measured(self, frequencies: Array) -> tuple[Array, Array]:
         """Frequencies in the measured domain, and their relative change per relative change of the model's."""
+        flat = frequencies.reshape(-1, frequencies.shape[-1])
         lower, middle, higher = (
-            as_floats(self.fem.aligner_.inverse_transform(frequencies * (1 + step))) for step in (-STEP, 0, STEP)
+            as_floats(self.structure.fem.aligner_.inverse_transform(flat * (1 + step))).reshape(frequencies.shape)
+            for step in (-STEP, 0, STEP)
         )
         return middle, (higher - lower) / (2 * STEP * middle)
 
     def _mean(self, values: Array) -> Array:
-        known = np.where(np.isnan(values), 0.0, self.weights)
-        return (known * np.nan_to_num(values)).sum(axis=0) / np.maximum(known.sum(axis=0), np.finfo(float).tiny)
+        """Mean over rows, the second axis, with each mode's weights."""
+        weights = self.weights if values.ndim == 3 else self.weights[..., np.newaxis]
+        known = np.where(np.isnan(values), 0.0, weights)
+        return (known * np.nan_to_num(values)).sum(axis=1) / np.maximum(known.sum(axis=1), np.finfo(float).tiny)
 
 
 def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
@@ -98,10 +100,10 @@ def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
     return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=warn)))
 
 
-def central_differences(function: Callable[[Array], Array], severities: Array) -> Array:
-    """Derivatives of a function by each severity, along a new last axis."""
-    steps = STEP * np.eye(len(severities))
-    return np.stack([(function(severities + h) - function(severities - h)) / (2 * STEP) for h in steps], axis=-1)
+def central_differences(function: Callable[[Array], Array], amounts: Array) -> Array:
+    """Derivatives of a function by each amount, along a new last axis."""
+    steps = STEP * np.eye(len(amounts))
+    return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * STEP) for h in steps], axis=-1)
 
 
 def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:

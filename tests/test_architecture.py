@@ -61,8 +61,9 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "reporting": {"reporting.service"},
     "reporting.service": set(),
     "studies.scenarios": set(),
-    "studies.detectability": {"studies.scenarios"},
-    "studies.extension": {"studies.detectability", "studies.scenarios"},
+    "studies.worlds": set(),
+    "studies.detectability": {"studies.scenarios", "studies.worlds"},
+    "studies.extension": {"studies.detectability", "studies.scenarios", "studies.worlds"},
     "studies.identification": {"studies.scenarios"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}

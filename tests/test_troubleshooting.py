@@ -18,7 +18,7 @@ ERRORS = "The most common errors"
 HELPER = "_warnings.py"
 """The file that gives the warnings of others."""
 
-REPORTS = ["_sentences", "_doubts", "summary", "likely_cause", "answer", "limits", "sentences"]
+REPORTS = ["_sentences", "_doubts", "summary", "likely_causes", "answer", "limits", "sentences"]
 """Functions whose sentences tell what is doubtful."""
 
 

@@ -39,6 +39,7 @@ class FEModel(Protocol):
     - ``linearised(theta)``, frequencies and Jacobian from one solution;
     - ``linearised_modes(theta, dofs)``, these and mode shapes with their derivatives at some degrees of freedom;
     - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;
+    - ``with_mass_parameters(masses)``, a model whose theta ends with 1 + the amount of each added mass;
     - ``with_added(stiffness, mass)``, a model with further stiffness and mass;
     - ``rescaled(theta)``, a model whose nominal state is this one's at theta.
 

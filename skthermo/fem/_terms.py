@@ -103,10 +103,10 @@ class AffineTerms(ABC):
     def each_matrix(self) -> list[Matrix]:
         """The matrices of the terms."""
 
-    def with_constant(self, matrix: Matrix) -> "AffineTerms":
-        """These terms and a further, constant one."""
-        exponents = np.vstack([self.exponents, np.zeros_like(self.exponents[:1])])
-        return type(self).from_matrices([*self.each_matrix, matrix], exponents).scaled(np.append(self.factors, 1.0))
+    def with_terms(self, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
+        """These terms and further ones; a row of zeros among the exponents makes a constant one."""
+        terms = type(self).from_matrices([*self.each_matrix, *matrices], np.vstack([self.exponents, exponents]))
+        return terms.scaled(np.append(self.factors, np.ones(len(matrices))))
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":

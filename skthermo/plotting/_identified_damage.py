@@ -1,4 +1,4 @@
-"""Identified damage: how severe, what it explains, and what cannot be told apart."""
+"""Identified damage: what explains the shifts, how probable that is, and how severe."""
 
 from __future__ import annotations
 
@@ -7,47 +7,55 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from skthermo.plotting._axes import Axes, draw_heat_map, panels
-from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, shortened
+from skthermo._formatting import chance_text
+from skthermo.plotting._axes import Axes, panels
+from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, drawing, label_of, plain, shortened
 
 NEEDED = {
-    "table": {"severity", "standard_error", "significant"},
-    "similarity": set(),
+    "told": {"probability"},
+    "table": {"probability", "severity", "lowest", "highest"},
     "shifts": {"measured", "explained", "standard_error"},
 }
-N_ERRORS = 2  # standard errors on either side of an estimate
+N_ERRORS = 2  # standard errors on either side of a measured shift
 LINE = 120  # number of letters of a line of the heading
+LABEL = 46  # number of letters of a line above a bar
+MOST_BARS = 5  # largest number of explanations that have a bar of their own
 SHORT_NAME = 8  # number of letters up to which names of modes fit beside each other
 
 
 @dataclass(eq=False, repr=False)
 class IdentifiedDamageDisplay:
-    """Severity of each group, shift of each mode beside what the damage explains, and collinearity of the groups.
+    """Explanations with their probabilities, severity of each group, and shift of each mode.
 
     It is best made by `from_predictions`.
 
     Parameters
     ----------
     identified : IdentifiedDamage
-        With the frames ``table`` (groups in rows; severity, standard_error, significant), ``shifts`` (modes in rows;
-        measured, explained, standard_error; relative) and ``similarity`` (cosine between groups), and perhaps the names
-        ``unseen`` of groups that are left out. The first sentence of its ``answer()``, if it has one, heads a figure of
-        its own.
+        With the frames ``told`` (explanations in rows, the most probable first; probability), ``table`` (causes in
+        rows; probability, severity, lowest, highest, and perhaps highest_if_damaged) and ``shifts`` (modes in rows;
+        measured, explained, standard_error; relative), and perhaps the names ``unseen`` of causes that the modes do not
+        show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
 
     Attributes
     ----------
     axes_ : ndarray of Axes of shape (3,)
-        Severities, shifts, collinearity.
+        Explanations, severities, shifts.
     figure_ : Figure
         Their figure.
-    severities_, shifts_ : ErrorbarContainer
-        Severities and measured shifts in percent, with two standard errors. A severity that is not determined is a
+    bars_ : BarContainer
+        Probabilities of the explanations in percent; those beyond the fifth, and those that are not listed, share the
+        last bar.
+    severities_ : ErrorbarContainer
+        Severities in percent, averaged over all explanations, with their 90 % bands; a pale bar reaches to the severity
+        that a damaged group has not exceeded with a probability of 95 %. A group of which these modes tell nothing is a
         dotted line from end to end.
+    shifts_ : ErrorbarContainer
+        Measured shifts in percent, with two standard errors.
     explained_ : Line2D
         Explained shifts in percent.
-    image_ : AxesImage
-        Cosines.
 
     Examples
     --------
@@ -55,17 +63,17 @@ class IdentifiedDamageDisplay:
     >>> import pandas as pd
     >>> from types import SimpleNamespace
     >>> from skthermo.plotting import IdentifiedDamageDisplay
-    >>> groups = ["deck", "piers"]
     >>> identified = SimpleNamespace(
+    ...     told=pd.DataFrame({"probability": [0.8, 0.2]}, ["piers 20 %", "deck 4 %, piers 12 %"]),
     ...     table=pd.DataFrame(
-    ...         {"severity": [0.01, 0.2], "standard_error": [0.02, 0.03], "significant": [False, True]}, groups),
-    ...     similarity=pd.DataFrame([[1.0, 0.4], [0.4, 1.0]], groups, groups),
+    ...         {"probability": [0.2, 1.0], "severity": [0.01, 0.18], "lowest": [0, 0.1], "highest": [0.04, 0.22]},
+    ...         ["deck", "piers"]),
     ...     shifts=pd.DataFrame(
     ...         {"measured": [-0.01, -0.05], "explained": [-0.012, -0.049], "standard_error": [0.002, 0.003]},
     ...         ["f1", "f2"]))
     >>> display = IdentifiedDamageDisplay.from_predictions(identified)
     >>> [ax.get_title() for ax in display.axes_]
-    ['severity ± 2 standard errors', 'shift of frequencies', 'cosine between groups']
+    ['what explains the shifts', 'average severity', 'shift of frequencies']
     >>> plt.close(display.figure_)
     """
 
@@ -114,59 +122,86 @@ class IdentifiedDamageDisplay:
         IdentifiedDamageDisplay
             Itself.
         """
-        self.axes_ = panels(ax, ["severity", "shifts", "similarity"], (4.3, 3.6), 3)
+        height = max(3.8, 1.4 + 0.3 * len(self.identified.table))
+        self.axes_ = panels(ax, ["explanations", "severities", "shifts"], (4.6, height), 3)
         self.figure_ = self.axes_[0].figure
-        self.severities_ = self._draw_severities(self.axes_[0])
-        self._draw_shifts(self.axes_[1])
-        similarity = self.identified.similarity
-        self.image_ = draw_heat_map(self.axes_[2], similarity, 1.0)
-        self.axes_[2].set_title("cosine between groups")
-        if len(similarity) > 3:
-            lean(self.axes_[2])
+        self.bars_ = self._draw_explanations(self.axes_[0])
+        self.severities_ = self._draw_severities(self.axes_[1])
+        self._draw_shifts(self.axes_[2])
         answer = getattr(self.identified, "answer", None)
         if ax is None and answer is not None:
-            self.figure_.suptitle(textwrap.fill(answer()[0], LINE), fontsize="medium")
-        self.figure_.colorbar(self.image_, ax=self.axes_[2], shrink=0.8)
+            self.figure_.suptitle(plain(textwrap.fill(answer()[0], LINE)), fontsize="medium")
         return self
 
+    def _draw_explanations(self, ax: Axes) -> Any:
+        """Bars with the causes above and the probability behind them."""
+        told = 100 * self.identified.told["probability"].astype(float)
+        shown = told.iloc[:MOST_BARS]
+        if (others := 100 - shown.sum()) >= 0.1:
+            shown = pd.concat([shown, pd.Series({"all others": others})])
+        places = np.arange(len(shown))
+        colours = [ORANGE] + [LIGHT] * (len(shown) - 1)
+        bars = ax.barh(places, shown.to_numpy(), height=0.36, color=colours, edgecolor=GREY, linewidth=0.6)
+        for place, (label, probability) in enumerate(shown.items()):
+            text = "\n".join(textwrap.wrap(str(label), LABEL, max_lines=2, placeholder=" ..."))
+            ax.text(0.8, place - 0.22, plain(text), ha="left", va="bottom", fontsize="small")
+            ax.text(probability + 1.5, place, chance_text(probability / 100), ha="left", va="center", fontsize="small")
+        ax.set_yticks([])
+        ax.set(title="what explains the shifts", xlabel="probability (%)", xlim=(0, 118))
+        ax.set_xticks(range(0, 101, 20))
+        ax.set_ylim(max(len(shown), 3) - 0.5, -0.9)
+        ax.spines[["top", "right"]].set_visible(False)
+        return bars
+
     def _draw_severities(self, ax: Axes) -> Any:
-        table = self.identified.table
-        places = np.arange(len(table))
-        severity = 100 * table["severity"].to_numpy(dtype=float)
-        errors = N_ERRORS * 100 * table["standard_error"].to_numpy(dtype=float)
-        known = np.isfinite(errors)
-        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2}
-        drawn = ax.errorbar(severity[known], places[known], xerr=errors[known], **style)
-        significant = table["significant"].to_numpy(dtype=bool)
-        for is_found, face, label in ((True, ORANGE, "significant"), (False, "white", "not significant")):
-            rows = (significant == is_found) & known
-            style = {"marker": "o", "color": ORANGE, "markerfacecolor": face, "markersize": 7, "label": label}
-            if rows.any():
-                ax.plot(severity[rows], places[rows], linestyle="", **style)
-        for place in places[~known]:  # it may be anything
-            ax.axhline(place, color=GREY, linestyle=":", linewidth=1.2)
+        """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
+        table, unseen = self.identified.table, set(getattr(self.identified, "unseen", ()))
+        places, is_known = np.arange(len(table)), ~table.index.isin(unseen)
+        severity, lowest, highest = 100 * table[["severity", "lowest", "highest"]].to_numpy(dtype=float).T
+        probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()
+        if "highest_if_damaged" in table:
+            possible = np.where(is_known, 100 * table["highest_if_damaged"].to_numpy(dtype=float), np.nan)
+            ax.barh(places, possible, height=0.5, color=LIGHT, alpha=0.5, label="if damaged, up to (95 %)")
+        errors = np.clip([severity - lowest, highest - severity], 0, None)[:, is_known]
+        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "90 % band"}
+        drawn = ax.errorbar(severity[is_known], places[is_known], xerr=errors, **style)
+        shades = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("probability", ["white", ORANGE])
+        points = {"cmap": shades, "vmin": 0, "vmax": 1, "edgecolors": ORANGE, "s": 50, "zorder": 3}
+        ax.scatter(severity[is_known], places[is_known], c=probability[is_known], **points)
+        for place, known, share in zip(places, is_known, probability, strict=True):
+            if not known:  # it may be anything
+                ax.axhline(place, color=GREY, linestyle=":", linewidth=1.2)
+                style = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"}
+                ax.text(
+                    0.5, place, "cannot be seen", transform=side, ha="center", va="center", fontsize="small", bbox=style
+                )
+            else:
+                ax.text(1.02, place, chance_text(share), transform=side, ha="left", va="center", fontsize="small")
+        ax.text(1.02, 1.0, "probability", transform=ax.transAxes, ha="left", va="bottom", fontsize="small")
         ax.axvline(0, color=BLACK, linewidth=0.8)
-        names = [
-            shortened(name) + ("" if one else "\n(not determined)")
-            for name, one in zip(table.index, known, strict=True)
-        ]
-        ax.set_yticks(places, names)
-        ax.set(title=f"severity ± {N_ERRORS} standard errors", xlabel="severity (%)", ylim=(len(table) - 0.5, -0.5))
-        ax.legend(framealpha=0.8, edgecolor="none", fontsize="small")
-        unseen = list(getattr(self.identified, "unseen", ()))
-        if unseen:
-            text = f"left out, as these modes do not show them: {', '.join(map(shortened, unseen))}"
-            ax.text(0.5, -0.2, text, transform=ax.transAxes, ha="center", va="top", fontsize="small", wrap=True)
+        ax.set_yticks(places, [shortened(name) for name in table.index])
+        is_damage = "kind" not in table or table["kind"].eq("damage").all()
+        label = "loss of stiffness (%)" if is_damage else "loss of stiffness, or change (%)"
+        ax.set(title="average severity", xlabel=label, ylim=(len(table) - 0.5, -0.5))
+        right = max(ax.get_xlim()[1], 1.0)
+        ax.set_xlim(min(ax.get_xlim()[0], -0.03 * right), right)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False, fontsize="small")
         return drawn
 
     def _draw_shifts(self, ax: Axes) -> None:
         shifts = 100 * self.identified.shifts[["measured", "explained", "standard_error"]].astype(float)
         places = np.arange(len(shifts))
         errors = N_ERRORS * shifts["standard_error"].to_numpy()
-        style = {"linestyle": "", "marker": "o", "color": BLUE, "capsize": 3, "label": "measured"}
+        style = {
+            "linestyle": "",
+            "marker": "o",
+            "color": BLUE,
+            "capsize": 3,
+            "label": f"measured ± {N_ERRORS} std. errors",
+        }
         known = np.where(np.isfinite(errors), errors, 0)
         self.shifts_ = ax.errorbar(places - 0.1, shifts["measured"].to_numpy(), yerr=known, **style)
-        style = {"linestyle": "", "marker": "D", "color": ORANGE, "label": "explained by the damage"}
+        style = {"linestyle": "", "marker": "D", "color": ORANGE, "label": "explained"}
         self.explained_ = ax.plot(places + 0.1, shifts["explained"].to_numpy(), **style)[0]
         ax.axhline(0, color=BLACK, linewidth=0.8)
         ax.set_xticks(places, [label_of(name) for name in shifts.index])

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._arrays import as_floats
-from skthermo._formatting import counted, percent, printable, share_text, significant
+from skthermo._formatting import chance_text, counted, percent, printable, share_text, significant
 from skthermo._validation import import_optional
 from skthermo.plotting import (
     DamageIndexDisplay,
@@ -171,21 +171,16 @@ def draw_groups(structure: Any, families: list[str]) -> Html:
 
 
 def draw_identified_damage(identified: Any) -> Html:
-    """Severities, shifts and similarity of the groups, one below the other."""
+    """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
-    n_groups = len(identified.table)
-    heights = [1.2 + 0.45 * n_groups, 2.8, 3.4]
+    heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
 
     def make() -> IdentifiedDamageDisplay:
         axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
         return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
 
-    severities = ", ".join(
-        f"{group} {share_text(row['severity'])}" for group, row in identified.table.iterrows() if row["severity"] > 0
-    )
-    alt = (
-        f"Identified severities ({severities or 'none'}), measured and explained shifts, and similarity of the groups."
-    )
+    told = ", ".join(f"{label}: {chance_text(row['probability'])}" for label, row in identified.told.head(3).iterrows())
+    alt = f"Explanations with their probabilities ({told}), severities, and measured and explained shifts."
     return draw(make, alt, height=sum(heights))
 
 

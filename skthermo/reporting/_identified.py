@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from skthermo._formatting import percent, probability_text
+from skthermo._formatting import bounds_text, chance_text, share_text
 from skthermo.reporting._figures import draw_identified_damage
-from skthermo.reporting._html import Html, bullets, element, figure, paragraphs, section, table
+from skthermo.reporting._html import Html, bar, bullets, element, figure, paragraphs, section, table
+
+LEAST = 0.005  # probability from which on an explanation has a row
+UNITS = {"damage": "loss of stiffness", "stiffening": "gain of stiffness", "parameter": "change", "mass": "added mass"}
+"""What the amounts of a cause are, by its kind."""
 
 
 def identified_damage(identified: Any) -> Html:
-    """Where damage is, how severe, what it explains, and what cannot be said."""
-    found, answers = identified.table, identified.damaged
-    rows = [
-        [
-            group,
-            percent(row["severity"], ".1f") if np.isfinite(row["severity"]) else "cannot be seen",
-            f"± {percent(2 * row['standard_error'], '.1f')}" if np.isfinite(row["standard_error"]) else "",
-            probability_text(row["p_value"]) if np.isfinite(row["severity"]) else "",
-            answers[group],
-        ]
-        for group, row in found.iterrows()
+    """What is most probable, what else could be, how severe, and what cannot be told."""
+    told = identified.told[identified.told["probability"] >= LEAST]
+    explanations = [
+        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
     ]
     shifts = [
         [
@@ -35,27 +30,57 @@ def identified_damage(identified: Any) -> Html:
     parts = [
         paragraphs(
             "Records of the structure as it is now were compared with what the healthy structure would do in the same "
-            "weather. The severities below explain how the frequencies have shifted."
+            "weather. Explanations of how the frequencies have shifted were weighed against each other: each has a "
+            "probability, and these add up to 100 %."
         ),
         bullets(identified.answer()),
+        table(
+            "Explanations with their probabilities. The bounds hold the severity with a probability of 90 % if the "
+            "explanation is right.",
+            ["Explanation", "Probability"],
+            explanations,
+        ),
+        element("h3", "What cannot be told"),
+        bullets(identified.limits()) or paragraphs("All groups can be seen and told apart by the measured modes."),
         paragraphs(*identified.records.sentences()),
         table(
-            "Identified damage: share of the stiffness that is lost, and its uncertainty (two standard errors). The "
-            "probability is that of such a severity, or a larger one, by chance in a healthy structure.",
-            ["Group", "Severity", "Uncertainty", "Probability by chance", "Clearly damaged"],
-            rows,
+            "Every group: the probability that it has changed, and by how much on average over all explanations, with "
+            "bounds that hold this with a probability of 90 %. The last column is what a group, if it has changed, "
+            "does not exceed with a probability of 95 %.",
+            ["Group", "Probability", "What changes", "On average", "Bounds", "If changed, up to"],
+            [_row(str(cause), row, cause in identified.unseen) for cause, row in identified.table.iterrows()],
         ),
         table(
-            "Mean shift of each natural frequency: measured, and explained by the identified damage.",
-            ["Mode", "Measured", "Explained", "Uncertainty of the measured shift"],
+            "Mean shift of each natural frequency: measured, and explained on average over all explanations.",
+            ["Mode", "Measured", "Explained", "Uncertainty of the measured shift (two standard errors)"],
             shifts,
         ),
-        element("h3", "What cannot be said"),
-        bullets(identified.limits()) or paragraphs("All groups can be seen and told apart by the measured modes."),
         figure(
-            "Severity of each group; shift of each natural frequency, measured and explained; and how similar "
-            "the effects of the groups are: 1 means that two groups change all modes alike and cannot be told apart.",
+            "Explanations with their probabilities; severity of each group, on average over all explanations; shift of "
+            "each natural frequency, measured and explained.",
             [draw_identified_damage(identified)],
         ),
     ]
     return section("identified", "Identified damage", *parts)
+
+
+def _row(cause: str, row: Any, is_unseen: bool) -> list[Any]:
+    """Cells of one cause."""
+    if is_unseen:
+        return [cause, "cannot be seen", UNITS[row["kind"]], "not known", "", ""]
+    amounts = row[["severity", "lowest", "highest", "highest_if_damaged"]].astype(float)
+    if row["kind"] == "stiffening":
+        amounts = amounts.abs()
+    lowest, highest = sorted(amounts[["lowest", "highest"]])
+    return [
+        cause,
+        chance_text(row["probability"]),
+        UNITS[row["kind"]],
+        share_text(amounts["severity"]),
+        bounds_text(lowest, highest),
+        share_text(amounts["highest_if_damaged"]),
+    ]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

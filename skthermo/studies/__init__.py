@@ -2,10 +2,11 @@
 
 from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
 from skthermo.studies.extension import what_to_add
-from skthermo.studies.identification import IdentifiedDamage, identify_damage
+from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage
 from skthermo.studies.scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
 
 __all__ = [
+    "DamagePrior",
     "DetectabilityStudy",
     "DetectionTask",
     "IdentifiedDamage",

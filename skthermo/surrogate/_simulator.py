@@ -1,6 +1,6 @@
 """Frequencies of many rows of parameters, by the reduced model inside its box and the full model outside."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +36,7 @@ class Simulator:
     model: FEModel
     reduced: Any = None
     box: Array | None = None
+    tol: float = DEFAULT_TOLERANCE
 
     @classmethod
     def around(cls, model: FEModel, theta: Array, reduce: bool | float) -> "Simulator":
@@ -46,14 +47,14 @@ class Simulator:
         lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
         margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
         box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
-        return cls(model, model.reduced(box, tol=tol, random_state=0), box)
+        return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
 
     def changed(self, method: str, *args: Any, **options: Any) -> "Simulator":
         """The simulator of the structure that a method of the model gives, such as "damaged"."""
         if not hasattr(self.model, method):
             raise ValueError(f"{self.model!r} has no method {method!r}; expected a model with one, such as AffineModel")
         reduced = None if self.reduced is None else getattr(self.reduced, method)(*args, **options)
-        return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box)
+        return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box, self.tol)
 
     def damaged(self, damage: Mapping[str, float] | None) -> "Simulator":
         """The simulator of the damaged structure; itself without damage."""
@@ -66,7 +67,21 @@ class Simulator:
         if self.box is None:
             return changed
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
-        return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]))
+        return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
+
+    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], ranges: Array) -> "Simulator":
+        """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
+
+        A reduced model is made for the ranges of what multiplies each column, (n_columns, 2).
+        """
+        model: Any = self.changed("with_damage_parameters", groups).model if groups else self.model
+        model = Simulator(model).changed("with_mass_parameters", masses).model if masses else model
+        if self.box is None:
+            return Simulator(model)
+        ends = np.vstack([self.box, np.ones((len(ranges) - len(self.box), 2))])
+        margins = MARGIN_OF_SEVERITY * (ranges != 1).any(axis=1)
+        box = ends * (ranges + np.outer(margins, [-1, 1]))
+        return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)
 
     def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""

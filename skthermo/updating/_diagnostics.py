@@ -91,7 +91,7 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
 
 def doubtful_parameters(names: Sequence[str], theta: Array, bounds: Array, covariance: Array | None) -> Iterator[str]:
     """Warnings about parameters at their bounds and, without a prior, those that the modes do not determine."""
-    at_bound = np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
+    at_bound = at_bounds(theta, bounds)
     if at_bound.any():
         listed = ", ".join(f"{names[i]!r} ({theta[i]:.3g})" for i in np.flatnonzero(at_bound))
         yield f"the optimum lies at the bounds of {listed}: expected wider bounds, or another model"
@@ -101,6 +101,11 @@ def doubtful_parameters(names: Sequence[str], theta: Array, bounds: Array, covar
         if undetermined.any() and not undetermined.all():
             listed = [names[i] for i in np.flatnonzero(undetermined)]
             yield f"{listed} hardly move the measured modes and are not determined: leave them out, or give a prior"
+
+
+def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
+    """Which parameters are at their bounds."""
+    return np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
 
 
 def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[str]:

@@ -1,15 +1,24 @@
 """One optimisation, from one start."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, least_squares, minimize
 
 from skthermo._arrays import Array
 from skthermo._threads import single_blas_thread
-from skthermo.updating._residuals import Point, Residuals
 
 TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
+
+
+class Searched(Protocol):
+    """What a search minimises: residuals at each theta, and the loss of their squares."""
+
+    def at(self, theta: Array) -> Any:
+        """Residuals at one theta: ``values``, ``objective``, ``jacobian()`` and ``gradient()``."""
+
+    def loss(self, squares: Array) -> Array:
+        """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
 
 
 class Outcome(NamedTuple):
@@ -26,14 +35,14 @@ class Outcome(NamedTuple):
 class SearchHistory:
     """Record of one optimisation: its last and its best point, and how many theta had no modes."""
 
-    def __init__(self, residuals: Residuals, start: Array):
+    def __init__(self, residuals: Searched, start: Array):
         self._residuals = residuals
         self._theta = self.theta = start
         self._point = self.best = residuals.at(start)
         self.n_evaluations = 1
         self.n_failed = 0 if np.isfinite(self.best.objective) else 1
 
-    def at(self, theta: Array) -> Point:
+    def at(self, theta: Array) -> Any:
         """Residuals at theta. Those at the last and at the best theta are remembered."""
         if np.array_equal(theta, self.theta):
             return self.best
@@ -52,7 +61,7 @@ class NoDerivatives(Exception):
     """The model has no finite derivatives at some theta."""
 
 
-def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
+def optimise(residuals: Searched, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
     """Minimise the residuals' loss within bounds.
 
     Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
@@ -77,7 +86,7 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
 
 
 def _least_squares(
-    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float
+    history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float
 ) -> OptimizeResult:
     def jacobian(theta: Array) -> Array:
         return _finite(history.at(theta).jacobian())
@@ -95,7 +104,7 @@ def _least_squares(
     )
 
 
-def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.

@@ -21,23 +21,33 @@ class Residuals:
         self.measured = measured
         self.prior = prior
         self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
-        self._n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
+        self.n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
     def at(self, theta: Array) -> "Point":
         """Residuals at one theta."""
         return Point(self, theta, paired_modes(self.model, self.measured, theta))
+
+    @property
+    def precisions(self) -> Array:
+        """Precision of each tangent of the weighted shapes, (n_weighted,), with the noise their weights are made for.
+
+        A shape with the weight sqrt(2 (n - 1)) / s^2 has noise of s times its root mean square at n degrees of freedom:
+        each of its tangents, and of the unit shape's components, has the variance s^2 / n.
+        """
+        n_dofs = len(self.measured.dofs)
+        return self.measured.shape_weights[self.weighted] * n_dofs / np.sqrt(2 * max(n_dofs - 1, 1))
 
     def loss(self, squares: Array) -> Array:
         """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
         rho = np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
         weights = self.measured.shape_weights[self.weighted] ** 2
         per_mode = len(self.measured.dofs)
-        E = squares[self._n_plain :].reshape(len(self.weighted), per_mode).sum(axis=1)
+        E = squares[self.n_plain :].reshape(len(self.weighted), per_mode).sum(axis=1)
         secant = np.sqrt(1 + E)
         values = weights * (E / (1 + secant)) ** 2
         slopes = weights * E / (secant * (1 + secant))
-        rho[0, self._n_plain :] = np.repeat(values, per_mode) / max(per_mode, 1)
-        rho[1, self._n_plain :] = np.repeat(slopes, per_mode)
+        rho[0, self.n_plain :] = np.repeat(values, per_mode) / max(per_mode, 1)
+        rho[1, self.n_plain :] = np.repeat(slopes, per_mode)
         return rho
 
 
@@ -74,15 +84,9 @@ class Point:
         return 2 * (slopes * self.values) @ self.jacobian()
 
     def information(self) -> Array:
-        """Fisher information of the prior, and of measurements whose noise is that for which the weights are made.
-
-        A shape with the weight sqrt(2 (n - 1)) / s^2 has noise of s times its root mean square at n degrees of freedom:
-        each of its tangents, and of the unit shape's components, has the variance s^2 / n.
-        """
+        """Fisher information of the prior, and of measurements whose noise is that for which the weights are made."""
         plain, slopes = self.blocks()
-        weights = self._residuals.measured.shape_weights[self._residuals.weighted]
-        precisions = weights * len(slopes) / np.sqrt(2 * max(len(slopes) - 1, 1))
-        return plain.T @ plain + np.einsum("djp,j,djq->pq", slopes, precisions, slopes)
+        return plain.T @ plain + np.einsum("djp,j,djq->pq", slopes, self._residuals.precisions, slopes)
 
     def blocks(self) -> tuple[Array, Array]:
         """Derivatives of the residuals of frequencies and prior, and of tangents (n_dofs, n_shapes, n_parameters)."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import Literal
 
@@ -14,7 +13,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._arguments import check_bounds, check_model, check_prior
+from skthermo._arguments import check_bounds, check_model, check_prior, check_size
 from skthermo._arrays import Array, Bounds, real_array
 from skthermo._frames import column_names
 from skthermo._validation import (
@@ -23,9 +22,11 @@ from skthermo._validation import (
     Interval,
     StrOptions,
     _fit_context,
+    check_is_fitted,
     validate_data,
 )
-from skthermo.fem import CallableModel, FEModel
+from skthermo._warnings import warn_each
+from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (
     doubtful_frequencies,
     doubtful_parameters,
@@ -34,6 +35,7 @@ from skthermo.updating._diagnostics import (
     starts_table,
     unfinished,
 )
+from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
 from skthermo.updating._identifiability import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
@@ -132,6 +134,11 @@ class ModelUpdater(Estimator):
 
     Liu & Nocedal, On the limited memory BFGS method for large scale optimization, Mathematical Programming 45 (1989)
     503-528 [LN89]_.
+
+    Kitanidis, Quasi-linear geostatistical theory for inversing, Water Resources Research 31 (1995) 2411-2419 [Kit95]_.
+
+    Oliver, He & Reynolds, Conditioning permeability fields to pressure data, 5th European Conference on the Mathematics
+    of Oil Recovery, Leoben, 1996 [OHR96]_.
 
     Examples
     --------
@@ -249,8 +256,10 @@ class ModelUpdater(Estimator):
                 f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds"
             )
 
+        self._measured = measured
+        self._has_deviations = frequency_std is not None
         self.theta_ = best.theta
-        self.model_ = _rescaled(self.model, best.theta)
+        self.model_ = rescaled(self.model, best.theta)
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
         self.table_ = modes_table(model, measured, best.theta)
@@ -266,6 +275,99 @@ class ModelUpdater(Estimator):
         if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
             self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
         return self
+
+    def sample_models(
+        self,
+        n: int,
+        *,
+        spread: float = 0.15,
+        groups: Sequence[str] | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> list[FEModel]:
+        """Models that are as likely as the calibrated one, given the measurements and what was known before.
+
+        The stiffness of every damage group is unknown too, also of those that no parameter scales. What the measured
+        modes do not determine differs from model to model as much as the prior allows.
+
+        Parameters
+        ----------
+        n : int
+            Number of models.
+        spread : float, default=0.15
+            Relative standard deviation of the stiffness of each damage group about its nominal value, before anything
+            is measured; also of the parameters, if the updater has no ``prior``.
+        groups : sequence of str, optional
+            Damage groups whose stiffness is unknown. By default all that are not made up of other groups; an empty
+            sequence means none. Groups all of whose stiffness the parameters scale are not varied a second time.
+        random_state : int, RandomState or None, default=None
+            Seed of the draws. The models do not depend on ``n_jobs``.
+
+        Returns
+        -------
+        list of FE model
+            ``n`` models like ``model_``: theta = 1 is the drawn stiffness; parameters, damage groups and modes are
+            those of ``model``. A model that has no method ``with_damage_parameters`` varies in its parameters only.
+
+        Raises
+        ------
+        ValueError
+            If the updater was fitted without ``frequency_std``, ``n`` is not a positive integer, ``spread`` is not
+            between 0 and 0.5, or a group is unknown.
+
+        Warns
+        -----
+        UserWarning
+            If some searches have not converged, more than a tenth of the models lie at a bound, modes swap places in
+            some of them, or some are outside the bounds for which the model was reduced. Each warning counts the
+            models.
+
+        Notes
+        -----
+        *Randomised maximum a posteriori* [Kit95]_, [OHR96]_: each model minimises the squares of all residuals in
+        units of their standard deviations, where noise of the measurements' size has been added to the measured
+        frequencies and shapes, and noise of the prior's size to its mean. Where residuals are linear in theta, the
+        models are independent draws from the posterior distribution; else approximately so. The search takes the
+        bounded Gauss-Newton steps of `fit`, with exact derivatives, from the optimum.
+
+        *Prior.* Multipliers of parameters and of groups are normally distributed about 1, the nominal model of
+        ``model``, and independent. Draws end at the bounds if they would pass them: ``bounds`` for the parameters, and
+        four standard deviations, or a tenth of the nominal stiffness, for the groups.
+
+        *Deviations.* ``frequency_std`` should hold what separates the mean measured frequency from that of a perfect
+        model in the same state: with many records, the error of the model (some tenths of a percent) is larger than
+        that of the mean. The mass is taken as known, unless a parameter scales it.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> from skthermo.updating import ModelUpdater
+        >>> truss = make_truss()
+        >>> F = truss.frequencies([0.9, 1.1, 0.95, 1.05])
+        >>> updater = ModelUpdater(truss, bounds=0.6, prior=0.15).fit(F, frequency_std=0.005 * F[0])
+        >>> models = updater.sample_models(20, random_state=0)
+        >>> drawn = [model.frequencies([1.0, 1.0, 1.0, 1.0])[0] / F[0] for model in models]
+        >>> print((100 * np.std(drawn, axis=0)).round(2))
+        [0.35 0.39 0.3  0.32 0.4  0.41]
+        """
+        check_is_fitted(self)
+        if not self._has_deviations:
+            raise ValueError(
+                "fit was called without frequency_std, and how much models may differ is not known; expected "
+                "fit(F, frequency_std=...), standard deviations of the mean frequencies in Hz"
+            )
+        if not isinstance(n, Integral) or isinstance(n, bool) or n < 1:
+            raise ValueError(f"n is {n!r:.100}; expected a positive number of models")
+        check_size(spread, "spread", 0, 0.5, "a relative standard deviation above 0 and below 0.5, such as 0.15")
+        names = self.model.parameter_names
+        prior = check_prior(spread if self.prior is None else self.prior, names)
+        ensemble = Ensemble(
+            self.model, self._measured, self._read_bounds(), prior, groups_beside(self.model, groups), spread
+        )
+        parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
+        outcomes = ensemble.multipliers(n, self.theta_, check_random_state(random_state), self.max_iter, parallel)
+        warn_each(ensemble.doubts(outcomes))
+        ensemble.warn_of([outcome.theta for outcome in outcomes])
+        return parallel(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         check_model(self.model)
@@ -302,15 +404,3 @@ class ModelUpdater(Estimator):
         parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
         starts = np.vstack([np.ones(len(bounds)), drawn])
         return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
-
-
-def _rescaled(model: FEModel, theta: Array) -> FEModel:
-    """A model whose nominal state is the given model at theta."""
-    if hasattr(model, "rescaled"):
-        return model.rescaled(theta)
-    function = partial(_frequencies_from, model, theta)
-    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
-
-
-def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
-    return model.frequencies(origin * theta)

@@ -18,11 +18,12 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from skthermo.studies.identification._bounded_fit import p_of_damage, p_of_misfit, standard_errors, two_errors
 
 from skthermo._arrays import as_floats
+from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies.identification._bounded_fit import p_of_damage, p_of_misfit, standard_errors, two_errors
 from skthermo.studies.identification._comparison import Comparison, Part, remembered
 from skthermo.studies.identification._shift import measured_shift
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
@@ -50,7 +51,9 @@ def window(fem, T, F):
     """Shift of records without noise, and the effects of damage in their weather."""
     theta = as_floats(fem.predict_parameters(T))
     F = F.to_numpy()
-    return measured_shift(fem, T, theta, F, "fitted"), remembered(FrequencyEffects.of(fem, theta, F, GROUPS))
+    return measured_shift(fem, T, theta, F, "fitted"), remembered(
+        FrequencyEffects.of(fem, theta, F, Changes.of_damage(fem.model, GROUPS))
+    )
 
 
 def trials(fem, n_records, memory, per_year, options, seed):

@@ -161,55 +161,80 @@ def test_sensitivities_as_a_map_with_numbers():
         SensitivityDisplay.from_predictions(table.to_numpy())
 
 
-def identified():
-    groups = ["deck", "piers", "soil"]
-    return SimpleNamespace(
-        table=pd.DataFrame(
-            {
-                "severity": [0.01, 0.2, 0.1],
-                "standard_error": [0.02, 0.03, np.inf],
-                "significant": [False, True, False],
-            },
-            groups,
-        ),
-        similarity=pd.DataFrame(np.eye(3), groups, groups),
-        shifts=pd.DataFrame(
+def given(n_groups=3, **changed):
+    """An identification by hand: the last group is not seen."""
+    groups = ["deck", "piers", "soil", *(f"E_{number}" for number in range(4, n_groups + 1))][:n_groups]
+    first = [0.3, 0.05, 0.02, 0.1, 0.16, 0.18]
+    values = np.vstack([first, *[[0.8, 0.2, 0.15, 0.25, 0.2, 0.25]] * (n_groups - 1)])
+    columns = ["probability", "severity", "lowest", "highest", "if_damaged", "highest_if_damaged"]
+    labels = ["piers 20 %", "deck 4 %, piers 12 %", "soil 8 %", "deck 5 %", "piers 3 %, soil 2 %", "no damage"]
+    frames = {
+        "told": pd.DataFrame({"probability": [0.5, 0.2, 0.1, 0.08, 0.06, 0.05]}, labels),
+        "table": pd.DataFrame(values, groups, columns),
+        "shifts": pd.DataFrame(
             {"measured": [-0.01, -0.05], "explained": [-0.012, -0.04], "standard_error": [0.002, 0.003]}, ["f1", "f2"]
         ),
-    )
-
-
-def test_identified_damage_is_drawn_in_percent_with_two_standard_errors():
-    given = identified()
-    display = IdentifiedDamageDisplay.from_predictions(given)
-    severities, shifts, collinearity = display.axes_
-    spans = [segment[:, 0] for segment in display.severities_[2][0].get_segments()]
-    np.testing.assert_allclose(spans, [[-3, 5], [14, 26]])
-    assert severities.get_yticklabels()[2].get_text() == "soil\n(not determined)"
-    faces = {
-        line.get_markerfacecolor(): line.get_xdata().tolist() for line in severities.lines if line.get_marker() == "o"
+        "unseen": groups[-1:],
     }
-    assert faces == {"#D55E00": [20.0], "white": [1.0]}
-    (anything,) = (
-        line for line in severities.lines if line.get_linestyle() == ":"
-    )  # what is not determined has no mark
+    return SimpleNamespace(**frames | changed)
+
+
+def test_probabilities_of_explanations_are_bars_and_those_beyond_the_fifth_share_one():
+    found = given()
+    display = IdentifiedDamageDisplay.from_predictions(found)
+    np.testing.assert_allclose([bar.get_width() for bar in display.bars_], [50, 20, 10, 8, 6, 6])
+    texts = [text.get_text() for text in display.axes_[0].texts]
+    assert texts[::2] == [*found.told.index[:5], "all others"]
+    assert [text.replace("\xa0", " ") for text in texts[1::2]] == ["50 %", "20 %", "10 %", "8 %", "6 %", "6 %"]
+    assert display.bars_[0].get_facecolor() != display.bars_[1].get_facecolor()
+    assert display.axes_[0].get_xlabel() == "probability (%)"
+    whole = IdentifiedDamageDisplay.from_predictions(given(told=pd.DataFrame({"probability": [0.9, 0.1]}, ["a", "b"])))
+    assert len(whole.bars_) == 2
+
+
+def test_severities_have_bands_and_probabilities_and_what_is_not_seen_has_none():
+    display = IdentifiedDamageDisplay.from_predictions(given())
+    ax = display.axes_[1]
+    spans = [segment[:, 0] for segment in display.severities_[2][0].get_segments()]
+    np.testing.assert_allclose(spans, [[2, 10], [15, 25]])
+    np.testing.assert_allclose([bar.get_width() for bar in ax.patches[:2]], [18, 25])
+    assert np.isnan(ax.patches[2].get_width())
+    (anything,) = (line for line in ax.lines if line.get_linestyle() == ":")
     assert list(anything.get_ydata()) == [2, 2]
+    texts = [text.get_text().replace("\xa0", " ") for text in ax.texts]
+    assert texts == ["30 %", "80 %", "cannot be seen", "probability"]
+    shades = ax.collections[-1].get_array()
+    np.testing.assert_allclose(shades, [0.3, 0.8])
+    assert ax.get_xlabel() == "loss of stiffness (%)"
+    assert [tick.get_text() for tick in ax.get_yticklabels()] == ["deck", "piers", "soil"]
+
+
+def test_shifts_are_drawn_in_percent_with_two_standard_errors():
+    display = IdentifiedDamageDisplay.from_predictions(given())
     np.testing.assert_allclose(display.shifts_[0].get_ydata(), [-1, -5])
     np.testing.assert_allclose(display.explained_.get_ydata(), [-1.2, -4])
     np.testing.assert_allclose(display.shifts_[2][0].get_segments()[1][:, 1], [-5.6, -4.4])
-    np.testing.assert_array_equal(display.image_.get_array(), np.eye(3))
-    assert shifts.get_ylabel() == "shift (%)"
-    assert severities.get_xlabel() == "severity (%)"
-    assert display.image_.get_clim() == (-1, 1)
-    assert collinearity.get_title() == "cosine between groups"
-    assert not severities.texts
-    given.unseen = ["vertical"]
-    text = IdentifiedDamageDisplay.from_predictions(given).axes_[0].texts[0].get_text()
-    assert text == "left out, as these modes do not show them: vertical"
+    assert display.axes_[2].get_ylabel() == "shift (%)"
+
+
+@pytest.mark.parametrize("n_groups", [1, 3, 14])
+def test_nothing_that_is_written_overlaps_in_a_figure_of_its_own(n_groups):
+    long = "Rebar of the upper floors in the eastern wing"
+    found = given(n_groups, unseen=[])
+    found.table = found.table.rename(index={"deck": long})
+    found.told = found.told.rename(index={"piers 20 %": f"{long} 12 %, main stays of the western pylon 4 %"})
+    display = IdentifiedDamageDisplay.from_predictions(found)
+    display.figure_.canvas.draw()
+    for ax in display.axes_[:2]:
+        boxes = [text.get_window_extent() for text in [*ax.texts, *ax.get_yticklabels(), ax.title]]
+        for number, box in enumerate(boxes):
+            assert not any(box.overlaps(other) for other in boxes[number + 1 :])
+    assert len(display.axes_[1].get_yticklabels()) == n_groups
+    assert display.axes_[0].texts[0].get_text().count("\n") <= 1
 
 
 def test_incomplete_results_are_named():
-    broken = identified()
+    broken = given()
     broken.shifts = broken.shifts.drop(columns="explained")
     with pytest.raises(ValueError, match=r"'shifts' is missing or lacks \['explained'\]"):
         IdentifiedDamageDisplay.from_predictions(broken)

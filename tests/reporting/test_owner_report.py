@@ -2,7 +2,6 @@
 
 import copy
 import re
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,21 +9,16 @@ import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
+from skthermo._formatting import chance_text, share_text
 from skthermo.datasets import kw51_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._html import STYLE
 from skthermo.reporting._identified import identified_damage
-from skthermo.studies import (
-    DetectabilityStudy,
-    ProgressiveDamage,
-    Scenario,
-    UncertainDamage,
-    identify_damage,
-    sweep,
-)
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, sweep
 from tests.reporting.pages import HOSTILE, MODES, QUOTED, SENSOR, Page, fitted_chain, run_study
+from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
@@ -50,17 +44,22 @@ def study(chain):
     return run_study(fem, T, scenarios)
 
 
-@pytest.fixture(scope="module")
-def identified(chain):
-    fem, T, _ = chain
-    damaged = fem.simulate(T, damage={HOSTILE: 0.2}, noise="fitted", random_state=3)
-    return identify_damage(fem, T, damaged, random_state=0)
+EXPLANATIONS = {
+    HOSTILE: (0.9, {HOSTILE: (0.2, 0.012)}),
+    f"{HOSTILE} + {QUOTED}": (0.08, {HOSTILE: (0.15, 0.02), QUOTED: (0.03, 0.02)}),
+    "no damage": (0.0001, {}),
+}
 
 
 @pytest.fixture(scope="module")
-def file(study, identified, tmp_path_factory):
+def found():
+    return identified(EXPLANATIONS)
+
+
+@pytest.fixture(scope="module")
+def file(study, found, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "bridge.html"
-    assert owner_report(study, path, identified=identified, title=HOSTILE, structure=kw51_structure()) == path
+    assert owner_report(study, path, identified=found, title=HOSTILE, structure=kw51_structure()) == path
     return path
 
 
@@ -117,48 +116,49 @@ def test_the_page_says_what_the_table_says(page, study):
     assert "3.3\xa0%" in page.text  # 4 of 120 records lack the second mode
 
 
-def test_identified_damage_is_said_first_and_in_full(page, identified):
-    severity, error = identified.table.loc[HOSTILE, ["severity", "standard_error"]]
-    said = f"{HOSTILE} has lost {100 * severity:.1f}\xa0% of its stiffness (± {200 * error:.1f}\xa0%)."
+def test_identified_damage_is_said_first_and_in_full(page):
+    said = f"Most probable: a loss of 20\xa0% of stiffness in {HOSTILE} (between 18 and 22\xa0%), probability 90\xa0%."
     assert page.text.count(said) == 2
     assert page.text.index(said) < page.text.index("False alarms")
+    assert f"It could also be: a loss of 15\xa0% in {HOSTILE} and of 3\xa0% in {QUOTED} (8\xa0%)." in page.text
 
 
-def test_what_cannot_be_identified_is_said(identified):
-    changes = {"confused": [(HOSTILE, "deck")], "unseen": ["piers"], "misfit_p_value": 0.01}
-    table = identified.table.reindex([*identified.table.index, "piers"])
-    table["significant"] = False
-    doubtful = replace(identified, table=table, **changes)
-    text = Page(identified_damage(doubtful)).text
-    assert f"{HOSTILE} and deck cannot be told apart" in text
-    assert "piers cannot be seen in these modes" in text
-    assert "something else has changed too" in text
-    assert "damage of these groups does not explain all of it" in text
-    assert "Which part cannot be said: the best explanation is a loss of" in text
-    doubtful = replace(doubtful, misfit_p_value=np.nan, confused=[], unseen=[])
-    text = Page(identified_damage(doubtful)).text
-    assert "no more modes than damaged groups" in text
+def test_explanations_and_groups_are_in_tables_with_their_probabilities(page, found):
+    assert f"A loss of 20\xa0% of stiffness in {HOSTILE} (between 18 and 22\xa0%)" in page.heads
+    assert {HOSTILE, QUOTED} <= set(page.heads)
+    row = found.table.loc[QUOTED]
+    last = len(page.cells) - page.cells[::-1].index("loss of stiffness") - 1
+    assert page.cells[last - 1] == chance_text(row["probability"])
+    assert page.cells[last + 1] == share_text(row["severity"])
+    assert page.cells[last + 3] == share_text(row["highest_if_damaged"])
 
 
-def test_what_damage_does_not_explain_is_said_where_damage_is_named(study, identified, tmp_path):
-    table, shifts = identified.table.copy(), identified.shifts.copy()
-    table["severity"], table["standard_error"], table["significant"] = [0.149, 0.003], [0.0005, 0.002], True  # widened
-    shifts["measured"] = shifts["explained"] + [0, 5, 0] * shifts["standard_error"]
-    misfit = replace(identified, table=table, shifts=shifts, misfit_p_value=3e-5)
-    page = Page(owner_report(study, tmp_path / "a.html", identified=misfit).read_text(encoding="utf-8"))
+def test_what_cannot_be_told_is_said():
+    doubtful = identified(
+        EXPLANATIONS,
+        groups=[HOSTILE, QUOTED, "piers"],
+        confused=[(HOSTILE, QUOTED)],
+        unseen=["piers"],
+        misfit_p_value=0.01,
+    )
+    page = Page(identified_damage(doubtful))
+    assert f"{HOSTILE} and {QUOTED} cannot be told apart" in page.text
+    assert "Damage in piers cannot be seen in these modes: nothing is known of it." in page.text
+    assert "piers" in page.heads
+    assert page.cells.count("cannot be seen") == 1
+    assert "The most probable explanation leaves something unexplained (probability by chance 1\xa0%)" in page.text
+    page = Page(identified_damage(identified(EXPLANATIONS, rest=0.0)))
+    assert "All groups can be seen and told apart by the measured modes." in page.text
+
+
+def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(study, tmp_path):
+    nothing = identified({"something else": (0.93, {}), "no damage": (0.07, {})}, groups=[HOSTILE, QUOTED])
+    page = Page(owner_report(study, tmp_path / "a.html", identified=nothing).read_text(encoding="utf-8"))
     headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
-    assert "damage of these groups does not explain all of it" in headline
-    assert f"{HOSTILE} has lost 14.9\xa0% of its stiffness (± 0.1\xa0%), if nothing else has changed." in headline
-    assert f"It is doubtful whether {QUOTED} is damaged: a loss of 0.3\xa0% (± 0.4\xa0%)" in headline
-    assert [cell for cell in page.cells if cell.startswith(("yes", "doubtful"))] == [
-        "yes, if nothing else has changed",
-        "doubtful",
-    ]
+    assert "Most probable: something else than damage of these groups, probability 93\xa0%." in headline
+    assert "No damage of these groups explains the shifts; mode" in headline
     warned = page.text[page.text.rindex("Warnings") :]
-    assert "Identified damage: damage of these groups does not explain the shifts (probability 3e-05)" in warned
-    explained = replace(misfit, misfit_p_value=0.5).answer()
-    assert f"{QUOTED} has lost 0.3\xa0% of its stiffness (± 0.4\xa0%)." in explained
-    assert not [sentence for sentence in explained if "doubtful" in sentence or "not explain" in sentence]
+    assert "Identified damage: damage of these groups does not explain the shifts (something else has a" in warned
 
 
 @pytest.mark.filterwarnings("ignore:temperatures of other rows explain .* of 3 rows after")  # north_lag3 stands alone
@@ -214,22 +214,19 @@ def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     assert "There was no warning" not in text
 
 
-def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(file, study, identified, tmp_path):
+def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(file, study, found, tmp_path):
     opened = plt.figure()
     with plt.style.context("dark_background"):
-        again = owner_report(
-            study, tmp_path / "a.html", identified=identified, title=HOSTILE, structure=kw51_structure()
-        )
+        again = owner_report(study, tmp_path / "a.html", identified=found, title=HOSTILE, structure=kw51_structure())
     assert plt.get_fignums() == [opened.number]
     plt.close(opened)
     assert Page(again.read_text(encoding="utf-8")).values("src") == Page(file.read_text(encoding="utf-8")).values("src")
 
 
-def test_control_characters_in_names_are_seen_and_harm_nothing(identified, tmp_path):
-    names = {"table": ["a\x00b", "line\nbreak \x1b[31m\u202e"], "similarity": ["a\x00b", "line\nbreak \x1b[31m\u202e"]}
-    table = identified.table.set_axis(names["table"])
-    similarity = identified.similarity.set_axis(names["similarity"]).set_axis(names["similarity"], axis=1)
-    text = identified_damage(replace(identified, table=table, similarity=similarity, unseen=["\x07bell", "\ud800"]))
+def test_control_characters_in_names_are_seen_and_harm_nothing():
+    names = ["a\x00b", "line\nbreak \x1b[31m\u202e", "\x07bell", "\ud800"]
+    explanations = {name: (0.25, {name: (0.2, 0.01)}) for name in names}
+    text = identified_damage(identified(explanations, unseen=names[2:]))
     page = Page(text)
     for seen in (r"a\x00b", r"line break \x1b[31m\u202e", r"\x07bell", r"\ud800"):
         assert seen in page.text

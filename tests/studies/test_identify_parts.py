@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
-
-from skthermo._frequency_effects import FrequencyEffects, read_groups
-from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._bounded_fit import (
     fit_severities,
     p_of_damage,
@@ -14,9 +11,12 @@ from skthermo.studies.identification._bounded_fit import (
     redrawn,
     widening_of,
 )
+
+from skthermo._changes import Changes
+from skthermo._frequency_effects import FrequencyEffects, read_groups
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._comparison import Comparison, Part
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone, merge_confused
-from skthermo.studies.identification._shape_effects import ShapeEffects
 from skthermo.studies.identification._shift import measured_shift
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -33,7 +33,9 @@ def differences(function, at, step=1e-4):
 def test_effects_are_the_changes_of_simulated_records(fem):
     F = fem.simulate(WEATHER).to_numpy(copy=True)
     F[::2, 1], F[:, 4] = np.nan, np.nan
-    effects = FrequencyEffects.of(fem, fem.predict_parameters(WEATHER).to_numpy(), F, GROUPS)
+    effects = FrequencyEffects.of(
+        fem, fem.predict_parameters(WEATHER).to_numpy(), F, Changes.of_damage(fem.model, GROUPS)
+    )
     change, slopes = effects(AT)
     damaged = fem.simulate(WEATHER, damage=dict(zip(GROUPS, AT, strict=True))).to_numpy()
     ratios = np.log(damaged / fem.simulate(WEATHER).to_numpy())
@@ -42,20 +44,6 @@ def test_effects_are_the_changes_of_simulated_records(fem):
     np.testing.assert_allclose(change, np.nanmean(expected, axis=0), atol=1e-9)
     np.testing.assert_allclose(slopes, differences(lambda at: effects(at)[0], AT), rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(effects(np.zeros(3))[0], 0, atol=1e-12)
-
-
-def test_effects_on_shapes(fem):
-    dofs = [0, 3, 7, 11]
-    effects = ShapeEffects.of(fem, np.array([[1.0, 1.02, 0.98, 1.0]]), GROUPS, dofs)
-    change, slopes = effects(AT)
-    np.testing.assert_allclose(slopes, differences(lambda at: effects(at)[0], AT), rtol=1e-4, atol=1e-4)
-    damaged = make_truss().damaged(dict(zip(GROUPS, AT, strict=True)))
-    shapes = damaged.modes(effects.theta)[1][0][dofs]
-    turned = shapes * np.array([1j, -2, 3, 0.1 - 0.2j, 1, -1])
-    measured, deviations = effects.measured((effects.reference * -3, turned), 0.02)
-    np.testing.assert_allclose(measured, change, atol=1e-9)
-    largest = np.abs(effects.reference).max(axis=0)
-    np.testing.assert_allclose(deviations.reshape(4, 6), np.sqrt(2) * 0.02 * np.tile(largest, (4, 1)))
 
 
 def quadratic(severities):

@@ -1,107 +1,224 @@
-"""What an identification says: one wording, whose first sentence follows the probabilities."""
+"""What an identification says: the most probable explanation first, then what else could be and what cannot be told."""
 
-import itertools
-from dataclasses import replace
+import re
 
 import numpy as np
 import pytest
 
-from skthermo.datasets import make_truss_campaign
+from skthermo._formatting import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_damage
-from skthermo.studies import identify_damage
+from skthermo.studies.identification._compared import ComparedRecords
+from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
-GROUPS = ["bottom", "top", "diagonal"]
-FEW = {"n_independent": 1.6, "n_trained_independent": 12.2}
+
+CLEAR = {
+    "side span": (0.85, {"side span": (0.12, 0.018)}),
+    "main stays + bearings": (0.09, {"main stays": (0.04, 0.01), "bearings": (0.03, 0.01)}),
+    "something else": (0.04, {}),
+    "side span + something else": (0.019, {"side span": (0.1, 0.03)}),
+    "no damage": (0.0002, {}),
+}
+PIERS = {
+    "pier_1": (0.44, {"pier_1": (0.12, 0.018)}),
+    "pier_2": (0.40, {"pier_2": (0.11, 0.018)}),
+    "pier_1 + pier_2": (0.06, {"pier_1": (0.06, 0.03), "pier_2": (0.06, 0.03)}),
+    "deck": (0.07, {"deck": (0.03, 0.01)}),
+    "no damage": (0.03, {}),
+}
+HEALTHY = {
+    "no damage": (0.9, {}),
+    "vertical": (0.05, {"vertical": (0.3, 0.2)}),
+    "something else": (0.03, {}),
+    "deck": (0.02, {"deck": (0.02, 0.01)}),
+}
+ELSE = {"something else": (0.9, {}), "deck + something else": (0.06, {"deck": (0.02, 0.01)}), "no damage": (0.04, {})}
+CASES = {
+    "clear": identified(CLEAR),
+    "alike": identified(PIERS, alike=[("pier_1", "pier_2")]),
+    "healthy": identified(HEALTHY, groups=["deck", "piers", "vertical"], unseen=["vertical"], p_value=0.4),
+    "something else": identified(ELSE, groups=["deck", "piers"]),
+}
 
 
-@pytest.fixture(scope="module")
-def found(fem):
-    later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
-    return identify_damage(fem, later.temperatures[:60], later.frequencies[:60], GROUPS, random_state=0)
+def said(found):
+    return found.summary().split("\n")
 
 
-def changed(found, is_evident, is_known, is_misfit, is_few):
-    table = found.table.assign(significant=is_known & np.array([False, True, False]))
-    numbers = {"n_independent": 60.0, "n_trained_independent": 365.0} | (FEW if is_few else {})
-    return replace(
-        found,
-        table=table,
-        p_value=0.002 if is_evident else 0.35,
-        misfit_p_value=0.01 if is_misfit else 0.6,
-        records=replace(found.records, **numbers),
+def shifts(measured, explained=0.0, error=0.001):
+    n_modes = len(measured)
+    return {"measured": measured, "explained": [explained] * n_modes, "standard_error": [error] * n_modes}
+
+
+def test_what_is_most_probable_what_else_could_be_and_whether_anything_has_changed():
+    first, others, unchanged, averages, records = said(CASES["clear"])
+    assert first == "Most probable: a loss of 12 % of stiffness in side span (between 9 and 15 %), probability 85 %."
+    assert others == (
+        "It could also be: a loss of 4 % in main stays and of 3 % in bearings (9 %); something else than damage of "
+        "these groups (4 %); a loss of 10 % in side span and something else (2 %)."
+    )
+    assert unchanged == "The probability that nothing has changed is below 0.1 %."
+    assert re.fullmatch(
+        r"Averaged over all explanations: side span 1\d % \(between 0 and 15 %; damaged with probability 8\d %\)\.",
+        averages,
+    )
+    assert records == "Compared: 60 records; with 365 training records."
+
+
+def test_an_explanation_that_is_sure_needs_no_averages():
+    sure = identified({"top": (0.995, {"top": (0.2, 0.004)}), "bottom": (0.005, {"bottom": (0.2, 0.01)})})
+    assert said(sure)[:2] == [
+        "Most probable: a loss of 20.0 % of stiffness in top (between 19.3 and 20.7 %), probability 99.5 %.",
+        "The probability that nothing has changed is below 0.1 %.",
+    ]
+
+
+def test_groups_that_look_alike_are_said_together_with_the_sum_of_their_probabilities():
+    found = CASES["alike"]
+    first, others, *_ = said(found)
+    assert first == (
+        "Most probable: a loss of 12 % of stiffness in pier_1 or pier_2 (between 9 and 15 %), which these modes cannot "
+        "tell apart, probability 90 %."
+    )
+    assert others == "It could also be: a loss of 3 % in deck (7 %)."
+    assert found.told["probability"].to_dict() == pytest.approx(
+        {"pier_1 or pier_2 12\xa0%": 0.9, "deck 3\xa0%": 0.07, "no damage": 0.03}
+    )
+    assert "pier_1 and pier_2 cannot be told apart by these modes: only their common effect is known." in said(found)
+    apart = identified(PIERS)
+    assert apart.told["probability"].iloc[0] == pytest.approx(0.44)
+
+
+def test_alike_groups_of_other_effect_have_each_their_own_severity():
+    weak = PIERS | {"pier_2": (0.40, {"pier_2": (0.3, 0.04)})}
+    (first, *_) = said(identified(weak, alike=[("pier_1", "pier_2")]))
+    assert first == (
+        "Most probable: a loss of 12 % of stiffness in pier_1 (between 9 and 15 %) or of 30 % in pier_2 (between 23 "
+        "and 37 %), which these modes cannot tell apart, probability 90 %."
     )
 
 
-CASES = [case for case in itertools.product([True, False], repeat=4) if case[0] or not case[1]]
+def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
+    found = identified(PIERS, confused=[("pier_1", "pier_2", "deck")])
+    assert found.told["probability"].iloc[0] == pytest.approx(0.44)
+    assert "pier_1, pier_2 and deck cannot be told apart by these modes" in found.summary()
 
 
-@pytest.mark.parametrize(("is_evident", "is_known", "is_misfit", "is_few"), CASES)
-def test_report_summary_and_drawing_say_the_same(found, is_evident, is_known, is_misfit, is_few):
-    case = changed(found, is_evident, is_known, is_misfit, is_few)
-    first, *others = case.answer()
-    said = " ".join(others)
-    if is_evident:
-        assert first.startswith("Something has changed (probability by chance 0.002)")
-        assert ("does not explain all of it (probability of such a misfit by chance 0.01)" in first) == is_misfit
-    elif is_misfit:
-        assert first == (
-            "Something has changed, but no damage of these groups explains it (probability by chance 0.01)."
-        )
-    else:
-        assert first == "No change is evident (probability by chance 0.35)."
-    assert ("Which part cannot be said" in said) == (is_evident and not is_known)
-    assert ("could have gone unseen" in said) == (not is_evident and not is_misfit)
-    assert ("top has lost" in said or "whether top is damaged" in said) == is_known
-    assert ("doubtful" in said or "if nothing else" in said) == (is_known and is_misfit)
-    summary = case.summary()
-    page = identified_damage(case)
+def test_silence_is_never_healthy():
+    found = CASES["healthy"]
+    first, others, unnoticed, unseen, *_ = said(found)
+    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with that of the unseen group
+    assert others.startswith(
+        "It could also be: something else than damage of these groups (3 %); a loss of 2 % in deck"
+    )
+    bounds = found.table["highest_if_damaged"]
+    assert unnoticed == (
+        f"A loss of stiffness of up to {100 * bounds['deck']:.2g} % in deck and {100 * bounds['piers']:.2g} % in piers "
+        "could have gone unseen."
+    )
+    assert unseen == "Damage in vertical cannot be seen in these modes: nothing is known of it."
+    doubtful = identified(HEALTHY, unseen=["vertical"], p_value=0.01)
+    assert "Yet a healthy structure shows such shifts with a probability of only 1 %." in said(doubtful)
+
+
+def test_damage_of_a_group_that_is_hardly_seen_is_said_where_it_is_more_probable_than_none():
+    severe = {"vertical": (0.97, {"vertical": (0.6, 0.15)}), "no damage": (0.03, {})}
+    (first, *_) = said(identified(severe, unseen=["vertical"]))
+    assert first.startswith("Most probable: a loss of 60 % of stiffness in vertical")
+
+
+@pytest.mark.parametrize(
+    ("measured", "cause"),
+    [
+        ([2 * np.pi - 1] * 4, "frequencies in rad/s: the measured ones are about 2 pi times the predicted ones"),
+        ([-0.021, -0.02, -0.0195, -0.0205], "another clock of the logger, or mass or stiffness all over the structure"),
+        ([0.02, -0.001, 0.012, 0.0], "strengthening, which was not sought (stiffening=...): 2 of 4 frequencies rose"),
+        ([-0.001, -0.05, 0.001, 0.0], "another mode taken for mode f2, which alone departs"),
+        ([-0.01, -0.05, 0.001, 0.0], "damage outside these groups, a change of mass or of a support, a wrong sensor"),
+    ],
+)
+def test_where_no_damage_explains_the_shifts_likely_causes_are_named(measured, cause):
+    found = identified(ELSE, groups=["deck", "piers"], shifts=shifts(measured))
+    first, departs, causes, *_ = said(found)
+    assert first == "Most probable: something else than damage of these groups, probability 90 %."
+    worst = int(np.argmax(np.abs(measured)))
+    assert departs == (
+        f"No damage of these groups explains the shifts; mode f{worst + 1} departs most: it moved by "
+        f"{100 * measured[worst]:+.2f} % (standard error 0.10 %), of which these groups explain +0.00 %."
+    )
+    assert causes.startswith(f"Likely causes: {cause}")
+    assert cause in dict(found.warnings())["unexplained shifts"]
+
+
+def test_strengthening_that_was_sought_is_said_as_a_gain_and_not_named_as_a_cause():
+    names = {"deck stiffened": "stiffening"}
+    gained = {"deck stiffened": (0.97, {"deck stiffened": (-0.08, 0.012)}), "something else": (0.03, {})}
+    (first, *_) = said(identified(gained, kinds=names))
+    assert first == (
+        "Most probable: a gain of 8 % of stiffness in deck stiffened (between 6 and 10 %), probability 97 %."
+    )
+    sought = identified(ELSE, groups=["deck", *names], kinds=names, shifts=shifts([0.02, -0.001, 0.012, 0.0]))
+    assert "strengthening" not in sought.summary()
+
+
+def test_what_the_most_probable_explanation_leaves_is_told():
+    found = identified(CLEAR, misfit_p_value=0.004, shifts=shifts([-0.02, -0.001, -0.012, 0.0], -0.001))
+    (misfit,) = (line for line in said(found) if "unexplained" in line)
+    assert misfit == (
+        "The most probable explanation leaves something unexplained (probability by chance 0.4 %): mode f1 departs "
+        "most: it moved by -2.00 % (standard error 0.10 %), of which these groups explain -0.10 %."
+    )
+    assert "likely causes: damage outside these groups" in dict(found.warnings())["unexplained shifts"]
+    assert "any shift can be explained" in identified(CLEAR, misfit_p_value=np.nan).summary()
+
+
+def test_explanations_that_are_not_listed_are_counted():
+    few = {name: CLEAR[name] for name in ("side span", "something else")}
+    assert "Explanations that are not listed have a probability of 11 % together." in said(identified(few))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_report_summary_and_drawing_say_the_same(name):
+    found = CASES[name]
+    page = identified_damage(found)
     assert isinstance(page, Html)
-    for sentence in (first, *others, *case.limits(), *case.records.sentences()):
-        assert sentence.replace("\xa0", " ") in summary
+    for sentence in (*found.answer(), *found.limits(), *found.records.sentences()):
+        assert sentence.replace(SPACE, " ") in found.summary()
         assert sentence in page
-    display = IdentifiedDamageDisplay.from_predictions(case)
-    assert " ".join(display.figure_.get_suptitle().split()) == first.replace("\xa0", " ")
+    for probability in found.told["probability"]:
+        assert probability < 0.005 or chance_text(probability) in page
+    display = IdentifiedDamageDisplay.from_predictions(found)
+    assert " ".join(display.figure_.get_suptitle().split()) == said(found)[0]
     plt.close(display.figure_)
-    assert ("60 records, worth 1.6 independent ones" in summary) == is_few
-    kinds = dict(case.warnings())
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [(0.0, "below 0.1 %"), (0.0012, "0.1 %"), (0.048, "5 %"), (0.853, "85 %"), (0.9949, "99 %"), (0.996, "99.6 %")],
+)
+def test_probabilities_have_no_more_digits_than_they_deserve(probability, text):
+    assert chance_text(probability).replace(SPACE, " ") == text
+    assert chance_text(1.0) == f"above 99.9{SPACE}%"
+
+
+def test_records_that_were_left_out_or_scatter_widely_are_told():
+    left_out = {"without a frequency": 12, "in foreign weather": 3}
+    records = ComparedRecords(90, left_out, 75.0, 365, 365.0, {"f3": 2.4})
+    found = identified(CLEAR, records=records)
+    assert records.n_compared == 75
+    assert "15 of 90 records could not be compared: 12 without a frequency and 3 in foreign weather." in found.summary()
+    assert "Mode f3 scatters 2.4 times as widely as in the training records" in found.summary()
+    assert "records that were not compared" in dict(found.warnings())
+
+
+@pytest.mark.parametrize("is_few", [True, False])
+def test_few_independent_records_are_warned_of(is_few):
+    worth = (1.6, 12.2) if is_few else (60.0, 365.0)
+    found = identified(CLEAR, records=ComparedRecords(60, {}, worth[0], 365, worth[1], {}))
+    assert ("60 records, worth 1.6 independent ones" in found.summary()) == is_few
+    kinds = dict(found.warnings())
     assert ("few independent records" in kinds) == is_few
     assert ("few independent training records" in kinds) == is_few
-    assert ("unexplained shifts" in kinds) == is_misfit
-
-
-def test_no_group_is_called_damaged_where_no_damage_is_evident(found):
-    case = replace(found, p_value=0.2, table=found.table.assign(significant=False))
-    assert (case.damaged == "no").all()
-    text = case.summary()
-    assert text.startswith("No change is evident (probability by chance 0.2).")
-    highest = found.table.loc["top", "severity"] + 2 * found.table.loc["top", "standard_error"]
-    assert f"{100 * highest:.1f} % in top" in text
-
-
-def test_records_that_were_left_out_or_scatter_widely_are_told(found):
-    records = replace(
-        found.records, n_given=90, left_out={"without a frequency": 12, "in foreign weather": 3}, wider={"f3": 2.4}
-    )
-    case = replace(found, records=records)
-    assert records.n_compared == 75
-    assert "15 of 90 records could not be compared: 12 without a frequency and 3 in foreign weather." in case.summary()
-    assert "Mode f3 scatters 2.4 times as widely as in the training records" in case.summary()
-    assert "records that were not compared" in dict(case.warnings())
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_records_with_outliers_widen_their_own_errors(fem):
-    later = make_truss_campaign(random_state=1)
-    T, F = later.temperatures[:60], later.frequencies[:60].copy()
-    plain = identify_damage(fem, T, F, GROUPS, random_state=0)
-    F.iloc[::7, 2] *= 0.9
-    spoiled = identify_damage(fem, T, F, GROUPS, random_state=0)
-    assert list(spoiled.records.wider) == ["f3"]
-    assert plain.records.wider == {}
-    ratio = spoiled.shifts["standard_error"] / plain.shifts["standard_error"]
-    assert ratio["f3"] > 1.5
-    assert ratio.drop("f3").max() < 1.1

@@ -1,5 +1,7 @@
 """Detectability studies of the truss."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,8 +15,9 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.metrics import probability_of_detection, time_to_detection
-from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, sweep
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
 from skthermo.surrogate import DataInformedFEM
+from tests.surrogate.chains import chain
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures
@@ -364,3 +367,37 @@ def test_a_family_of_one_severity_has_no_curve_but_a_bracket(fem):
     mdd, lowest, highest = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(mdd)
     assert (lowest, highest) == (0.0, 0.4)
+
+
+@pytest.fixture(scope="module")
+def in_service():
+    """A chain whose training records have an outage, and a sensor that failed."""
+    T, F = YEAR.temperatures.copy(), YEAR.frequencies.copy()
+    T.iloc[200:260, 1] = np.nan
+    F.iloc[40:60] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the gaps, which are meant
+        return chain(random_state=0).fit(T, F)
+
+
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled", "ignore:.*not judged")
+def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
+    scenarios = [{}, {"bottom": 0.2}]
+    study = DetectabilityStudy(in_service, compensated(), scenarios, n_repeats=3, gaps="fitted", random_state=0)
+    results = study.run(WEATHER)
+    healthy, damaged = (np.isnan(one) for one in study.decisions_.values())
+    np.testing.assert_array_equal(healthy, damaged)
+    assert (results["n_not_judged"] == healthy.sum()).all()
+    assert (healthy[0] != healthy[1]).any()
+    assert healthy.any()
+    seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(3, 2))[:, 0]
+    outages = [in_service.draw_gaps(WEATHER, random_state=int(seed))[1].all(axis=1) for seed in seeds]
+    np.testing.assert_array_equal(healthy, outages)
+
+
+def test_a_detector_sees_temperatures_with_their_gaps(in_service):
+    task = detection_task(in_service, WEATHER, [{}, {"top": 0.2}], gaps="fitted", n_repeats=2, random_state=0)
+    gaps = task.X["T2"][len(YEAR.frequencies) :].isna().to_numpy().reshape(2, 2, -1)
+    np.testing.assert_array_equal(gaps[:, 0], gaps[:, 1])
+    assert gaps.any()
+    assert (gaps[0] != gaps[1]).any()

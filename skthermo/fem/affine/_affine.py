@@ -12,7 +12,7 @@ from skthermo._arguments import check_flag, check_theta
 from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
-from skthermo.fem.affine._base import AffineBase
+from skthermo.fem.affine._base import AffineBase, Content
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import (
     are_sparse,
@@ -56,6 +56,9 @@ class AffineModel(AffineBase):
         swap. False: column j is the j-th lowest mode.
     dof_names : sequence of str, optional
         Names of the degrees of freedom in error messages.
+    contents : sequence of sequence of (member, properties), optional
+        The members of a `Structure` whose matrices each stiffness term sums, as `Structure.assemble` gives them, so
+        that `Structure.divide` can take them apart.
 
     Attributes
     ----------
@@ -104,12 +107,16 @@ class AffineModel(AffineBase):
         groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
         track: bool = False,
         dof_names: Sequence[str] | None = None,
+        contents: Sequence[Sequence[Content]] = (),
     ):
         stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
         self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
         n_modes = check_n_modes(n_modes)
+        if contents and len(contents) != len(stiffness_keys):
+            raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
+        self._contents = tuple(map(tuple, contents))
 
         terms: type[AffineTerms] = (
             SparseTerms if are_sparse(stiffness_matrices + mass_matrices, n_modes) else DenseTerms
@@ -204,8 +211,10 @@ class AffineModel(AffineBase):
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
+        groups: dict[str, tuple[int, ...]] | None = None,
     ) -> Self:
-        return self._twin(_core=change(self._core), _parameter_names=names or self._parameter_names)
+        names, groups = names or self._parameter_names, groups or self._groups
+        return self._twin(_core=change(self._core), _parameter_names=names, _groups=groups)
 
     @property
     def _full_core(self) -> AffineCore:

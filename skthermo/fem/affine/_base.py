@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import copy
 from functools import partial
 from typing import Any, Self
@@ -19,8 +19,10 @@ from skthermo._warnings import warn_user
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.affine._read_terms import check_different, check_modes, read_matrix
+from skthermo.fem.affine._read_terms import check_different, check_modes, read_mass, read_matrix
 from skthermo.fem.modal import LocalModes
+
+Content = tuple[Hashable, tuple[str, ...]]
 
 
 class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel, ABC):
@@ -32,6 +34,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
     _parameter_names: tuple[str, ...]
     _groups: dict[str, tuple[int, ...]]
+    _contents: tuple[tuple[Content, ...], ...] = ()
     _core: AffineCore
     _basis: Array | None = None
     _is_quiet = False
@@ -69,6 +72,25 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
     def groups(self) -> dict[str, tuple[int, ...]]:
         """Damage groups and the positions of the stiffness terms that each scales."""
         return dict(self._groups)
+
+    @property
+    def parameter_terms(self) -> dict[str, tuple[int, ...]]:
+        """Parameters and the positions of the stiffness terms that each scales; none for a parameter of the mass."""
+        exponents = self._full_core.stiffness.exponents
+        return {
+            name: tuple(np.flatnonzero(column).tolist())
+            for name, column in zip(self._parameter_names, exponents.T, strict=True)
+        }
+
+    @property
+    def contents(self) -> tuple[tuple[Content, ...], ...]:
+        """Members of a `Structure` and their properties whose matrices each stiffness term sums; empty if unknown."""
+        return self._contents
+
+    @property
+    def stiffness_terms(self) -> list[scipy.sparse.csc_array]:
+        """Matrices of the stiffness terms in N/m, without the parameters and severities that multiply them."""
+        return [scipy.sparse.csc_array(matrix) for matrix in self._full_core.stiffness.each_matrix]
 
     @property
     def rows_per_chunk(self) -> int:
@@ -328,15 +350,110 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         >>> bool(heavier.frequencies([[1, 1, 1, 1]])[0, 0] < truss.frequencies([[1, 1, 1, 1]])[0, 0])
         True
         """
-        if mass is not None and not scipy.sparse.issparse(mass) and real_array(mass, "added mass").ndim == 1:
-            if np.shape(mass) != (self.n_dof,):
-                raise ValueError(f"mass has shape {np.shape(mass)}; expected ({self.n_dof},) or a matrix")
-            mass = scipy.sparse.diags_array(real_array(mass, "added mass")).tocsc()
-        added = [
-            None if matrix is None else read_matrix(matrix, f"added {what}", self.n_dof)
-            for matrix, what in ((stiffness, "stiffness"), (mass, "mass"))
-        ]
-        return self._changed(lambda core: core.with_added(*added))
+        stiff = None if stiffness is None else read_matrix(stiffness, "added stiffness", self.n_dof)
+        heavy = None if mass is None else read_mass(mass, "added mass", self.n_dof)
+        return self._changed(lambda core: core.with_added(stiff, heavy))
+
+    def with_mass_parameters(
+        self, masses: Mapping[str, MatrixLike], *, amounts: tuple[float, float] = (0.0, 2.0)
+    ) -> Self:
+        """A new model with one more parameter for each pattern of added mass: 1 + how many times it is added.
+
+        At theta = 1 nothing is added. Each row of theta may have its own amounts, and the Jacobian holds exact
+        derivatives by them.
+
+        Parameters
+        ----------
+        masses : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,)
+            Names and masses in kg; a vector holds lumped masses.
+        amounts : (float, float), default=(0.0, 2.0)
+            Smallest and largest amount that a reduced model covers, above -1; a full model has no bounds.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            Its last parameters are named ``1 + NAME``.
+
+        Raises
+        ------
+        ValueError
+            If a mass has the wrong shape, is not symmetric, or holds values that are not finite, if the name of a
+            parameter is taken, or the amounts are no range above -1.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skthermo.datasets import make_truss
+        >>> truss = make_truss()
+        >>> loaded = truss.with_mass_parameters({"asphalt": np.full(truss.n_dof, 100.0)})
+        >>> loaded.parameter_names
+        ('bottom', 'top', 'diagonal', 'vertical', '1 + asphalt')
+        >>> loaded.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 1.5]])[:, 0].round(3)
+        array([7.485, 7.269])
+        """
+        if not isinstance(masses, Mapping) or not masses:
+            raise ValueError(f"masses is {masses!r:.200}; expected a mapping of name to mass in kg")
+        names = check_different([*self.parameter_names, *(f"1 + {name}" for name in masses)])
+        matrices = [read_mass(mass, f"mass {name!r}", self.n_dof) for name, mass in masses.items()]
+        range_of = real_array(amounts, "amounts")
+        if range_of.shape != (2,) or not -1 < range_of[0] < range_of[1] < np.inf:
+            raise ValueError(f"amounts is {amounts!r:.200}; expected the smallest and the largest, above -1")
+        bounds = np.tile(1 + range_of, (len(masses), 1))
+        return self._changed(lambda core: core.with_mass_factors(matrices), names, bounds)
+
+    def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
+        """A new model of the same matrices with further damage groups, each of which scales parts of stiffness terms.
+
+        `Structure.divide` finds the parts that belong to members.
+
+        Parameters
+        ----------
+        parts : mapping of str to mapping of int to matrix
+            Damage group -> position of a stiffness term -> the matrix (n_dof, n_dof), a part of that term, which the
+            group scales. What is left of a term still belongs to the groups that it is in, and so do its parts.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            With the same parameters and frequencies. A reduced model is checked anew.
+
+        Raises
+        ------
+        ValueError
+            If a group exists already or has no part, a term is unknown, or a matrix has the wrong shape or is not
+            symmetric.
+
+        Examples
+        --------
+        Two springs in a row, of which one parameter is the stiffness of both:
+
+        >>> import numpy as np
+        >>> from skthermo.fem import AffineModel
+        >>> model = AffineModel({("k",): [[800.0, -400.0], [-400.0, 400.0]]}, mass=np.eye(2), n_modes=2)
+        >>> divided = model.with_parts({"first": {0: [[400.0, 0.0], [0.0, 0.0]]}})
+        >>> divided.groups
+        {'k': (0, 1), 'first': (1,)}
+        >>> divided.damaged({"first": 0.5}).frequencies([[1.0]]).round(3)
+        array([[1.49 , 4.807]])
+        """
+        n_terms = len(self._full_core.stiffness.factors)
+        groups, divided = dict(self._groups), []
+        for name, of_terms in parts.items():
+            if name in self._groups or not isinstance(of_terms, Mapping) or not of_terms:
+                raise ValueError(f"part {name!r} is {of_terms!r:.200}; expected a new name, and matrices by position")
+            unknown = [position for position in of_terms if position not in range(n_terms)]
+            if unknown:
+                raise ValueError(f"part {name!r} is of terms {unknown}; expected positions from 0 to {n_terms - 1}")
+            first = n_terms + len(divided)
+            new = dict(zip(of_terms, range(first, first + len(of_terms)), strict=True))
+            for group, inside in groups.items():
+                groups[group] = (*inside, *(new[position] for position in inside if position in new))
+            groups[name] = tuple(new.values())
+            divided += [
+                (position, read_matrix(part, f"part {name!r}", self.n_dof)) for position, part in of_terms.items()
+            ]
+        twin = self._changed(lambda core: core.with_divided_stiffness(divided), groups=groups)
+        return twin._twin(_contents=())
 
     def quiet(self) -> Self:
         return self._twin(_is_quiet=True)
@@ -363,8 +480,9 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
+        groups: dict[str, tuple[int, ...]] | None = None,
     ) -> Self:
-        """A model like this one with a changed full core, these parameter names, and bounds of the new ones."""
+        """A model like this one with a changed full core, these parameter names, bounds of the new ones, and groups."""
 
     @property
     @abstractmethod

@@ -136,19 +136,40 @@ class AffineCore:
         stiffness = np.hstack([self.stiffness.exponents, further])
         return self._with_exponents(stiffness, np.hstack([self.mass.exponents, constant]), healthy)
 
+    def with_mass_factors(self, masses: Sequence[Matrix]) -> "AffineCore":
+        """The core with further parameters: 1 + the number of times that each of these masses is added."""
+        wider = self.with_group_factors(np.zeros((len(self.stiffness.factors), len(masses)), dtype=np.int64))
+        none = np.zeros((len(masses), self.mass.exponents.shape[1]), dtype=np.int64)
+        once = np.hstack([none, np.eye(len(masses), dtype=np.int64)])
+        heavy = wider.mass.with_terms(masses, once).with_terms([-mass for mass in masses], 0 * once)
+        solver, nominal = eigen_solver(wider.stiffness, heavy), self.nominal.beside(heavy)
+        return replace(wider, mass=heavy, solver=solver, nominal=nominal)
+
     def _with_exponents(self, stiffness: NDArray, mass: NDArray, healthy: "AffineCore | None") -> "AffineCore":
         terms = self.stiffness.with_exponents(stiffness), self.mass.with_exponents(mass)
         return replace(self, stiffness=terms[0], mass=terms[1], solver=eigen_solver(*terms), healthy=healthy)
 
     def with_added(self, stiffness: Matrix | None, mass: Matrix | None) -> "AffineCore":
         """The core with further constant stiffness and mass; its columns stay the same nominal modes."""
-        stiff = self.stiffness if stiffness is None else self.stiffness.with_constant(stiffness)
-        heavy = self.mass if mass is None else self.mass.with_constant(mass)
+        constant = np.zeros_like(self.mass.exponents[:1])
+        stiff = self.stiffness if stiffness is None else self.stiffness.with_terms([stiffness], constant)
+        heavy = self.mass if mass is None else self.mass.with_terms([mass], constant)
         if mass is not None:
             total = heavy.assemble(nominal_theta(heavy.exponents.shape[1]))[0]
             count_modes(total, at_least=self.n_modes, what="mass, with what is added,")
         solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
         return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
+
+    def with_divided_stiffness(self, parts: Sequence[tuple[int, Matrix]]) -> "AffineCore":
+        """The core with parts of its stiffness terms, each with its term's position, taken out as further terms."""
+        matrices = self.stiffness.each_matrix
+        for position, part in parts:
+            matrices[position] = matrices[position] - part
+        origin = [*range(len(matrices)), *(position for position, _ in parts)]
+        terms = [*matrices, *(part for _, part in parts)]
+        stiffness = self.stiffness.from_matrices(terms, self.stiffness.exponents[origin])
+        stiffness = stiffness.scaled(self.stiffness.factors[origin])
+        return replace(self, stiffness=stiffness, solver=eigen_solver(stiffness, self.mass))
 
     def projected(self, basis: Array, widest_spectrum: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes."""

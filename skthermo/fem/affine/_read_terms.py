@@ -7,7 +7,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arguments import as_mapping, integer_row
-from skthermo._arrays import Matrix, is_real, positive_integer, real_array
+from skthermo._arrays import Matrix, MatrixLike, is_real, positive_integer, real_array
 
 Key = tuple[str, ...]
 
@@ -65,6 +65,15 @@ def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
             f"{array[row, column]} and {array[column, row]}"
         )
     return (array + array.T) / 2
+
+
+def read_mass(mass: MatrixLike, what: str, n_dof: int) -> Matrix:
+    """A mass matrix; lumped masses, in a vector, become its diagonal."""
+    if scipy.sparse.issparse(mass) or real_array(mass, what).ndim != 1:
+        return read_matrix(mass, what, n_dof)
+    if np.shape(mass) != (n_dof,):
+        raise ValueError(f"{what} has shape {np.shape(mass)}; expected ({n_dof},) or a matrix")
+    return read_matrix(scipy.sparse.diags_array(real_array(mass, what)), what, n_dof)
 
 
 def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:

@@ -93,7 +93,7 @@ class ReducedModel(AffineBase):
             raise ValueError(f"full is {full!r:.200}; expected an AffineModel, or a ReducedModel")
         if not isinstance(tol, int | float | np.floating) or not 0 < tol < 1:
             raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
-        self._parameter_names, self._groups = full.parameter_names, full._groups
+        self._parameter_names, self._groups, self._contents = full.parameter_names, full._groups, full._contents
         self._full = full
         self._bounds = check_bounds(bounds, full.parameter_names)
         self._tol = tol
@@ -173,8 +173,9 @@ class ReducedModel(AffineBase):
         change: Callable[[AffineCore], AffineCore],
         names: tuple[str, ...] | None = None,
         bounds: Array | None = None,
+        groups: dict[str, tuple[int, ...]] | None = None,
     ) -> Self:
-        full = self._full._changed(change, names)
+        full = self._full._changed(change, names, groups=groups)
         known = dict(zip(self._parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
@@ -182,7 +183,7 @@ class ReducedModel(AffineBase):
 
     def _regrown(self, full: AffineBase, bounds: Array) -> Self:
         """A reduced model of another full model; its basis starts from the present one."""
-        twin = self._twin(_full=full, _bounds=bounds, _parameter_names=full.parameter_names)
+        twin = self._twin(_full=full, _bounds=bounds, _parameter_names=full.parameter_names, _groups=full._groups)
         twin._use(grow_basis(full._core, bounds, self._tol, 0, start=self._basis))
         return twin
 

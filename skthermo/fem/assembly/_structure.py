@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from skthermo._arrays import Array, real_array
-from skthermo.fem.affine import AffineModel
+from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element, check_matrices
 
 Binding = tuple[str, str] | tuple[str, str, str]
 Target = tuple[str, str, tuple[str, ...]]
+
+SAME = 1e-9  # relative difference of matrices up to which members are the model's
 
 EXPECTED = {
     "nodes": "a mapping of node to coordinates",
@@ -158,9 +160,9 @@ class Structure:
             dofs = element.dofs(self.dimension)
             damage = self._bound(name, damageable, STIFFNESS)
             matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), STIFFNESS)
-            stiffness.add(matrices, dofs, self._bound(name, bindings, STIFFNESS), damage)
+            stiffness.add(name, matrices, dofs, self._bound(name, bindings, STIFFNESS), damage)
             masses = check_matrices(name, element, element.mass(coordinates), len(dofs), MASS)
-            mass.add(masses, dofs, self._bound(name, bindings, MASS))
+            mass.add(name, masses, dofs, self._bound(name, bindings, MASS))
         return AffineModel(
             stiffness.terms(),
             mass.terms(),
@@ -169,7 +171,97 @@ class Structure:
             groups={name: terms for name in damageable if (terms := stiffness.positions(name)) or groups is not None},
             track=track,
             dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
+            contents=stiffness.contents,
         )
+
+    def divide(
+        self, model: AffineModel | ReducedModel, groups: Mapping[str, Mapping[str, Collection[Hashable]]]
+    ) -> Any:
+        """A model of this structure with further damage groups, which hold some members of its groups.
+
+        Parameters
+        ----------
+        model : AffineModel or ReducedModel
+            Assembled from this structure; it may have been calibrated, damaged or reduced since.
+        groups : mapping of str to mapping of str to collection of members
+            Damage group of the model -> name of each part -> members of the part. Parts of a group may not overlap; a
+            group need not be divided wholly. If one property is damaged in the group, so it is in its parts.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            With the same parameters and frequencies.
+
+        Raises
+        ------
+        ValueError
+            If the model was not assembled from this structure, or is divided already, a group or member is unknown, a
+            member is in two parts, or a name is taken.
+
+        Examples
+        --------
+        >>> from skthermo.fem import Bar, Structure
+        >>> steel = dict(E=210e9, A=0.01, density=7850.0)
+        >>> nodes = {"left": (0, 0), "right": (6, 0), "apex": (3, 2)}
+        >>> ends = {"west": ("left", "apex"), "east": ("apex", "right"), "tie": ("left", "right")}
+        >>> bars = {name: Bar(*pair, **steel) for name, pair in ends.items()}
+        >>> supports = {"left": "xy", "right": "y"}
+        >>> structure = Structure(nodes, bars, supports, {"rafters": ["west", "east"], "tie": ["tie"]})
+        >>> model = structure.assemble(["rafters", "tie"], n_modes=2)
+        >>> divided = structure.divide(model, {"rafters": {"western rafter": ["west"]}})
+        >>> divided.damaged({"western rafter": 0.2}).frequencies([[1.0, 1.0]]).round(2)
+        array([[129.28, 227.74]])
+        """
+        if not getattr(model, "contents", ()):
+            raise ValueError(
+                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, and "
+                "that is not divided yet"
+            )
+        terms = model.stiffness_terms
+        if terms[0].shape[0] != len(self.dofs):
+            raise ValueError(
+                f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {len(self.dofs)}; expected a "
+                "model that this structure has assembled"
+            )
+        parts: dict[str, dict[int, Any]] = {}
+        for group, named in groups.items():
+            if group not in model.groups:
+                raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(model.groups)}")
+            part_of = {member: name for name, members in named.items() for member in members}
+            if len(part_of) < sum(len(set(members)) for members in named.values()):
+                raise ValueError(f"parts of group {group!r} overlap; expected every member in one part only")
+            inside = {member for position in model.groups[group] for member, _ in model.contents[position]}
+            unknown = part_of.keys() - inside
+            if unknown:
+                raise ValueError(f"{sorted(map(str, unknown))} are not in group {group!r}; expected members of it")
+            for position in model.groups[group]:
+                for name, matrix in self._sum_by_part(model.contents[position], part_of, terms[position]).items():
+                    parts.setdefault(name, {})[position] = matrix
+        return model.with_parts(parts)
+
+    def _sum_by_part(
+        self, contents: Sequence[tuple[Hashable, tuple[str, ...]]], part_of: Mapping[Hashable, str], term: Any
+    ) -> dict[str, Any]:
+        """Summed stiffness of the members of every part of a term, after a check that all members make up the term."""
+        assembler = TermAssembler(self.dofs)
+        for member, properties in contents:
+            element = self._members.get(member)
+            nodes = [] if element is None else [self._coordinates[node] for node in element.nodes]
+            matrices = {} if element is None else element.stiffness(np.array(nodes))
+            if properties not in matrices:
+                raise ValueError(
+                    f"member {member!r} of the model is not in the structure; expected the model's structure"
+                )
+            part = {part_of[member]: STIFFNESS} if member in part_of else {}
+            assembler.add(member, {properties: matrices[properties]}, element.dofs(self.dimension), {}, part)
+        matrices = [matrix for _, matrix in assembler.terms()]
+        if abs(sum(matrices) - term).max() > SAME * abs(term).max():
+            raise ValueError(
+                f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
+                "expected the structure that assembled the model"
+            )
+        names = [name for name in dict.fromkeys(part_of.values()) if assembler.positions(name)]
+        return {name: matrices[assembler.positions(name)[0]] for name in names}
 
     def _bound(self, member: Hashable, bindings: Mapping[str, Target], matrix: str) -> dict[str, str]:
         """The parameters or damage groups of one member, and the property that each acts on."""

@@ -1,6 +1,6 @@
 """Sums members' matrices into affine terms."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
 import scipy.sparse
@@ -25,9 +25,11 @@ class TermAssembler:
     def __init__(self, dofs: Sequence[Dof]):
         self._index = {dof: i for i, dof in enumerate(dofs)}
         self._entries: dict[tuple[Key, frozenset[str]], list] = {}
+        self._contents: dict[tuple[Key, frozenset[str]], list[tuple[Hashable, Key]]] = {}
 
     def add(
         self,
+        member: Hashable,
         matrices: ByProperties,
         dofs: Sequence[Dof],
         bound: Mapping[str, str],
@@ -46,6 +48,7 @@ class TermAssembler:
             groups = frozenset(g for g, prop in (damage or {}).items() if prop in (STIFFNESS, *properties))
             block = matrix[np.ix_(free, free)]
             self._entries.setdefault((key, groups), []).append((block, *grid))
+            self._contents.setdefault((key, groups), []).append((member, properties))
 
     def terms(self) -> list[tuple[Key, scipy.sparse.csr_array]]:
         """Parameters and matrix of every term."""
@@ -55,6 +58,11 @@ class TermAssembler:
     def positions(self, group: str) -> list[int]:
         """Positions of the terms that a damage group scales."""
         return [i for i, (_, damage) in enumerate(self._entries) if group in damage]
+
+    @property
+    def contents(self) -> list[list[tuple[Hashable, Key]]]:
+        """Members and properties whose matrices each term sums."""
+        return list(self._contents.values())
 
     def _matrix(self, blocks: Sequence[tuple[np.ndarray, ...]]) -> scipy.sparse.csr_array:
         shape = (len(self._index), len(self._index))

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._changes import Changes
 from skthermo._frames import check_same_rows
 from skthermo._frequency_effects import FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._saved_frames import SavesFrames
@@ -160,7 +161,7 @@ class GroupEffects:
         """Effects at the parameters that the chain gives for records, for small changes."""
         members = read_groups(fem.model, groups)
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        frequencies = FrequencyEffects.of(fem, parameters(fem, T), as_floats(F), of_model)
+        frequencies = FrequencyEffects.of(fem, parameters(fem, T), as_floats(F), Changes.of_damage(fem.model, of_model))
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])
         unchanged = np.zeros(len(of_model))
         slopes, nominal = (-effects(unchanged)[1] @ incidence for effects in (frequencies, frequencies.nominal()))

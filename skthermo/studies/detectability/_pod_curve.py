@@ -41,6 +41,8 @@ class PODCurve:
     bracket : tuple of float
         Magnitudes of the highest tested severity with a POD below 0.9 (0 if there is none) and of the next one (NaN if
         there is none).
+    worlds : tuple of PODCurve, default=()
+        Curves of measured campaigns as a study expects them where more than the noise is uncertain; see `band`.
 
     Examples
     --------
@@ -59,6 +61,7 @@ class PODCurve:
     log: bool
     confidence: float
     bracket: tuple[float, float]
+    worlds: tuple[PODCurve, ...] = ()
 
     @property
     def a50(self) -> float:
@@ -122,6 +125,37 @@ class PODCurve:
         )
         margin = norm.ppf((1 + self.confidence) / 2) * deviation
         return expit(centre), expit(centre - margin), expit(centre + margin)
+
+    def band(self, severity: ArrayLike) -> tuple[Any, Any]:
+        """Band in which the curve of a measured campaign should lie, with all that was uncertain in the study.
+
+        Parameters
+        ----------
+        severity : float or array-like
+            Of the sign of the tested severities.
+
+        Returns
+        -------
+        lowest, highest : float or ndarray
+            Quantiles of ``worlds`` at each severity, which hold such a curve with the curve's confidence; NaN without
+            worlds.
+        """
+        places = real_array(severity, "severity")
+        if not self.worlds:
+            return np.full(places.shape, np.nan), np.full(places.shape, np.nan)
+        tails = (1 - self.confidence) / 2, (1 + self.confidence) / 2
+        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.worlds], tails, axis=0)
+        return lowest, highest
+
+    @property
+    def a90_band(self) -> tuple[float, float]:
+        """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without worlds."""
+        if not self.worlds:
+            return float("nan"), float("nan")
+        tail = (1 - self.confidence) / 2
+        found = np.abs([one.a90 for one in self.worlds])
+        sign = np.sign(self.severities[0])
+        return float(sign * np.quantile(found, tail)), float(sign * np.quantile(found, 1 - tail))
 
     def severity_at(self, pod: float, confidence: float | None = None) -> float:
         """Severity at which the curve, or a confidence bound of it, reaches a POD.

@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns, as_floats
+from skthermo._frames import column_names, frame_like
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
@@ -39,6 +40,23 @@ class Records:
 
 
 @dataclass(frozen=True, eq=False)
+class Measurement:
+    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`."""
+
+    noise: Any
+    gaps: Any = None
+    outliers: Any = None
+
+    def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
+        """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
+        noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
+        if not isinstance(self.gaps, str):
+            return noise, T
+        missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
+        return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
+
+
+@dataclass(frozen=True, eq=False)
 class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
     every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
@@ -48,7 +66,7 @@ class Simulation:
     scenarios: Sequence[BaseScenario]
     T: Any
     clean: Mapping[str, Sequence[Array]]
-    noise: Any
+    measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
     def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
@@ -57,13 +75,13 @@ class Simulation:
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
         for records in self.records(self.scenarios, 0, seeds):
-            self._judge(records, judgement, with_indices=True)
+            self.judge(records, judgement, with_indices=True)
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
                 records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
-                self._judge(records, judgement, with_indices=True)
+                self.judge(records, judgement, with_indices=True)
         with without_warnings():
             self._calibrate(judgement, 0, seeds)
 
@@ -81,16 +99,16 @@ class Simulation:
         judgement = Judgement()
         with without_warnings(), single_blas_thread():
             for records in self.records(self.scenarios, number, seeds):
-                self._judge(records, judgement)
+                self.judge(records, judgement)
             self._calibrate(judgement, number, seeds)
         return judgement
 
     def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
-        """Records of scenarios from every source, one after the other, all with the same noise."""
-        factors = 1 + self.fem.draw_noise(self.T, self.noise, random_state=int(seeds[0]))
+        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
+        noise, T = self.measurement.of(self.fem, self.T, int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * factors, self.T, self.T)
+            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * (1 + noise), T, self.T)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 shape = as_columns(values).shape
@@ -101,7 +119,7 @@ class Simulation:
                     )
                 yield Records(scenario, REFERENCE, values, self.T, self.T)
 
-    def _judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
+    def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
         """Add the decisions of every detector and, if asked, its damage indices."""
 
         def judged(name: str) -> tuple[Any, Array]:
@@ -121,15 +139,18 @@ class Simulation:
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
         for records in self.records(healthy, repeat, others) if healthy else ():
             found = Judgement(errors=judgement.errors)
-            self._judge(records, found)
+            self.judge(records, found)
             judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
 
 
-def clean_frequencies(fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take."""
+def clean_frequencies(
+    fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int, first: int = 0
+) -> dict[str, list[Array]]:
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
     clean = {}
     for scenario in scenarios:
-        changes = [scenario.changes(T, draw) for draw in range(min(scenario.n_draws, n_repeats))]
+        draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
+        changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
             clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
         else:

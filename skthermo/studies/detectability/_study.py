@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -19,14 +20,18 @@ from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._families import Family, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
+from skthermo.studies.detectability._parts import bands_in_words, table_of_parts
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
+    Measurement,
     Simulation,
     clean_frequencies,
 )
+from skthermo.studies.detectability._world_rates import WorldRates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.studies.worlds import Worlds
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -54,10 +59,15 @@ class DetectabilityStudy(BaseEstimator):
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
         Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
+    gaps : float or "fitted", optional
+        Values that are missing in the simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`. With
+        "fitted", detectors that see temperatures also see them with the gaps of the training records.
+    outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
+        Values that are far off, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats. Results do not depend on it.
     random_state : int, RandomState or None, default=None
-        Seed of the noise, and of parts of detectors without a seed of their own.
+        Seed of noise, gaps and outliers, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats are
         done.
@@ -97,9 +107,9 @@ class DetectabilityStudy(BaseEstimator):
 
     Notes
     -----
-    All scenarios and sources have the same weather, and repeat r has the same noise in all scenarios (common random
-    numbers), and all detectors judge the same records, so that differences between scenarios or detectors are more
-    certain than each rate. A detector's rates do not depend on which others are in the study.
+    All scenarios and sources have the same weather, and repeat r has the same noise, gaps and outliers in all scenarios
+    (common random numbers), and all detectors judge the same records, so that differences between scenarios or
+    detectors are more certain than each rate. A detector's rates do not depend on which others are in the study.
 
     The intervals are those of a rate over noise, for this weather, this baseline and this model: another year, another
     baseline or an error of the model is not in them. Records are serially dependent: the effective number of records is
@@ -144,6 +154,11 @@ class DetectabilityStudy(BaseEstimator):
         *,
         n_repeats: int = 20,
         noise: ArrayLike | Literal["fitted"] = "fitted",
+        gaps: float | Literal["fitted"] | None = None,
+        outliers: ArrayLike | Literal["fitted"] | None = None,
+        uncertainty: Sequence[str] = ("noise",),
+        models: Sequence[Any] | None = None,
+        n_worlds: int = 20,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
         verbose: bool | int = 0,
@@ -153,13 +168,18 @@ class DetectabilityStudy(BaseEstimator):
         self.scenarios = scenarios
         self.n_repeats = n_repeats
         self.noise = noise
+        self.gaps = gaps
+        self.outliers = outliers
+        self.uncertainty = uncertainty
+        self.models = models
+        self.n_worlds = n_worlds
         self.n_jobs = n_jobs
         self.random_state = random_state
         self.verbose = verbose
 
     def run(
         self,
-        T: ArrayLike,
+        T: ArrayLike | Sequence[ArrayLike],
         baseline: ArrayLike | None = None,
         *,
         reference: Reference | None = None,
@@ -225,7 +245,9 @@ class DetectabilityStudy(BaseEstimator):
         scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        judgement, stages = Judgement(), Stages(self, 4)
+        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, int(seeds[0, 0]))
+        T = worlds.years[0]
+        judgement, stages = Judgement(), Stages(self, 4 + bool(worlds.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
             candidates = judgement.ask(
@@ -234,11 +256,19 @@ class DetectabilityStudy(BaseEstimator):
         with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
-            simulation = Simulation(self.fem, candidates, scenarios, T, clean, self.noise, function)
+            measurement = Measurement(self.noise, self.gaps, self.outliers)
+            simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
                 simulation.first_repeat(judgement, measured, seeds[0])
         with stages.stage(f"other {n_repeats - 1} repeats"):
             simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
+        self.worlds_ = None
+        if worlds.parts:
+            with stages.stage(f"{len(worlds.seeds)} worlds"):
+                left = replace(
+                    simulation, candidates={k: v for k, v in candidates.items() if k not in judgement.errors}
+                )
+                self.worlds_ = WorldRates.of(left, worlds, self.n_jobs, verbose=max(self.verbose - 1, 0))
         rows = judgement.ask(
             candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
         )
@@ -253,7 +283,9 @@ class DetectabilityStudy(BaseEstimator):
         self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
         table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
         columns = list(next(iter(rows.values()))[0])
-        self.results_ = pd.DataFrame([row for some in table for row in some], columns=columns)
+        results = pd.DataFrame([row for some in table for row in some], columns=columns)
+        self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
+        self.uncertainty_ = None if self.worlds_ is None else table_of_parts(self.worlds_)
         self._warn_of_many_false_alarms()
         return self.results_
 
@@ -288,7 +320,9 @@ class DetectabilityStudy(BaseEstimator):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        return self._family(family, source, detector).curve(log)
+        found = self._family(family, source, detector)
+        curves = [] if self.worlds_ is None else self.worlds_.curves(found, log)
+        return replace(found.curve(log), worlds=tuple(curves))
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -341,7 +375,11 @@ class DetectabilityStudy(BaseEstimator):
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
         names = ["detector", "family", "source"][-len(next(iter(found))) :]
         index = pd.MultiIndex.from_tuples(list(found), names=names)
-        return pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
+        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
+        if self.worlds_ is None:
+            return table
+        bands = [self.worlds_.smallest(one, level, method, self.confidence_) for one in families.values()]
+        return table.assign(**dict(zip(["band_lowest", "band_highest"], np.transpose(bands), strict=True)))
 
     def is_undetected(self, family: str, source: str = "data-informed", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.
@@ -506,7 +544,12 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             As `ranking`.
         """
-        return in_words(self.ranking(max_false_alarms, source), max_false_alarms)
+        ranking = self.ranking(max_false_alarms, source)
+        told = in_words(ranking, max_false_alarms)
+        if self.worlds_ is None or source != SIMULATED:
+            return told
+        bands = bands_in_words(self.results_, self.uncertainty_, ranking.index[0], self.confidence_)
+        return "\n".join([told, *bands])
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.

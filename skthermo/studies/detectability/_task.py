@@ -20,7 +20,7 @@ from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.detectability._pod_curve import check_probability
-from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._task_scorer import TaskScorer
 from skthermo.studies.detectability._view import View
@@ -55,7 +55,7 @@ class DetectionTask(Bunch):
     states : DataFrame of shape (n_records, 2)
         Name of the ``scenario`` (missing for the baseline) and number of the ``repeat`` (-1) of each record.
 
-    fem, T, scenarios, noise, seeds : object
+    fem, T, scenarios, measurement, seeds : object
         What the records were simulated with.
 
     See Also
@@ -178,7 +178,8 @@ class DetectionTask(Bunch):
         if not named:
             raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
-        fresh = _task(self.fem, T, self.scenarios, self.baseline, self.noise, self.scoring.max_false_alarms, 1, seeds)
+        limit = self.scoring.max_false_alarms
+        fresh = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             warn_user(
                 "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
@@ -227,6 +228,8 @@ def detection_task(
     columns: Sequence[Hashable] | None = None,
     n_repeats: int = 10,
     noise: ArrayLike | Literal["fitted"] = "fitted",
+    gaps: float | Literal["fitted"] | None = None,
+    outliers: ArrayLike | Literal["fitted"] | None = None,
     max_false_alarms: float = 0.02,
     n_splits: int = 2,
     random_state: int | np.random.RandomState | None = None,
@@ -254,7 +257,11 @@ def detection_task(
     n_repeats : int, default=10
         How often the records are simulated, each time with other noise.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
-        As in `~skthermo.surrogate.DataInformedFEM.simulate`.
+        As in `~skthermo.surrogate.DataInformedFEM.simulate`, and so are the next two.
+    gaps : float or "fitted", optional
+        Values that are missing; with "fitted" temperatures, too.
+    outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
+        Values that are far off.
     max_false_alarms : float, default=0.02
         Limit of the share of healthy records in alarm.
     n_splits : int, default=2
@@ -343,11 +350,19 @@ def detection_task(
     check_chain(fem)
     table = _baseline(fem, baseline)
     table = table[_columns(table, columns, fem.mode_names_)]
-    return _task(fem, T, read_scenarios(scenarios, fem.model), table, noise, limit, n_splits, seeds)
+    measurement = Measurement(noise, gaps, outliers)
+    return _task(fem, T, read_scenarios(scenarios, fem.model), table, measurement, limit, n_splits, seeds)
 
 
 def _task(
-    fem: Any, T: Any, scenarios: Any, baseline: pd.DataFrame, noise: Any, limit: float, n_splits: int, seeds: Any
+    fem: Any,
+    T: Any,
+    scenarios: Any,
+    baseline: pd.DataFrame,
+    measurement: Measurement,
+    limit: float,
+    n_splits: int,
+    seeds: Any,
 ) -> DetectionTask:
     """A task with the noise of some seeds."""
     names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
@@ -357,9 +372,9 @@ def _task(
     index = _moved(T, baseline, n_repeats * n_scenarios)
     with warnings_once("in the simulations of this task"), single_blas_thread():
         clean = clean_frequencies(fem, scenarios, T, len(seeds))
-        simulation = Simulation(fem, {}, scenarios, T, clean, noise, None)
+        simulation = Simulation(fem, {}, scenarios, T, clean, measurement, None)
         tables = [
-            np.hstack([as_floats(T), one.values])[:, positions]
+            np.hstack([as_floats(one.T), one.values])[:, positions]
             for repeat, seed in enumerate(seeds)
             for one in simulation.records(scenarios, repeat, [seed])
         ]
@@ -381,7 +396,7 @@ def _task(
         fem=fem,
         T=T,
         scenarios=scenarios,
-        noise=noise,
+        measurement=measurement,
         seeds=seeds,
     )
 

@@ -1,95 +1,54 @@
-"""Measured shifts beside the effects of damage, in standard errors."""
+"""Measured shifts beside the effects of causes, in standard errors."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._bounded_fit import BoundedFit, Effects, fit_severities
+from skthermo.studies.identification._evidence import Observed
+
+Effects = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class Part:
     """Shifts of one kind, of frequencies or of mode shapes: NaN where nothing was measured; (n_observed,) each.
 
-    Effects are a function from severities of the model's groups to the change and its derivatives.
+    Effects are a function from amounts of all causes, (..., n_causes), to the change and its derivatives. Errors follow
+    Student's law with ``freedom``.
     """
 
     effects: Effects
     measured: Array
     covariance: Array
+    freedom: float = np.inf
 
-
-def remembered(effects: Effects) -> Effects:
-    """The same effects, computed once for each set of severities, because all fits begin at the same."""
-    solved: dict[bytes, tuple[Array, Array]] = {}
-
-    def at(severities: Array) -> tuple[Array, Array]:
-        key = severities.tobytes()
-        if key not in solved:
-            solved[key] = effects(severities)
-        return solved[key]
-
-    return at
+    @property
+    def known(self) -> NDArray[np.intp]:
+        return np.flatnonzero(~np.isnan(self.measured))
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All measured shifts, and the effects of some groups on them.
-
-    ``incidence``, (n_model_groups, n_groups), is 1 where a group contains a group of the model.
-    """
+    """All measured shifts, and the effects of all causes on them."""
 
     parts: list[Part]
-    incidence: Array
-    names: Sequence[str] = ()
-    of_model: Sequence[str] = ()
 
-    def of(self, columns: list[list[int]]) -> "Comparison":
-        """The comparison for some groups, each of one or several joined."""
-        incidence = np.array([self.incidence[:, joined].max(axis=1) for joined in columns])
-        names = [" + ".join(self.names[column] for column in joined) for joined in columns] if self.names else ()
-        return replace(self, incidence=incidence.reshape(len(columns), len(self.incidence)).T, names=names)
+    def observed(self) -> Observed:
+        """What was measured."""
+        return Observed.of(
+            [(p.measured[p.known], p.covariance[np.ix_(p.known, p.known)], p.freedom) for p in self.parts]
+        )
 
-    @property
-    def contents(self) -> dict[str, list[str]]:
-        """The model's groups that each group contains."""
-        return {
-            name: [group for group, inside in zip(self.of_model, column, strict=True) if inside]
-            for name, column in zip(self.names, self.incidence.T, strict=True)
-        }
+    def effects(self, amounts: Array) -> tuple[Array, Array]:
+        """Changes, (..., n_observed), and their derivatives, (..., n_observed, n_causes)."""
+        solved = [part.effects(amounts) for part in self.parts]
+        changes = [change[..., part.known] for (change, _), part in zip(solved, self.parts, strict=True)]
+        slopes = [slope[..., part.known, :] for (_, slope), part in zip(solved, self.parts, strict=True)]
+        return np.concatenate(changes, axis=-1), np.concatenate(slopes, axis=-2)
 
-    def slopes(self) -> Array:
-        """Effects of small severities in standard errors, (n_observed, n_groups)."""
-        return self.whitening @ self.effects(np.zeros(self.incidence.shape[1]))[1]
-
-    def fit(self) -> BoundedFit:
-        """Severities that explain the shifts best."""
-        measured = np.concatenate([part.measured[~np.isnan(part.measured)] for part in self.parts])
-        return fit_severities(self.effects, measured, self.whitening, self.incidence.shape[1])
-
-    def members(self, severities: Array) -> Array:
-        """Severities of the model's groups, (..., n_model_groups), by those of the groups, (..., n_groups)."""
-        return 1 - np.prod(np.where(self.incidence > 0, 1 - severities[..., np.newaxis, :], 1.0), axis=-1)
-
-    def effects(self, severities: Array) -> tuple[Array, Array]:
-        """Changes, (n_observed,), and their derivatives by the severities, (n_observed, n_groups)."""
-        members = self.members(severities)
-        inner = self.incidence * np.outer(1 - members, 1 / (1 - severities))
-        solved = [part.effects(members) for part in self.parts]
-        kept = [~np.isnan(part.measured) for part in self.parts]
-        changes = [change[rows] for (change, _), rows in zip(solved, kept, strict=True)]
-        slopes = [slope[rows] @ inner for (_, slope), rows in zip(solved, kept, strict=True)]
-        return np.concatenate(changes), np.vstack(slopes)
-
-    @property
-    def whitening(self) -> Array:
-        """Matrix that makes the errors of the shifts independent, with unit variance."""
-        roots = []
-        for part in self.parts:
-            rows = ~np.isnan(part.measured)
-            lower = np.linalg.cholesky(part.covariance[np.ix_(rows, rows)])
-            roots.append(scipy.linalg.solve_triangular(lower, np.eye(len(lower)), lower=True))
-        return scipy.linalg.block_diag(*roots)
+    def slopes(self, n_causes: int) -> Array:
+        """Effects of small amounts in standard errors, (n_observed, n_causes)."""
+        return self.observed().rotation @ self.effects(np.zeros(n_causes))[1]

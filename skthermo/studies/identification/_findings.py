@@ -1,111 +1,104 @@
-"""The result of an identification: tables and tests from fits."""
+"""The result of an identification: tables from the probabilities of explanations."""
+
+from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from skthermo.studies.identification._bounded_fit import (
-    BoundedFit,
-    error_beside,
-    p_of_damage,
-    p_of_group,
-    p_of_misfit,
-    redrawn,
-    standard_errors,
-    two_errors,
-    widening_of,
-)
+from skthermo._arrays import Array
+from skthermo._changes import Changes
+from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._compared import ComparedRecords
 from skthermo.studies.identification._comparison import Comparison
+from skthermo.studies.identification._evidence import Observed
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
+from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._prior import DamagePrior
+from skthermo.studies.identification._sentences import explanation_text
+from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone
 from skthermo.studies.identification._shift import Shift
 
-N_DRAWS = 500  # number of fits to redrawn shifts, for standard errors and p-values
+LISTED = 1e-3  # least probability of explanations that are listed
+N_DRAWS = 500
+OF_GROUPS = ("damage", "stiffening")
 
 
 def findings(
+    posterior: Posterior,
     comparison: Comparison,
     nominal: Comparison,
     shift: Shift,
     records: ComparedRecords,
-    unseen: list[str],
-    significance: float,
+    causes: list[Cause],
+    changes: Changes,
+    prior: DamagePrior,
     random: np.random.RandomState,
 ) -> IdentifiedDamage:
-    """Fit the groups together and one by one, and test what is found.
+    """Tables of a posterior, and what the causes' effects have in common.
 
-    The comparisons are with the effects of the groups in the weather of the records and at the model's nominal state.
+    The comparisons are with the effects of the causes in the weather of the records and at the model's nominal state.
     """
-    fit, names, at_nominal = comparison.fit(), list(comparison.names), nominal.slopes()
-    confused = list(dict.fromkeys(confused_groups(at_nominal) + confused_groups(fit.slopes)))
-    misfit_p_value = p_of_misfit(fit, shift.freedom)
-    widening = widening_of(fit) if misfit_p_value < significance else 1.0
-    draws = redrawn(fit.slopes, fit.target, N_DRAWS, random, shift.freedom, widening)
-    errors, covariance = standard_errors(fit, N_DRAWS, random)
-    for column in {column for group in confused for column in group}:
-        errors[column] = max(errors[column], error_beside(at_nominal, fit.severities, column))
-    factor = two_errors(shift.freedom)
-    errors, covariance = widening * errors, widening**2 * covariance
-    p_value, p_values = p_of_damage(fit, shift.freedom, N_DRAWS, random), []
-    for column, severity in enumerate(fit.severities):
-        others = [[other] for other in range(len(names)) if other != column]
-        without = comparison.of(others).fit() if severity > 0 else fit
-        p_values.append(p_of_group(fit, without, shift.freedom, column, at_nominal))
-    table = pd.DataFrame(
-        {
-            "severity": fit.severities,
-            "standard_error": factor * errors,
-            "error_alone": factor * widening * errors_alone(fit.slopes),
-            "p_value": p_values,
-            "significant": (np.array(p_values) < significance / len(names)) & (p_value <= significance),
-        },
-        index=names,
-    )
+    names, observed = [cause.name for cause in causes], comparison.observed()
+    factor, slopes, at_nominal = two_errors(shift.freedom), comparison.slopes(len(causes)), nominal.slopes(len(causes))
+    alone = factor * errors_alone(slopes)
+    seen = np.flatnonzero(alone <= VISIBLE)
+    groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
+    table = posterior.table(names)
+    table["error_alone"], table["kind"] = alone, [cause.kind for cause in causes]
+    first, factors = changes.n_parameters, changes.factors(posterior.drawn(names, N_DRAWS, random))
+    estimates, best = posterior.estimates(LISTED), posterior.explanations[0]
+    listed = [one for one in posterior.explanations if one.probability >= LISTED] or [best]
     return IdentifiedDamage(
+        explanations=pd.DataFrame(
+            {
+                "probability": [one.probability for one in listed],
+                "misfit": [one.misfit for one in listed],
+                "text": [explanation_text(one.causes, one.draws.mean(axis=0)) for one in listed],
+            },
+            index=[one.name for one in listed],
+        ),
+        estimates=estimates,
         table=table,
-        shifts=_shift_table(shift, fit, factor),
-        single=_single_fits(comparison, shift, factor),
+        shifts=_shift_table(shift, posterior.explained(), factor),
+        rest=max(1 - sum(one.probability for one in listed), 0.0),
+        most_probable=best.causes,
+        probability_of_damage=1 - posterior.no_damage,
+        probability_of_else=posterior.probability_of("something else"),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
-        covariance=pd.DataFrame(covariance, names, names),
-        draws=pd.DataFrame(comparison.members(draws), columns=list(comparison.of_model)),
-        confused=[tuple(names[column] for column in group) for group in confused],
-        unseen=unseen,
-        members=comparison.contents,
-        p_value=p_value,
-        misfit=fit.misfit,
-        misfit_p_value=misfit_p_value,
-        widening=widening,
+        confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
+        unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
+        members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
+        draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
+        p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
+        misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
         records=records,
-        significance=significance,
-        converged=fit.converged,
+        prior=prior,
     )
 
 
-def _shift_table(shift: Shift, fit: BoundedFit, factor: float) -> pd.DataFrame:
+def p_of_misfit(misfit: float, n_causes: int, observed: Observed, freedom: float) -> float:
+    """Probability (F) of a larger misfit by chance; NaN without more observations than causes."""
+    rest = len(observed.measured) - n_causes
+    return float(stats.f.sf(misfit / rest, rest, freedom)) if rest > 0 else float("nan")
+
+
+def two_errors(freedom: float) -> float:
+    """Half of what holds as much of Student's law as two standard deviations hold of the normal law."""
+    return float(stats.t.isf(stats.norm.sf(2.0), freedom)) / 2
+
+
+def _shift_table(shift: Shift, explained: Array, factor: float) -> pd.DataFrame:
     known = np.flatnonzero(~np.isnan(shift.mean))
-    explained = np.full(len(shift.mean), np.nan)
-    explained[known] = fit.explained[: len(known)]
+    values = np.full(len(shift.mean), np.nan)
+    values[known] = explained[: len(known)]
     return pd.DataFrame(
         {
             "measured": np.expm1(shift.mean),
-            "explained": np.expm1(explained),
+            "explained": np.expm1(values),
             "standard_error": np.where(np.isnan(shift.mean), np.nan, factor * np.sqrt(np.diag(shift.covariance))),
             "n_records": shift.n_records,
             "n_independent": shift.n_independent,
         },
         index=list(shift.modes),
     )
-
-
-def _single_fits(comparison: Comparison, shift: Shift, factor: float) -> pd.DataFrame:
-    """Each group's own best fit, the best first."""
-    fits = [comparison.of([[column]]).fit() for column in range(len(comparison.names))]
-    return pd.DataFrame(
-        {
-            "severity": [fit.severities[0] for fit in fits],
-            "standard_error": [factor * errors_alone(fit.slopes)[0] for fit in fits],
-            "misfit": [fit.misfit for fit in fits],
-            "misfit_p_value": [p_of_misfit(fit, shift.freedom) for fit in fits],
-        },
-        index=list(comparison.names),
-    ).sort_values("misfit", kind="stable")

@@ -6,22 +6,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag
-from skthermo._arrays import Array, as_floats, as_random_state, is_real
-from skthermo._frames import check_same_rows
-from skthermo._frequency_effects import FrequencyEffects, read_groups
-from skthermo._validation import check_array
-from skthermo._warnings import warn_each, warn_user, warnings_once
-from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
-from skthermo.studies.identification._comparison import Comparison, Part, remembered
+from skthermo._arrays import MatrixLike, as_random_state
+from skthermo._frequency_effects import FrequencyEffects
+from skthermo._warnings import warn_each
+from skthermo.studies.identification._causes import read_causes
+from skthermo.studies.identification._comparison import Comparison, Part
+from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._separability import VISIBLE, errors_alone, merge_confused
+from skthermo.studies.identification._measured_shapes import ShapeShift
+from skthermo.studies.identification._observe import observe
+from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._prior import DamagePrior
+from skthermo.studies.identification._separability import VISIBLE, errors_alone
 from skthermo.studies.identification._shape_effects import ShapeEffects
-from skthermo.studies.identification._shift import measured_shift
 from skthermo.studies.scenarios import check_chain
 
 
@@ -32,11 +32,13 @@ def identify_damage(
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     *,
     noise: ArrayLike | Literal["fitted"] = "fitted",
-    merge: bool = False,
+    prior: DamagePrior | None = None,
+    stiffening: bool | Sequence[str] | None = None,
+    parameters: Sequence[str] | None = None,
+    added_mass: Mapping[str, MatrixLike] | None = None,
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: ArrayLike | None = None,
     shape_noise: ArrayLike = 0.01,
-    significance: float = 0.05,
     random_state: int | np.random.RandomState | None = None,
 ) -> IdentifiedDamage:
     """Severities of damage groups that explain how measured frequencies have shifted.
@@ -55,8 +57,14 @@ def identify_damage(
     noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
         Where the error of the mean shift comes from: the residuals of the training records, with their correlations
         from mode to mode and from record to record; or independent records with a relative standard deviation.
-    merge : bool, default=False
-        Whether groups that cannot be told apart get one severity together.
+    prior : DamagePrior, optional
+        What is thought of damage before; by default `DamagePrior()`.
+    stiffening : bool or sequence of str, optional
+        Groups that may have become stiffer, as by a repair or a locked bearing; True for all.
+    parameters : sequence of str, optional
+        Parameters of the model that may have changed, whatever the weather.
+    added_mass : mapping of str to array-like, optional
+        Patterns of mass that may have been added, in kg at the degrees of freedom, such as ballast.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
         complex ones are rotated to be real; NaN where a component was not measured.
@@ -64,8 +72,6 @@ def identify_damage(
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of a component of a measured shape, relative to the shape's largest component.
-    significance : float, default=0.05
-        Probability with which any group of a healthy structure is called damaged.
     random_state : int, RandomState or None, default=None
         Seed of the draws behind standard errors and p-values.
 
@@ -123,95 +129,42 @@ def identify_damage(
     {'top': 0.0, 'diagonal': 0.1}
     """
     check_chain(fem)
-    check_flag(merge, "merge")
-    if not is_real(significance) or not 0 < significance < 1:
-        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.05")
+    prior = DamagePrior() if prior is None else prior
+    if not isinstance(prior, DamagePrior):
+        raise ValueError(f"prior is {prior!r}; expected a DamagePrior")
     if shapes is None and dofs is not None:
         raise ValueError("dofs came without shapes; expected both or neither")
-    frequencies, members = _read_frequencies(fem, T, F), read_groups(fem.model, groups)
-    labels = list(members)
-    of_model = list(dict.fromkeys(group for joined in members.values() for group in joined))
-    T = _named_as_in_fit(fem, T)
-    with warnings_once():
-        theta = as_floats(fem.predict_parameters(T))
-    left_out = left_out_rows(fem, T, theta, frequencies)
-    is_compared = ~np.any(list(left_out.values()), axis=0)
-    frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
-    with warnings_once():
-        shift = measured_shift(fem, T, theta, frequencies, noise)
-    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
-    incidence = np.array([[float(name in members[label]) for label in labels] for name in of_model])
+    causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
+    seen = observe(fem, T, F, noise)
+    effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
 
     def compared(effects: FrequencyEffects) -> Comparison:
-        parts = [Part(remembered(effects), shift.mean, shift.covariance)]
+        parts = [Part(effects, seen.shift.mean, seen.shift.covariance, seen.shift.freedom)]
         if shapes is not None:
-            parts.append(_of_shapes(fem, effects.theta, of_model, shapes, dofs, shape_noise))
-        return Comparison(parts, incidence, labels, of_model)
+            parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
+        return Comparison(parts)
 
-    effects = FrequencyEffects.of(fem, theta, frequencies, of_model)
     every, nominal = compared(effects), compared(effects.nominal())
-    alone = errors_alone(every.slopes())
-    seen = [(int(column),) for column in np.flatnonzero(alone <= VISIBLE)]
-    if not seen:
-        errors = ", ".join(f"{label} {error:.2g}" for label, error in zip(labels, alone, strict=True))
+    alone = errors_alone(every.slopes(len(causes)))
+    if alone.min() > VISIBLE:
+        errors = ", ".join(f"{cause.name} {error:.2g}" for cause, error in zip(causes, alone, strict=True))
         raise ValueError(
             f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
             f"{errors}. More records or other modes would lower them"
         )
-    joined = [list(group) for group in (merge_confused(nominal.slopes(), seen) if merge else seen)]
-    unseen = [label for label, error in zip(labels, alone, strict=True) if error > VISIBLE]
     random = as_random_state(random_state)
-    found = findings(every.of(joined), nominal.of(joined), shift, records, unseen, significance, random)
+    scale = Scale.of(every.observed(), every.effects, causes, prior)
+    posterior = Posterior.of(scale, *explanations(scale), random)
+    found = findings(posterior, every, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
 
 
-def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
-    """The frequencies as an array, after checks."""
-    check_same_rows(T, F, ("temperatures", "frequencies"))
-    names = getattr(F, "columns", None)
-    if names is not None and list(names) != fem.mode_names_:
-        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
-    frequencies = as_floats(check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
-    if frequencies.shape[1] != len(fem.mode_names_):
-        raise ValueError(
-            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
-        )
-    if (frequencies <= 0).any():
-        row = np.flatnonzero((frequencies <= 0).any(axis=1))[0]
-        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
-    return frequencies
-
-
-def _of_shapes(
-    fem: Any, theta: Array, groups: Sequence[str], shapes: Any, dofs: ArrayLike | None, noise: ArrayLike
-) -> Part:
+def _of_shapes(effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, noise: ArrayLike) -> Part:
     """Measured changes of mode shapes, and the effects of the groups on them."""
     if dofs is None:
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
-    effects = ShapeEffects.of(fem, theta, groups, dofs)
-    change, deviations = effects.measured(shapes, noise)
-    return Part(remembered(effects), change, np.diag(deviations**2))
-
-
-def _named_as_in_fit(fem: Any, T: Any) -> Any:
-    """Temperatures with column names where the chain was fitted with names, without where it was not.
-
-    One warning says what was assumed, in place of one from every part of the chain.
-    """
-    names, columns = getattr(fem, "feature_names_in_", None), list(getattr(T, "columns", ()))
-    is_named = any(isinstance(name, str) for name in columns)
-    if is_named == (names is not None) or np.shape(T)[1:] != (fem.n_features_in_,):
-        return T
-    if names is None:
-        warn_user(
-            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
-            "columns are taken in the order that they have",
-            "names of temperatures",
-        )
-        return T.set_axis(range(len(columns)), axis=1)
-    warn_user(
-        f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
-        "names of temperatures",
-    )
-    return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)
+    structure = effects.structure
+    of_shapes = ShapeEffects.of(structure, effects.theta, dofs)
+    shift = ShapeShift.of(of_shapes, shapes, noise, structure.fem.mode_names_)
+    return Part(shift.effects, shift.change, np.diag(shift.variances))

@@ -2,102 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from skthermo._formatting import listed, percent, probability_text
+from skthermo._arguments import seem_rad_per_s
+from skthermo._formatting import SPACE, chance_text, listed, percent
+from skthermo.studies.identification._causes import HIGHEST_SEVERITY, NO_DAMAGE
+from skthermo.studies.identification._told import Amount, either, told
 
-YES, NO, DOUBTFUL, ALONE = "yes", "no", "doubtful", "yes, if nothing else has changed"
-OF_GROUP = {
-    YES: "{} has lost {} of its stiffness (± {}).",
-    ALONE: "{} has lost {} of its stiffness (± {}), if nothing else has changed.",
-    DOUBTFUL: "It is doubtful whether {} is damaged: a loss of {} (± {}) may come from what else has changed.",
-}
-"""What is said of a damaged group, its severity and two standard errors."""
+NAMED, MOST_NAMED = 0.01, 4
+"""Probability from which on another explanation is named, and the largest number of those that are."""
 
-
-def damaged(found: Any) -> pd.Series:
-    """Whether each group is damaged, in words.
-
-    Where damage does not explain the shifts, standard errors are widened; a severity within two of them is doubtful.
-    """
-    table = found.table
-    answers = pd.Series(NO, table.index).mask(table["significant"].eq(True), YES)  # missing where a group is not seen
-    if not found.is_unexplained:
-        return answers
-    small = table["severity"] < 2 * table["standard_error"]
-    return answers.mask(answers == YES, small.map({True: DOUBTFUL, False: ALONE}))
+SURE = 0.9  # probability from which on the most probable explanation is not followed by averages over all
+LIKELY = 0.1  # probability from which on a cause is named among the averages
+RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is told
+NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
+CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
+EVEN = 0.1  # relative scatter of shifts up to which they count as even
 
 
 def answer(found: Any) -> Iterator[str]:
-    """Whether something has changed, and where: the first sentence follows the probability by chance."""
-    yield _first(found)
-    answers = damaged(found)
-    for group, row in found.table[answers != NO].iterrows():
-        yield OF_GROUP[answers[group]].format(group, _percent(row["severity"]), _percent(2 * row["standard_error"]))
-    if found.is_evident and (answers == NO).all():
-        yield _place_unknown(found)
-    if not found.is_evident and not found.is_unexplained:
-        yield _unnoticed(found)
+    """What is most probable, how probable, what else could be."""
+    explanations = told(found)
+    first, *others = explanations
+    shown = " that these modes show" if found.unseen else ""
+    yield (
+        f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
+        f"{chance_text(first.probability)}."
+    )
+    if first.has_else:
+        what = "No damage of these groups" if first.is_else else "Damage of these groups alone hardly"
+        yield f"{what} explains the shifts; {_departure(found)}."
+        yield f"Likely causes: {likely_causes(found)}."
+    named = [one for one in others if not one.is_healthy and one.probability >= NAMED][:MOST_NAMED]
+    if named:
+        yield f"It could also be: {'; '.join(f'{one.phrase()} ({chance_text(one.probability)})' for one in named)}."
+    if not first.is_healthy:
+        unchanged = sum(one.probability for one in explanations if one.is_healthy)
+        yield f"The probability that nothing has changed{shown} is {chance_text(unchanged)}."
+    if first.probability < SURE and not first.is_else:
+        yield from _averages(found)
+    if first.is_healthy:
+        yield from _unnoticed(found)
 
 
-def _first(found: Any) -> str:
-    chance, misfit = probability_text(found.p_value), probability_text(found.misfit_p_value)
-    if found.is_evident and found.is_unexplained:
-        return (
-            f"Something has changed (probability by chance {chance}), and damage of these groups does not explain all "
-            f"of it (probability of such a misfit by chance {misfit}): uncertainties are {found.widening:.1f} times as "
-            "wide for that."
-        )
-    if found.is_unexplained:
-        return f"Something has changed, but no damage of these groups explains it (probability by chance {misfit})."
-    if found.is_evident:
-        return f"Something has changed (probability by chance {chance})."
-    return f"No change is evident (probability by chance {chance})."
+def _averages(found: Any) -> Iterator[str]:
+    """Causes that are likely over all explanations together."""
+    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unseen)]
+    named = []
+    for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
+        amount = Amount(str(cause), row["kind"], row["severity"], row["lowest"], row["highest"])
+        word = "damaged" if row["kind"] == "damage" else "changed"
+        probability = f"{word} with probability {chance_text(row['probability'])}"
+        named.append(f"{cause} {amount.size} ({amount.band}; {probability})")
+    if named:
+        yield f"Averaged over all explanations: {'; '.join(named)}."
 
 
-def _place_unknown(found: Any) -> str:
-    """Which groups may be behind a change that none of them clearly shows."""
-    table = found.table.dropna(subset=["severity"])
-    possible = table[table["severity"] > 0]
-    losses = [
-        f"{percent(row['severity'], '.1f')} (± {_percent(2 * row['standard_error'])}) in {group}"
-        for group, row in possible.iterrows()
-    ]
-    if not losses:
-        return "Which part cannot be said."
-    best = f"the best explanation is a loss of {listed(losses)}, none of them clear by itself."
-    return f"Which part cannot be said: {best}"
-
-
-def _unnoticed(found: Any) -> str:
+def _unnoticed(found: Any) -> Iterator[str]:
     """What could be damaged all the same."""
-    table = found.table.dropna(subset=["severity", "standard_error"])
-    highest = (table["severity"] + 2 * table["standard_error"]).clip(upper=1.0)
-    losses = [f"{_percent(severity)} in {group}" for group, severity in highest.items()]
-    return f"A loss of stiffness of up to {listed(losses)} could have gone unseen."
+    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unseen)]
+    losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
+    if losses:
+        yield f"A loss of stiffness of up to {listed(losses)} could have gone unseen."
 
 
 def limits(found: Any) -> Iterator[str]:
     """What cannot be said of the place or the cause."""
-    for groups in found.confused:
-        yield f"{listed(groups)} cannot be told apart by these modes: only their common effect is known."
-    if len(found.unseen):
-        yield f"{listed(found.unseen)} cannot be seen in these modes: the standard error would be above 10 %."
-    rest = found.unexplained
+    best = told(found)[0]
+    for causes in found.confused:
+        yield f"{listed(causes)} cannot be told apart by these modes: only their common effect is known."
+    if found.unseen:
+        yield f"Damage in {either(found.unseen)} cannot be seen in these modes: nothing is known of it."
+    if best.is_healthy and found.p_value < RARE:
+        yield f"Yet a healthy structure shows such shifts with a probability of only {chance_text(found.p_value)}."
     if np.isnan(found.misfit_p_value):
-        yield "There are no more modes than damaged groups, so that any shift can be explained: it proves little."
-    elif found.is_unexplained and not np.isnan(rest).all():
-        worst = int(np.nanargmax(np.abs(rest)))
-        measured, explained = found.shifts[["measured", "explained"]].to_numpy(dtype=float)[worst]
+        yield "There are no more shifts than causes, so that any shift can be explained: the fit proves little."
+    elif found.misfit_p_value < RARE and not best.has_else:
         yield (
-            f"Mode {found.shifts.index[worst]} moved by {measured:+.2%}, of which damage explains {explained:+.2%}: "
-            f"{found.likely_cause or 'something else has changed too, or the model is wrong'}."
+            "The most probable explanation leaves something unexplained (probability by chance "
+            f"{chance_text(found.misfit_p_value)}): {_departure(found)}."
+        )
+    if found.rest >= NAMED:
+        yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
+
+
+def warnings(found: Any) -> Iterator[tuple[str, str]]:
+    """What is doubtful, by kind and text."""
+    best = told(found)[0]
+    yield from found.records.warnings()
+    if found.confused:
+        sets = "; ".join(" and ".join(causes) for causes in found.confused)
+        yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
+    if found.unseen:
+        names = ", ".join(found.unseen)
+        yield "unseen groups", f"groups that these modes do not show, of which nothing is known: {names}"
+    highest = [str(cause) for cause in found.most_probable if found.severities.get(cause, 0.0) >= HIGHEST_SEVERITY]
+    if highest:
+        yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
+    if best.has_else or found.misfit_p_value < RARE:
+        doubt = (
+            f"something else has a probability of {chance_text(found.probability_of_else)}"
+            if best.has_else
+            else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
+        )
+        yield (
+            "unexplained shifts",
+            f"damage of these groups does not explain the shifts ({doubt}); likely causes: {likely_causes(found)}",
         )
 
 
-def _percent(share: float) -> str:
-    return percent(share, ".1f")
+def _departure(found: Any) -> str:
+    """The mode that damage explains least, in standard errors."""
+    shifts = found.shifts
+    worst = int(np.nanargmax(np.abs(found.unexplained)))
+    measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))
+    error = float(shifts["standard_error"].iloc[worst])
+    return (
+        f"mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
+        f"{100 * error:.2f}{SPACE}%), of which these groups explain {_signed(explained)}"
+    )
+
+
+def likely_causes(found: Any) -> str:
+    """What may have shifted the frequencies where damage does not: what the shifts suggest, then what is usual."""
+    known, rest = found.shifts[found.shifts["measured"].notna()], found.unexplained
+    measured, error = (known[name].to_numpy(dtype=float) for name in ("measured", "standard_error"))
+    if seem_rad_per_s(1 + measured, NEAR_2_PI):
+        return "frequencies in rad/s: the measured ones are about 2 pi times the predicted ones; expected Hz"
+    n_rose, mean, worst = int((measured > CLEAR * error).sum()), float(measured.mean()), int(np.nanargmax(np.abs(rest)))
+    causes = []
+    if len(known) > 2 and measured.std() < EVEN * abs(mean):
+        causes.append(
+            f"another clock of the logger, or mass or stiffness all over the structure: all frequencies moved by about "
+            f"{_signed(mean)}"
+        )
+    elif n_rose and rest[worst] > 0 and not found.table["kind"].eq("stiffening").any():
+        causes.append(
+            f"strengthening, which was not sought (stiffening=...): {n_rose} of {len(known)} frequencies rose, that "
+            f"of mode {found.shifts.index[worst]} by {_signed(found.shifts['measured'].iloc[worst])}"
+        )
+    elif (np.abs(rest) > CLEAR).sum() == 1:
+        causes.append(f"another mode taken for mode {found.shifts.index[worst]}, which alone departs")
+    usual = "damage outside these groups, a change of mass or of a support, a wrong sensor, or a wrong model"
+    return "; or ".join([*causes, usual])
+
+
+def _signed(shift: float) -> str:
+    return f"{100 * shift:+.2f}{SPACE}%"
+
+
+def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
+    """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
+    parts = [f"{cause} {percent(abs(amount), '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE

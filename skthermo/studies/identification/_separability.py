@@ -1,7 +1,5 @@
 """Which damage groups can be told apart by their effects."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.optimize import nnls
 
@@ -37,19 +35,3 @@ def confused_groups(slopes: Array) -> list[tuple[int, ...]]:
             members = tuple(sorted([group, *others[shares >= IMITATING_SHARE].tolist()]))
             found[members] = min(rest, found.get(members, 1.0))
     return sorted((members for members in found if len(members) > 1), key=lambda members: found[members])
-
-
-def merge_confused(slopes: Array, members: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Groups merged two by two, the most similar first, until all can be told apart; each as members of ``slopes``."""
-    merged = [tuple(group) for group in members]
-    while True:
-        together = np.column_stack([slopes[:, list(group)].sum(axis=1) for group in merged])
-        confused = confused_groups(together)
-        if not confused:
-            return merged
-        alike = np.triu(cosines(together), 1)
-        inside = np.zeros_like(alike, dtype=bool)
-        inside[np.ix_(confused[0], confused[0])] = True
-        first, second = np.unravel_index(np.where(inside, alike, -np.inf).argmax(), alike.shape)
-        kept = [group for place, group in enumerate(merged) if place not in (first, second)]
-        merged = sorted([*kept, tuple(sorted(merged[first] + merged[second]))])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from sklearn.base import clone
+from sklearn.linear_model import Ridge
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
@@ -15,6 +16,9 @@ from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate.inverse import InverseSurrogate
+
+START_SAMPLES, START_PENALTY = 200, 1e-3
+"""Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
 
 
 def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
@@ -74,6 +78,19 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
         if part is not None:
             seed_parts(part, random_state)
     return inverse, mapper, aligner, imputer
+
+
+def with_quick_start(chain: Any, model: Any) -> Any:
+    """An unfitted twin of a fitted chain, with another model, whose refining inverse learns a mere start quickly."""
+    twin = clone(chain)
+    parts = twin.get_params()
+    twin.set_params(**{name: model for name, part in parts.items() if part is chain.model}, verbose=0)
+    inverse = chain.inverse_
+    if isinstance(inverse, InverseSurrogate) and inverse.n_steps_:
+        most = min(inverse.n_samples, START_SAMPLES)
+        start = {"regressor": Ridge(START_PENALTY), "n_samples": most, "narrow_bounds": False, "dofs": None}
+        twin.set_params(**{f"inverse__{name}": value for name, value in start.items()})
+    return twin
 
 
 def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:

@@ -14,10 +14,12 @@ from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats, patterns
+from skthermo._gaussian import Gaussian
 from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import correlation_time, row_times
 from skthermo._validation import last_step
+from skthermo._warnings import without_warnings
 from skthermo._weather import (
     TrainingRange,
     nearest_in_parts,
@@ -26,8 +28,9 @@ from skthermo._weather import (
     warn_of_unseen,
     weather_coordinates,
 )
-from skthermo.preprocessing import BlockedKFold
+from skthermo.preprocessing import BlockedKFold, HampelFilter
 from skthermo.surrogate.chain._scatter import Scatter
+from skthermo.surrogate.chain._service import ServiceRecords
 
 N_FOLDS = 5
 CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
@@ -36,6 +39,7 @@ SPREAD_OF = 100  # number of records with the most similar weather whose residua
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
 OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
 SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
+JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
 
@@ -46,13 +50,15 @@ class WeatherResiduals:
 
     ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
-    mapper that learned from all records. ``folds`` tells which records were predicted together.
+    mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
+    of the training records they are.
     """
 
     weather: Array
     values: Array
     own: Array
     folds: NDArray[np.intp]
+    rows: NDArray[np.intp] | None = None
 
     @cached_property
     def coordinates(self) -> Pipeline:
@@ -125,6 +131,45 @@ class WeatherResiduals:
         Rows of unknown weather are NaN.
         """
         return self._where_known(weather, lambda known: self.values[self._drawn(known, random_state)])
+
+    def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
+        """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
+
+        They follow the normal distribution of residuals without outliers. Without gaps and outliers, `draw` gives the
+        same.
+        """
+        return self._where_known(
+            weather, lambda known: self._completed(self._drawn(known, random_state), random_state, without_outliers)
+        )
+
+    def _completed(
+        self, records: NDArray[np.intp], random_state: np.random.RandomState, without_outliers: bool
+    ) -> Array:
+        values = self.usual[records] if without_outliers else self.values[records]
+        gaps = np.isnan(values)
+        if not gaps.any():
+            return values
+        expected = self._normal.completed(values)[0]
+        roots, of_row = self._normal.error_roots(values)
+        drawn = np.einsum("ijk,ik->ij", roots[of_row], random_state.standard_normal(values.shape))
+        return np.where(gaps, np.where(np.isnan(expected), self._normal.mean, expected) + drawn, values)
+
+    @cached_property
+    def usual(self) -> Array:
+        """The residuals, NaN where one is an outlier: far from its neighbours in time."""
+        return HampelFilter().fit(self.values).transform(self.values)
+
+    @property
+    def outliers(self) -> Array:
+        """Those of the residuals that are outliers, NaN elsewhere."""
+        return np.where(np.isnan(self.usual), self.values, np.nan)
+
+    @cached_property
+    def _normal(self) -> Gaussian:
+        """Normal distribution of the residuals without outliers."""
+        with without_warnings():
+            found = Gaussian.of(self.usual)
+        return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
     def _drawn(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records drawn for each row."""
@@ -218,8 +263,8 @@ class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
     ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
-    gives for the inputs, and ``weights`` those of the rows, or None. ``residuals`` are out of fold, and None until they
-    have been computed.
+    gives for the inputs, and ``weights`` those of the rows, or None. ``residuals`` are out of fold; they and the
+    ``service``, gaps and outliers, are None until they have been computed.
     """
 
     temperatures: Any
@@ -229,6 +274,7 @@ class TrainingRecords(SavesFrames):
     learned: Array
     weights: Array | None
     residuals: WeatherResiduals | None = None
+    service: ServiceRecords | None = None
 
     @property
     def trained(self) -> NDArray[np.bool_]:
@@ -273,7 +319,7 @@ class TrainingRecords(SavesFrames):
         warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
         values = measured / frequencies_of(predicted) - 1
         known = ~np.isnan(values).all(axis=1)
-        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known])
+        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known], order[known])
 
 
 def as_frame(table: Any) -> pd.DataFrame:

@@ -1,0 +1,181 @@
+"""Rates of alarms in many worlds, and the bands that a measured campaign should lie in."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from scipy.special import expit, logit
+from scipy.stats import t
+
+from skthermo._arrays import Array
+from skthermo._threads import single_blas_thread
+from skthermo._warnings import warn_user, without_warnings
+from skthermo.metrics import minimum_detectable_damage
+from skthermo.studies.detectability._families import Family
+from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement, Key
+from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
+from skthermo.studies.worlds import Worlds
+
+N_DRAWS = 4  # draws of the noise in each world, which tell its share from that of what else varies
+MOST_FAILURES = 0.5  # share of worlds that may fail
+
+
+@dataclass(frozen=True, eq=False)
+class WorldRates:
+    """Rates of alarms in worlds, (n_worlds, n_parts, n_draws), by detector and scenario, as parts are added one after
+    the other; ``n_records`` are judged in each draw, and ``with_noise`` tells whether bands hold the noise, too."""
+
+    rates: Mapping[Key, Array]
+    n_records: Mapping[Key, float]
+    parts: Sequence[str]
+    with_noise: bool
+    errors: Sequence[str]
+
+    @classmethod
+    def of(cls, simulation: Simulation, worlds: Worlds, n_jobs: int | None, verbose: int = 0) -> "WorldRates":
+        """Judge the records of every world; those that fail are counted in a warning, unless most fail."""
+        jobs = (delayed(_rates_of_world)(simulation, worlds, number) for number in range(len(worlds.seeds)))
+        with without_warnings():
+            outcomes = Parallel(n_jobs=n_jobs, verbose=verbose)(jobs)
+        errors = [one for one in outcomes if isinstance(one, str)]
+        found = [one for one in outcomes if not isinstance(one, str)]
+        if len(errors) > MOST_FAILURES * len(outcomes):
+            raise ValueError(
+                f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}; expected chains that can "
+                "be refitted, or uncertainty=('noise',)"
+            )
+        if errors:
+            warn_user(
+                f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}: bands are of the others",
+                "failed worlds",
+            )
+        keys = [key for key in found[0] if all(key in one for one in found)]
+        rates = {key: np.array([one[key][0] for one in found]) for key in keys}
+        n_records = {key: float(np.mean([one[key][1] for one in found])) for key in keys}
+        return cls(rates, n_records, worlds.parts, worlds.with_noise, errors)
+
+    def single(self, key: Key) -> Array:
+        """Rates of single campaigns with all that varies, (n_worlds, n_draws), or without noise their mean."""
+        last = self.rates[key][:, -1]
+        return last if self.with_noise else last.mean(axis=1, keepdims=True)
+
+    def band(self, key: Key, confidence: float) -> tuple[float, float]:
+        """Rates between which that of a measured campaign should lie with this probability.
+
+        Student's law on the scale of the logit: of few worlds, quantiles are hardly known.
+        """
+        rates, n = self.rates[key][:, -1], self.n_records[key]
+        spread = Spread.of(logit((rates * n + 0.5) / (n + 1)))
+        variance = spread.between + self.with_noise * spread.within
+        number = len(rates)
+        margin = t.ppf((1 + confidence) / 2, number - 1) * np.sqrt(variance * (1 + 1 / number))
+        lowest, highest = expit(spread.mean + np.array([-margin, margin]))
+        return tuple(np.clip(((n + 1) * np.array([lowest, highest]) - 0.5) / n, 0, 1))
+
+    def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
+        """The table of a study, whose simulated rows have the bands of the worlds."""
+        results = results.copy()
+        for row in results.index[results["source"] == SIMULATED]:
+            key = results.at[row, "detector"], results.at[row, "scenario"]
+            if key in self.rates:
+                results.loc[row, ["band_lowest", "band_highest"]] = self.band(key, confidence)
+        return results
+
+    def smallest(self, family: Family, level: float, method: str, confidence: float) -> tuple[float, float]:
+        """Band of the smallest severity of a family that is detected reliably."""
+        severities, rates = family.tested["severity"].to_numpy(dtype=float), self._campaigns(family)
+        if not len(rates):
+            return float("nan"), float("nan")
+        if method == "grid":
+            found = np.array([abs(minimum_detectable_damage(severities, row, level)) for row in rates])
+        else:
+            curves = [abs(one.severity_at(level)) for one in self.curves(family)]
+            found = np.append(curves, np.full(len(rates) - len(curves), np.nan))
+        found = np.where(np.isnan(found), np.inf, found)
+        sign, tail = np.sign(severities[0]), (1 - confidence) / 2
+        lowest, highest = (np.quantile(found, q, method=m) for q, m in ((tail, "lower"), (1 - tail, "higher")))
+        return float(sign * lowest), float(sign * highest)
+
+    def curves(self, family: Family, log: bool = False) -> list[PODCurve]:
+        """Fitted curves of all campaigns of all worlds that have one."""
+        tested, curves = family.tested, []
+        n = tested["n_effective"] / tested["n_repeats"]
+        for row in self._campaigns(family):
+            with suppress(ValueError), without_warnings():
+                curves.append(pod_curve(tested["severity"], row * n, n, log=log))
+        return [curve for curve in curves if np.isfinite(curve.slope)]
+
+    def _campaigns(self, family: Family) -> Array:
+        """Rates of single campaigns, (n_campaigns, n_severities); none of measured records."""
+        keys = list(zip(family.tested["detector"], family.tested["scenario"], strict=True))
+        if family.source != SIMULATED or not all(key in self.rates for key in keys):
+            return np.empty((0, len(keys)))
+        return np.array([self.single(key).ravel() for key in keys]).T
+
+    def by_part(self, key: Key) -> dict[str, float]:
+        """Standard deviation of the rate due to each part."""
+        steps = self.rates[key]
+        changes = np.concatenate([steps[:, :1], np.diff(steps, axis=1)], axis=1)
+        deviations = {"noise": np.sqrt(Spread.of(steps[:, -1]).within)} if self.with_noise else {}
+        for number, part in enumerate(self.parts):
+            deviations[part] = np.sqrt(Spread.of(changes[:, number]).between)
+        return deviations
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean of values, (n_worlds, n_draws), and their variances between worlds and within them."""
+
+    mean: float
+    between: float
+    within: float
+
+    @classmethod
+    def of(cls, values: Array) -> "Spread":
+        """Analysis of variance of values, (n_worlds, n_draws)."""
+        means, within = values.mean(axis=1), float(values.var(axis=1, ddof=1).mean())
+        between = max(float(means.var(ddof=1)) - within / values.shape[1], 0.0)
+        return cls(float(means.mean()), between, within)
+
+
+def _rates_of_world(simulation: Simulation, worlds: Worlds, number: int) -> Any:
+    """Rates, (n_parts, n_draws), and numbers of judged records by detector and scenario; or the text of an error."""
+    with without_warnings(), single_blas_thread():
+        random = np.random.RandomState([worlds.seeds[number] if worlds.with_noise else 0, N_DRAWS])
+        seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
+        try:
+            steps = [_rates(simulation, chain, T, seeds, number * N_DRAWS) for _, chain, T in worlds.world(number)]
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+    keys = [key for key in steps[0] if all(key in step for step in steps)]
+    return {
+        key: (np.array([step[key][0] for step in steps]), float(np.mean([step[key][1] for step in steps])))
+        for key in keys
+    }
+
+
+def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int) -> dict[Key, tuple[Array, float]]:
+    """Rates of alarms, (n_draws,), and the mean number of judged records, by detector and scenario."""
+    clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first)
+    drawn = replace(simulation, fem=chain, T=T, clean=clean, reference=None)
+    judgement = Judgement()
+    for number, pair in enumerate(seeds):
+        one = Judgement(errors=judgement.errors)
+        for records in drawn.records(simulation.scenarios, number, pair):
+            drawn.judge(records, one)
+        for key, decisions in one.decisions.items():
+            judgement.decisions.setdefault(key, []).extend(decisions)
+    rows = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T))))
+    scenarios = {scenario.name: scenario for scenario in simulation.scenarios}
+    found = {}
+    for key, decisions in judgement.decisions.items():
+        if len(decisions) == len(seeds):
+            counted = JudgedRecords(key[0], scenarios[key[1]], SIMULATED, rows, np.array(decisions)).from_onset()[0]
+            judged = (~np.isnan(counted)).sum(axis=1)
+            found[key[:2]] = (counted < 0).sum(axis=1) / np.maximum(judged, 1), float(judged.mean())
+    return found

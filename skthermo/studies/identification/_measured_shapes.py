@@ -1,0 +1,123 @@
+"""Measured mode shapes of the healthy and of the changed structure, and how far apart they are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arguments import check_noise
+from skthermo._arrays import Array, as_floats
+from skthermo._warnings import warn_user
+from skthermo.studies.identification._shape_effects import ShapeEffects
+
+STATES = ("healthy", "damaged")
+ALIKE = 0.5  # MAC of a measured healthy shape with the model's below which it counts as another mode
+MEASURED = 0.5  # share of a mode's records that must have a sensor's component for it to count
+
+
+@dataclass(frozen=True)
+class ShapeShift:
+    """Change of the components of measured shapes, (n_observed,), and the variances of its errors.
+
+    Effects are on the same components. The errors are independent and relative to the largest component of a shape.
+    """
+
+    effects: ShapeEffects
+    change: Array
+    variances: Array
+
+    @classmethod
+    def of(
+        cls, effects: ShapeEffects, shapes: Any, noise: ArrayLike | Literal["fitted"], modes: Sequence[Any]
+    ) -> "ShapeShift":
+        """From one or several records of each state, as `identify_damage` takes them."""
+        stated = stated_variances(noise, len(modes))
+        records = read_records(shapes, effects.reference.shape)
+        known = np.logical_and(*(measured_sensors(state) for state in records))
+        effects = effects.at(known & (known.sum(axis=0) > 1))
+        complete = np.logical_and(*((~np.isnan(effects.components(state))).any(axis=0) for state in records))
+        effects = effects.at(effects.known & np.isin(np.arange(len(modes)), effects.modes[complete]))
+        foreign = foreign_modes(effects, records[0])
+        if foreign.any():
+            warn_user(
+                f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
+                f"model's, {modes[np.flatnonzero(foreign)[0]]} the first, and are left out; expected shapes of the "
+                "same modes, with rows in the order of dofs",
+                "foreign mode shapes",
+            )
+        effects = effects.at(effects.known & ~foreign)
+        if not len(effects.modes):
+            raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
+        components = [effects.components(state) for state in records]
+        number = [(~np.isnan(values)).sum(axis=0) for values in components]
+        healthy, changed = (np.nanmean(values, axis=0) for values in components)
+        variance = np.maximum(scatter(components, effects.modes, len(modes), is_needed=isinstance(noise, str)), stated)
+        variance = variance[effects.modes]
+        return cls(effects, changed - healthy, variance * (1 / number[0] + 1 / number[1]))
+
+
+def read_records(shapes: Any, expected: tuple[int, ...]) -> list[NDArray]:
+    """Records of both states, (n_records, n_sensors, n_modes) each."""
+    if not isinstance(shapes, Sequence) or len(shapes) != 2:
+        raise ValueError("shapes is not a pair; expected measured shapes of the healthy and of the damaged structure")
+    states = []
+    for which, values in zip(STATES, shapes, strict=True):
+        array = np.asarray(values)
+        array = array if np.iscomplexobj(array) else as_floats(values)
+        if array.shape[-2:] != expected or array.ndim > 3 or not len(array):
+            raise ValueError(
+                f"the {which} shapes have shape {array.shape}; expected a row for each of {expected[0]} sensors "
+                f"and a column for each of {expected[1]} modes, or several records of these"
+            )
+        if np.isinf(array).any():
+            raise ValueError(f"the {which} shapes hold infinite values; expected NaN where not measured")
+        records = array.reshape(-1, *expected)
+        if (records == 0).all(axis=1).any():
+            mode = int(np.argwhere((records == 0).all(axis=1))[0, 1])
+            raise ValueError(f"the {which} shape of mode {mode} is zero; expected NaN where it was not measured")
+        states.append(records)
+    return states
+
+
+def measured_sensors(records: NDArray) -> NDArray[np.bool_]:
+    """Sensors with a component of a mode in most of the records that have the mode, (n_sensors, n_modes)."""
+    present = ~np.isnan(records)
+    n_with_mode = present.any(axis=1).sum(axis=0)
+    return present.sum(axis=0) >= np.maximum(MEASURED * n_with_mode, 1)
+
+
+def foreign_modes(effects: ShapeEffects, records: NDArray) -> NDArray[np.bool_]:
+    """Modes whose mean measured shape has a low MAC with the reference, (n_modes,)."""
+    squares = np.nanmean(effects.components(records), axis=0) ** 2
+    across = np.bincount(effects.modes, squares, minlength=len(effects.across))
+    return across > (1 - ALIKE) * (effects.known * effects.reference**2).sum(axis=0)
+
+
+def stated_variances(noise: ArrayLike | Literal["fitted"], n_modes: int) -> Array:
+    """Variances of one record's components as they are stated, (n_modes,); 0 where they are fitted."""
+    if isinstance(noise, str):
+        if noise != "fitted":
+            raise ValueError(f'shape_noise is {noise!r}; expected "fitted" or standard deviations')
+        return np.zeros(n_modes)
+    stated = check_noise(noise, n_modes, what="shape_noise", most=1)
+    if (stated == 0).any():
+        raise ValueError(f"shape_noise is {noise!r}; expected standard deviations above 0")
+    return stated**2
+
+
+def scatter(components: list[Array], modes: NDArray[np.intp], n_modes: int, *, is_needed: bool) -> Array:
+    """Variance of each mode's components about their state's mean, (n_modes,); 0 where all records are alone."""
+    squares, freedom = np.zeros(n_modes), np.zeros(n_modes)
+    for values in components:
+        rest = np.nan_to_num(values - np.nanmean(values, axis=0))
+        n_free = np.maximum((~np.isnan(values)).sum(axis=0) - 1, 0)
+        squares += np.bincount(modes, (rest**2).sum(axis=0), minlength=n_modes)
+        freedom += np.bincount(modes, n_free, minlength=n_modes)
+    if is_needed and (freedom[modes] < 3).any():
+        raise ValueError(
+            'shape_noise is "fitted", which needs several records of shapes in one of the states; expected a standard '
+            f"deviation, such as 0.01, since there are {len(components[0])} and {len(components[1])} records"
+        )
+    return squares / np.maximum(freedom - 2, 1)  # the mean variance of a normal law that is known so well

@@ -1,0 +1,81 @@
+"""The shift of some records, ready to be explained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._arrays import Array, as_floats
+from skthermo._frames import check_same_rows
+from skthermo._validation import check_array
+from skthermo._warnings import warn_user, warnings_once
+from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
+from skthermo.studies.identification._shift import Shift, measured_shift
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Records that were compared: their shift, parameters theta, and frequencies, NaN where a record was left out."""
+
+    shift: Shift
+    records: ComparedRecords
+    theta: Array
+    frequencies: Array
+
+
+def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fitted"]) -> Observation:
+    """The shift of records against a chain, less those that cannot be compared."""
+    frequencies, T = _read_frequencies(fem, T, F), _named_as_in_fit(fem, T)
+    with warnings_once():
+        theta = as_floats(fem.predict_parameters(T))
+    left_out = left_out_rows(fem, T, theta, frequencies)
+    is_compared = ~np.any(list(left_out.values()), axis=0)
+    frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
+    with warnings_once():
+        shift = measured_shift(fem, T, theta, frequencies, noise)
+    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
+    return Observation(shift, records, theta, frequencies)
+
+
+def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
+    """The frequencies as an array, after checks."""
+    check_same_rows(T, F, ("temperatures", "frequencies"))
+    names = getattr(F, "columns", None)
+    if names is not None and list(names) != fem.mode_names_:
+        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
+    frequencies = as_floats(check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+    if frequencies.shape[1] != len(fem.mode_names_):
+        raise ValueError(
+            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
+        )
+    if (frequencies <= 0).any():
+        row = np.flatnonzero((frequencies <= 0).any(axis=1))[0]
+        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
+    return frequencies
+
+
+def _named_as_in_fit(fem: Any, T: Any) -> Any:
+    """Temperatures with column names where the chain was fitted with names, without where it was not.
+
+    One warning says what was assumed, in place of one from every part of the chain.
+    """
+    names, columns = getattr(fem, "feature_names_in_", None), list(getattr(T, "columns", ()))
+    is_named = any(isinstance(name, str) for name in columns)
+    if is_named == (names is not None) or np.shape(T)[1:] != (fem.n_features_in_,):
+        return T
+    if names is None:
+        warn_user(
+            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
+            "columns are taken in the order that they have",
+            "names of temperatures",
+        )
+        return T.set_axis(range(len(columns)), axis=1)
+    warn_user(
+        f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
+        "names of temperatures",
+    )
+    return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)

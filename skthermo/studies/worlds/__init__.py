@@ -1,0 +1,5 @@
+"""Structures that could have given the training records of a chain, and weather that they may meet."""
+
+from skthermo.studies.worlds._worlds import PARTS, Worlds
+
+__all__ = ["PARTS", "Worlds"]

@@ -1,0 +1,76 @@
+"""Worlds: structures that could have given the training records of a chain, each in weather of its own."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skthermo._arrays import positive_integer
+from skthermo.studies.worlds._models import checked_models, drawn_models
+from skthermo.studies.worlds._weather import other_years, resampled_days
+
+PARTS = ("noise", "weather", "baseline", "model")
+"""What a world draws, in the order in which one is added to the others."""
+
+LARGEST_SEED = np.iinfo(np.int32).max
+
+
+@dataclass(frozen=True, eq=False)
+class Worlds:
+    """What may vary beside the noise, ``parts``; years of weather, of which the first is that of the study; models.
+
+    Every world is drawn from its own seed alone. Without "noise" among what varies, all worlds have the same.
+    """
+
+    fem: Any
+    parts: Sequence[str]
+    with_noise: bool
+    years: Sequence[Any]
+    models: Sequence[Any]
+    seeds: Sequence[int]
+
+    @classmethod
+    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: int) -> "Worlds":
+        """So many worlds in which the named parts vary; without models, these are drawn from the training records."""
+        asked = checked_parts(uncertainty)
+        years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
+        random = np.random.RandomState(seed)
+        seeds = random.randint(LARGEST_SEED, size=positive_integer(number, "n_worlds") + 1)
+        if models is not None:
+            models = checked_models(fem, models)
+        elif "model" in asked:
+            models = drawn_models(fem, number, int(seeds[-1]))
+        varied = [part for part in PARTS[1:] if part in asked]
+        return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
+
+    def world(self, number: int) -> Iterator[tuple[str, Any, Any]]:
+        """One part after the other, with a chain and temperatures in which it and those before vary.
+
+        A chain of other training records has learned its own healthy simulation, with fitted noise, in the weather of
+        the training records: records that this structure could have given as well.
+        """
+        random = np.random.RandomState(self.seeds[number])
+        chain, T, years = self.fem, self.years[0], len(self.years)
+        weather, noise = (int(one) for one in random.randint(LARGEST_SEED, size=2))
+        known, F = None, None
+        for part in self.parts:
+            if part == "weather":
+                other = np.random.RandomState(weather)
+                T = self.years[number % years] if years > 1 else resampled_days(T, other)
+            elif part == "baseline":
+                known = self.fem.training_records_[0]
+                F = self.fem.simulate(known, noise="fitted", random_state=noise)
+                chain = self.fem.refitted(known, F)
+            else:
+                chain = self.fem.refitted(known, F, model=self.models[number % len(self.models)])
+            yield part, chain, T
+
+
+def checked_parts(uncertainty: Any) -> list[str]:
+    """What varies, or an error."""
+    asked = [uncertainty] if isinstance(uncertainty, str) else list(uncertainty)
+    unknown = [part for part in asked if part not in PARTS]
+    if unknown or not asked:
+        raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected some of {list(PARTS)}")
+    return asked

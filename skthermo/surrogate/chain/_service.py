@@ -1,0 +1,113 @@
+"""Records as they come in service: gaps and outliers in runs, as the training records have them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, as_floats, patterns
+from skthermo._frames import check_same_rows
+from skthermo._times import row_times
+
+MEAN_LENGTH = 25  # of runs of consecutive training records, before records of similar weather take over
+TAKEN_FROM = 25  # number of records with the most similar weather, and the same faults, that take over
+
+
+@dataclass(frozen=True, eq=False)
+class ServiceRecords:
+    """Gaps and outliers of training records in order of time, and the weather of each.
+
+    ``missing``, (n_records, n_sensors + n_modes), tells which values are not there; ``outliers``, (n_records, n_modes),
+    are relative residuals, NaN where a value is none; ``places`` are coordinates of the weather.
+    """
+
+    missing: NDArray[np.bool_]
+    outliers: Array
+    places: Array
+
+    @classmethod
+    def of(cls, records: Any, residuals: Any) -> ServiceRecords:
+        """Learn from training records; a value is an outlier if its residual is far from those of its neighbours."""
+        outliers = np.full(np.shape(records.frequencies), np.nan)
+        outliers[residuals.rows] = residuals.outliers
+        return cls._in_order(records, residuals, as_floats(records.frequencies), outliers)
+
+    @classmethod
+    def of_raw(cls, records: Any, residuals: Any, raw: Any, predicted: Array) -> ServiceRecords:
+        """Learn from the training records before they were cleaned: what cleaning has changed or removed is an outlier.
+
+        Given are these frequencies, and those that are predicted for the rows.
+        """
+        measured = as_floats(raw)
+        if measured.shape != np.shape(records.frequencies):
+            raise ValueError(
+                f"outliers has shape {measured.shape}; expected the frequencies that the chain was fitted on before "
+                f"they were cleaned, {np.shape(records.frequencies)}, or 'fitted', or the share of outliers"
+            )
+        check_same_rows(records.frequencies, raw, ("the frequencies of fit", "outliers"))
+        is_outlier = ~np.isnan(measured) & (measured != as_floats(records.frequencies))
+        outliers = np.where(is_outlier, measured / predicted - 1, np.nan)
+        return cls._in_order(records, residuals, measured, outliers)
+
+    @classmethod
+    def _in_order(cls, records: Any, residuals: Any, measured: Array, outliers: Array) -> ServiceRecords:
+        order = np.argsort(row_times(records.temperatures), kind="stable")
+        order = order[records.counted[order]]
+        missing = np.isnan(np.hstack([as_floats(records.temperatures), measured]))
+        places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
+        return cls(missing[order], outliers[order], places.to_numpy())
+
+    def draw(self, places: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+        """Positions of the records whose faults rows of weather in order of time have, (n_rows,).
+
+        A row takes the record after the one that the row before it took, so that faults last as long as in training.
+        Now and then, a record with the same faults and similar weather takes over before: where a run of faults
+        begins, or in records with the most usual faults, which are mostly none. All records are taken equally often.
+        """
+        n_records, n_rows = len(self.places), len(places)
+        passes = random_state.uniform(size=n_rows) < 1 / MEAN_LENGTH
+        which = random_state.uniform(size=n_rows)
+        taken = np.empty(n_rows, dtype=np.intp)
+        record = self._similar(0, places[0], which[0]) if n_rows else 0
+        for row in range(n_rows):
+            if row:
+                if passes[row] and self._joint_of[record]:
+                    record = self._similar(self._joint_of[record], places[row - 1], which[row])
+                record = (record + 1) % n_records
+            taken[row] = record
+        return taken
+
+    def _similar(self, joint: int, place: Array, share: float) -> int:
+        """One of the records at a joint whose weather is most similar, or any where it is unknown."""
+        rows = self._joints[joint]
+        if len(rows) > TAKEN_FROM and not np.isnan(place).any():
+            distances = ((self.places[rows] - place) ** 2).sum(axis=1)
+            rows = rows[np.argpartition(distances, TAKEN_FROM)[:TAKEN_FROM]]
+        return int(rows[int(share * len(rows))])
+
+    @cached_property
+    def _joint_of(self) -> NDArray[np.intp]:
+        """From 1 on, the number of the faults of records at which others may take over; 0 for the rest."""
+        of_row = patterns(np.hstack([self.missing, ~np.isnan(self.outliers)]))[1]
+        begins = np.diff(of_row, prepend=of_row[-1:]) != 0
+        return np.where(begins | (of_row == np.bincount(of_row).argmax()), of_row + 1, 0)
+
+    @cached_property
+    def _joints(self) -> dict[int, NDArray[np.intp]]:
+        """Records by these numbers, and all of them for 0."""
+        found = {int(joint): np.flatnonzero(self._joint_of == joint) for joint in np.unique(self._joint_of)}
+        return found | {0: np.arange(len(self.places))}
+
+
+def places_of(residuals: Any, weather: Array) -> Array:
+    """Coordinates of weather; NaN where it is unknown."""
+    known = ~np.isnan(weather).any(axis=1)
+    places = np.full((len(weather), residuals.places.shape[1]), np.nan)
+    if known.any():
+        places[known] = residuals.coordinates.transform(weather[known])
+    return places

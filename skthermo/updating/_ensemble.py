@@ -1,0 +1,197 @@
+"""Models drawn from what calibration leaves open, by randomised maximum a posteriori."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from skthermo._arrays import Array
+from skthermo._frequency_effects import read_groups
+from skthermo.fem import CallableModel, FEModel
+from skthermo.updating._diagnostics import at_bounds, false_matches
+from skthermo.updating._measured import Measured
+from skthermo.updating._optimise import Outcome, optimise
+from skthermo.updating._residuals import Residuals
+
+WIDEST = 4.0
+"""Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays
+positive."""
+
+SOFTEST = 0.1  # lowest multiplier of a group's stiffness
+MOST_AT_BOUND = 0.1
+"""Share of models at a bound up to which these models differ nearly as much as the prior allows: at a bound of two
+standard deviations of the prior it is 5 %."""
+
+
+@dataclass(frozen=True)
+class RandomisedResiduals:
+    """Residuals in units of their standard deviations, each less a standard normal number.
+
+    That is what they would be with another measurement and another mean of the prior, as likely as the given ones.
+    """
+
+    residuals: Residuals
+    noise: Array
+
+    @classmethod
+    def draw(cls, residuals: Residuals, n: int, random: np.random.RandomState) -> "list[RandomisedResiduals]":
+        """Draw n times. Noise of a shape is orthogonal to the shape, whose scale is free."""
+        unit = residuals.measured.shapes[:, residuals.weighted]
+        noise = random.standard_normal((n, residuals.n_plain + unit.size))
+        across = noise[:, residuals.n_plain :].reshape(n, *unit.T.shape)
+        along = np.einsum("smd,dm,em->sme", across, unit, unit)
+        noise[:, residuals.n_plain :] -= along.reshape(n, -1)
+        return [cls(residuals, row) for row in noise]
+
+    def at(self, theta: Array) -> "RandomisedPoint":
+        """Residuals at one theta."""
+        point = self.residuals.at(theta)
+        weights = np.sqrt(np.repeat(self.residuals.precisions, len(self.residuals.measured.dofs)))
+        weights = np.append(np.ones(self.residuals.n_plain), weights)
+        return RandomisedPoint(point, weights, weights * point.values - self.noise)
+
+    def loss(self, squares: Array) -> Array:
+        """The squares themselves."""
+        return np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
+
+
+@dataclass(frozen=True)
+class RandomisedPoint:
+    """Randomised residuals at one theta."""
+
+    point: Any
+    weights: Array
+    values: Array
+
+    @property
+    def objective(self) -> float:
+        """Sum of the squares; infinite where the model has no modes."""
+        total = float((self.values**2).sum())
+        return total if np.isfinite(total) else np.inf
+
+    def jacobian(self) -> Array:
+        """Derivatives of ``values``, (n_values, n_parameters)."""
+        return self.weights[:, np.newaxis] * self.point.jacobian()
+
+
+class Ensemble:
+    """Draws of a model's parameters, and of the stiffness of its damage groups, given measured modes.
+
+    Parameters
+    ----------
+    model : FE model
+        As it was before calibration.
+    measured : Measured
+        Modes with their noise.
+    bounds : ndarray of shape (n_parameters, 2)
+        Box of the parameters.
+    prior : ndarray of shape (n_parameters,)
+        Standard deviation of each parameter about 1.
+    groups : list of str
+        Damage groups whose stiffness is not known either.
+    spread : float
+        Standard deviation of their stiffness about 1.
+    """
+
+    def __init__(
+        self, model: FEModel, measured: Measured, bounds: Array, prior: Array, groups: Sequence[str], spread: float
+    ):
+        self.model, self.measured, self.groups = model, measured, list(groups)
+        limits = max(1 - WIDEST * spread, SOFTEST), 1 + WIDEST * spread
+        self.bounds = np.vstack([bounds, np.tile(limits, (len(self.groups), 1))])
+        prior = np.append(prior, np.full(len(self.groups), spread))
+        self.extended: Any = model
+        if self.groups:
+            severities = 1 - limits[1], 1 - limits[0]
+            self.extended = model.with_damage_parameters(self.groups, severities=severities)  # type: ignore[attr-defined]
+        quiet = self.extended.quiet() if hasattr(self.extended, "quiet") else self.extended
+        self.residuals = Residuals(quiet, measured, prior)
+
+    @property
+    def names(self) -> list[str]:
+        """What the columns of the multipliers are: parameters, then damage groups."""
+        return [*self.model.parameter_names, *self.groups]
+
+    def multipliers(
+        self, n: int, start: Array, random: np.random.RandomState, max_iter: int, parallel: Parallel
+    ) -> list[Outcome]:
+        """Most probable multipliers of n randomised problems, each from the same start."""
+        first = np.append(start, np.ones(len(self.groups)))
+        search = partial(optimise, bounds=self.bounds, start=first, method="least_squares", max_iter=max_iter)
+        drawn = RandomisedResiduals.draw(self.residuals, n, random)
+        return parallel(delayed(search)(randomised) for randomised in drawn)
+
+    def model_at(self, multipliers: Array) -> FEModel:
+        """The model whose theta = 1 has these multipliers; its damage groups are those of the model."""
+        n_parameters = len(self.model.parameter_names)
+        model: Any = self.model
+        if self.groups:
+            model = model.damaged(dict(zip(self.groups, (1 - multipliers[n_parameters:]).tolist(), strict=True)))
+        return rescaled(model, multipliers[:n_parameters])
+
+    def doubts(self, outcomes: Sequence[Outcome]) -> Iterator[tuple[str, str]]:
+        """Warnings about the draws: kind and text of each."""
+        n = len(outcomes)
+        theta = np.array([outcome.theta for outcome in outcomes])
+        if unfinished := sum(not outcome.success for outcome in outcomes):
+            yield (
+                "unfinished draws",
+                f"the search has not converged for {unfinished} of {n} drawn models, which may not be likely ones: "
+                "expected a higher max_iter, or bounds within which the model has modes",
+            )
+        at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
+        if (at_bound > MOST_AT_BOUND * n).any():
+            counts = zip(self.names, at_bound, strict=True)
+            listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in counts if count)
+            yield (
+                "draws at bounds",
+                f"drawn models lie at the bounds of {listed}, and are less different than what is not known: expected "
+                "wider bounds, or a narrower prior",
+            )
+        mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
+        if mismatched:
+            yield (
+                "draws with swapped modes",
+                f"modes swap places in {mismatched} of {n} drawn models, and a measured mode is fitted with "
+                "another one: expected a model with track=True, or shapes",
+            )
+
+    def warn_of(self, multipliers: Sequence[Array]) -> None:
+        """Warnings of the model about drawn multipliers, such as those outside the bounds of a reduced model."""
+        if hasattr(self.extended, "warn_of"):
+            theta = np.array(multipliers)
+            self.extended.warn_of(theta, self.residuals.model.frequencies(theta))
+
+
+def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:
+    """Damage groups whose stiffness no parameters scale already; by default those that are not made up of others."""
+    if groups is None and not (hasattr(model, "groups") and hasattr(model, "with_damage_parameters")):
+        return []
+    if groups is not None and not isinstance(groups, str) and not len(groups):
+        return []
+    chosen = list(read_groups(model, groups))
+    known = getattr(model, "parameter_terms", None)
+    if known is None:
+        return [name for name in chosen if name not in model.parameter_names]
+    parameters = [set(terms) for terms in known.values()]
+
+    def is_scaled(name: str) -> bool:
+        own = set(model.groups[name])
+        return set().union(*(terms for terms in parameters if terms <= own)) == own
+
+    return [name for name in chosen if not is_scaled(name)]
+
+
+def rescaled(model: FEModel, theta: Array) -> FEModel:
+    """A model whose nominal state is the given model at theta."""
+    if hasattr(model, "rescaled"):
+        return model.rescaled(theta)
+    function = partial(_frequencies_from, model, theta)
+    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
+
+
+def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
+    return model.frequencies(origin * theta)

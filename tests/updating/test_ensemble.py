@@ -1,0 +1,184 @@
+"""Models drawn from what calibration leaves open: exact where linear, and as wide as the prior where unknown."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from skthermo.datasets import make_truss
+from skthermo.fem import AffineModel, CallableModel
+from skthermo.updating import ModelUpdater
+from skthermo.updating._ensemble import groups_beside
+from tests.fem.frames import portal
+
+TRUSS = make_truss()
+NAMES = TRUSS.parameter_names
+TRUTH = np.array([0.9, 1.1, 0.95, 1.05])
+MEASURED = TRUSS.frequencies([TRUTH])[0]
+ONE = np.ones((1, 4))
+EFFECTS = np.array([[3.0, 1.0, 0.5], [1.0, 4.0, 1.0]])  # of three parameters on two modes, in Hz
+LINEAR = CallableModel(lambda theta: theta @ EFFECTS.T, ["a", "b", "c"], 2, vectorized=True)
+
+
+def calibrated(model=TRUSS, noise=0.005, **options):
+    options = {"bounds": 0.7, "prior": 0.15} | options
+    return ModelUpdater(model, **options).fit(MEASURED, frequency_std=noise * MEASURED)
+
+
+def multipliers(models, model=TRUSS):
+    """Stiffness of each group, from the stiffness matrices."""
+    nominal = [change(model, group) for group in NAMES]
+    return np.array([[change(m, group) / there for group, there in zip(NAMES, nominal, strict=True)] for m in models])
+
+
+def change(model, group):
+    """Trace of the stiffness that half of a group adds."""
+    whole, half = (m.matrices(np.ones(len(m.parameter_names)))[0] for m in (model, model.damaged({group: 0.5})))
+    return (whole - half).trace()
+
+
+def test_draws_of_a_linear_model_have_the_posterior_mean_and_covariance():
+    F, std, prior, n = np.array([4.6, 6.3]), np.array([0.05, 0.08]), np.array([0.1, 0.05, 0.15]), 400
+    updater = ModelUpdater(LINEAR, bounds=0.9, prior=prior).fit(F, frequency_std=std)
+    models = updater.sample_models(n, random_state=0)
+    columns = [(m.frequencies(np.ones((3, 3)) + np.eye(3)) - m.frequencies(np.ones((1, 3)))) for m in models]
+    theta = np.array([(rows[:, 0] / EFFECTS[0]) for rows in columns])
+    covariance = np.linalg.inv(EFFECTS.T @ np.diag(std**-2) @ EFFECTS + np.diag(prior**-2))
+    mean = 1 + covariance @ EFFECTS.T @ ((F - EFFECTS.sum(axis=1)) / std**2)
+    deviations = np.sqrt(np.diag(covariance))
+    assert np.abs((theta.mean(axis=0) - mean) / deviations * np.sqrt(n)).max() < 3.5
+    errors = np.cov(theta.T) / np.outer(deviations, deviations) - covariance / np.outer(deviations, deviations)
+    assert np.abs(errors).max() < 3.5 * np.sqrt(2 / n)
+    np.testing.assert_allclose(updater.theta_, mean, rtol=1e-6)
+
+
+def test_moments_on_the_truss_agree_with_importance_sampling():
+    updater = calibrated(noise=0.002)
+    drawn = multipliers(updater.sample_models(200, random_state=0))
+    random, n = np.random.default_rng(1), 20000
+    wide = 1.5**2 * updater.covariance_
+    theta = random.multivariate_normal(updater.theta_, wide, n)
+    inside = (np.abs(theta - 1) < 0.7).all(axis=1)
+    theta = theta[inside]
+    from_optimum = theta - updater.theta_
+    proposal = -0.5 * np.einsum("ni,ij,nj->n", from_optimum, np.linalg.inv(wide), from_optimum)
+    misfit = ((TRUSS.frequencies(theta) / MEASURED - 1) / 0.002) ** 2
+    target = -0.5 * (misfit.sum(axis=1) + (((theta - 1) / 0.15) ** 2).sum(axis=1))
+    weights = np.exp(target - proposal - (target - proposal).max())
+    weights /= weights.sum()
+    effective = 1 / (weights**2).sum()
+    mean = weights @ theta
+    deviations = np.sqrt(weights @ (theta - mean) ** 2)
+    print(f"{n} weighted draws, {effective:.0f} effective; means {mean.round(4)}, deviations {deviations.round(4)}")
+    print(f"models drawn: means {drawn.mean(axis=0).round(4)}, deviations {drawn.std(axis=0).round(4)}")
+    assert effective > 2000
+    assert np.abs((drawn.mean(axis=0) - mean) / deviations).max() < 0.25
+    np.testing.assert_allclose(drawn.std(axis=0) / deviations, 1, atol=0.15)
+
+
+def test_what_frequencies_do_not_determine_stays_as_wide_as_the_prior_and_the_rest_as_measured():
+    models = calibrated(noise=0.005).sample_models(150, random_state=0)
+    scatter = multipliers(models).std(axis=0)
+    assert scatter[NAMES.index("vertical")] == pytest.approx(0.15, rel=0.17)
+    assert scatter[NAMES.index("diagonal")] < 0.02
+    six = np.array([m.frequencies(ONE)[0] / MEASURED for m in models])
+    assert (six.std(axis=0) < 1.15 * 0.005).all()
+    assert six.std(axis=0).mean() > 0.5 * 0.005
+
+
+def test_stiffness_is_drawn_alike_whether_a_parameter_or_a_damage_group_scales_it():
+    models = calibrated().sample_models(5, spread=0.15, random_state=0)
+    others = calibrated(TRUSS.with_parameters(["bottom", "top"])).sample_models(5, spread=0.15, random_state=0)
+    np.testing.assert_allclose(multipliers(models), multipliers(others), rtol=1e-3)
+    alone = calibrated(TRUSS.with_parameters(["bottom", "top"])).sample_models(5, groups=[], random_state=0)
+    np.testing.assert_allclose(multipliers(alone)[:, 2:], 1)
+    one = calibrated(TRUSS.with_parameters(["bottom"])).sample_models(5, groups=["diagonal", "bottom"], random_state=0)
+    assert (multipliers(one).std(axis=0) > 1e-4).tolist() == [True, False, True, False]
+    damaged = [m.damaged({"vertical": 0.5}).frequencies([[1, 1]]) for m in others]
+    np.testing.assert_allclose(damaged, [m.damaged({"vertical": 0.5}).frequencies(ONE) for m in models], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [TRUSS, TRUSS.reduced(0.7, random_state=0), TRUSS.with_parameters(["top"]).reduced(0.7, random_state=0)],
+    ids=["full", "reduced", "reduced, one parameter"],
+)
+def test_drawn_models_are_like_the_calibrated_one(model):
+    models = calibrated(model).sample_models(3, random_state=0)
+    full = calibrated(TRUSS.with_parameters(model.parameter_names)).sample_models(3, random_state=0)
+    for drawn, same in zip(models, full, strict=True):
+        assert type(drawn) is type(model)
+        assert drawn.parameter_names == model.parameter_names
+        assert drawn.groups == model.groups
+        assert drawn.track == model.track
+        one = np.ones((1, len(model.parameter_names)))
+        np.testing.assert_allclose(drawn.frequencies(one), same.frequencies(one), rtol=2e-5)
+
+
+def test_models_that_follow_their_modes_do_so_when_they_are_drawn():
+    model = portal(2, track=True).with_modes([0, 1, 3, 2, 4, 5])
+    assert groups_beside(model, None) == ["beams"]  # whose torsion no parameter scales
+    assert groups_beside(model, ["columns", "soil"]) == []
+    truth = [1.0, 1.0, 1.0, 1.02]
+    F = model.frequencies([truth])[0]
+    updater = ModelUpdater(model, bounds=0.7, prior=0.15).fit(F, frequency_std=0.01 * F)
+    for drawn in updater.sample_models(3, random_state=0):
+        assert drawn.track
+        np.testing.assert_allclose(drawn.frequencies(ONE)[0], F, rtol=0.05)
+
+
+def test_a_warning_counts_models_in_which_sorted_modes_swap_places():
+    sorted_ = AffineModel({("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 1.1])}, np.eye(2), n_modes=2)
+    F = sorted_.frequencies([[1.0, 1.0]])[0]
+    updater = ModelUpdater(sorted_, bounds=0.7, prior=0.15).fit(F, frequency_std=0.05 * F)
+    with pytest.warns(UserWarning, match=r"modes swap places in \d+ of 30 drawn models"):
+        updater.sample_models(30, random_state=0)
+
+
+def test_same_seed_same_models_whatever_the_number_of_jobs():
+    found = [
+        [m.frequencies(ONE) for m in calibrated(n_jobs=n_jobs).sample_models(4, random_state=seed)]
+        for n_jobs, seed in ((None, 0), (2, 0), (None, 1))
+    ]
+    np.testing.assert_array_equal(found[0], found[1])
+    assert not np.allclose(found[0], found[2], rtol=1e-4)
+
+
+def test_shapes_make_models_alike_as_far_as_their_noise_allows():
+    dofs, noise = np.arange(0, 22, 2), 0.01
+    frequencies, shapes = (values[0] for values in TRUSS.modes([TRUTH]))
+    weight = np.sqrt(2 * (len(dofs) - 1)) / noise**2
+    updater = ModelUpdater(TRUSS, bounds=0.9, prior=0.15, shape_weight=weight)
+    updater.fit(frequencies, shapes=shapes[dofs], dofs=dofs, frequency_std=0.005 * frequencies)
+    scatter = multipliers(updater.sample_models(100, random_state=0)).std(axis=0)
+    np.testing.assert_allclose(scatter / np.sqrt(np.diag(updater.covariance_)), 1, atol=0.25)
+    assert scatter[NAMES.index("vertical")] < 0.05
+
+
+def test_each_warning_counts_the_models():
+    with pytest.warns(UserWarning, match=r"lie at the bounds of 'vertical' \(\d+ of 40\), and are less different"):
+        calibrated(bounds={"bottom": 0.7, "top": 0.7, "diagonal": 0.7, "vertical": 0.1}).sample_models(
+            40, random_state=0
+        )
+    with pytest.warns(UserWarning, match="optimum"):
+        hasty = calibrated(max_iter=1)
+    with pytest.warns(UserWarning, match="has not converged for 5 of 5 drawn models"):
+        hasty.sample_models(5, random_state=0)
+    narrow = TRUSS.reduced(0.1, random_state=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        updater = calibrated(narrow)
+    with pytest.warns(UserWarning, match=r"\d+ of 6 theta are outside the bounds for which the model was reduced"):
+        updater.sample_models(6, random_state=0)
+
+
+def test_errors_say_what_is_expected():
+    with pytest.raises(ValueError, match="fit was called without frequency_std"):
+        ModelUpdater(TRUSS).fit(MEASURED).sample_models(2)
+    updater = calibrated()
+    with pytest.raises(ValueError, match="n is 0; expected a positive number"):
+        updater.sample_models(0)
+    with pytest.raises(ValueError, match="spread is 15; expected a relative standard deviation"):
+        updater.sample_models(2, spread=15)
+    with pytest.raises(ValueError, match="unknown damage groups"):
+        updater.sample_models(2, groups=["deck"])
