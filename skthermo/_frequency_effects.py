@@ -32,7 +32,7 @@ class FrequencyEffects:
     @classmethod
     def of(cls, fem: Any, theta: Array, F: Array, changes: Changes) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
-        is_slow = fem.simulator_.reduced is None and getattr(fem.model, "prefer", "processes") == "processes"
+        is_slow = fem.simulator_.reduced is not None or getattr(fem.model, "prefer", "processes") == "processes"
         present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
         rows = np.flatnonzero(present.any(axis=1))
         most = MOST_SLOW_ROWS if is_slow else MOST_ROWS

@@ -9,7 +9,12 @@ from skthermo.reporting._figures import draw_identified_damage
 from skthermo.reporting._html import Html, bar, bullets, element, figure, paragraphs, section, table
 
 LEAST = 0.005  # probability from which on an explanation has a row
-UNITS = {"damage": "loss of stiffness", "stiffening": "gain of stiffness", "parameter": "change", "mass": "added mass"}
+UNITS = {
+    "damage": "loss of stiffness",
+    "stiffening": "gain of stiffness",
+    "parameter": "change",
+    "mass": "added, as a share of the given mass",
+}
 """What the amounts of a cause are, by its kind."""
 
 
@@ -69,16 +74,14 @@ def _row(cause: str, row: Any, is_unseen: bool) -> list[Any]:
     if is_unseen:
         return [cause, "cannot be seen", UNITS[row["kind"]], "not known", "", ""]
     amounts = row[["severity", "lowest", "highest", "highest_if_damaged"]].astype(float)
-    if row["kind"] == "stiffening":
-        amounts = amounts.abs()
-    lowest, highest = sorted(amounts[["lowest", "highest"]])
+    lowest, highest = sorted(amounts[["lowest", "highest"]].abs())
     return [
         cause,
         chance_text(row["probability"]),
         UNITS[row["kind"]],
-        share_text(amounts["severity"]),
+        share_text(abs(amounts["severity"])),
         bounds_text(lowest, highest),
-        share_text(amounts["highest_if_damaged"]),
+        share_text(abs(amounts["highest_if_damaged"])),
     ]
 
 

@@ -153,15 +153,34 @@ def test_where_no_damage_explains_the_shifts_likely_causes_are_named(measured, c
     assert cause in dict(found.warnings())["unexplained shifts"]
 
 
-def test_strengthening_that_was_sought_is_said_as_a_gain_and_not_named_as_a_cause():
-    names = {"deck stiffened": "stiffening"}
-    gained = {"deck stiffened": (0.97, {"deck stiffened": (-0.08, 0.012)}), "something else": (0.03, {})}
-    (first, *_) = said(identified(gained, kinds=names))
-    assert first == (
-        "Most probable: a gain of 8 % of stiffness in deck stiffened (between 6 and 10 %), probability 97 %."
-    )
+@pytest.mark.parametrize(
+    ("cause", "kind", "amount", "text"),
+    [
+        ("deck stiffer", "stiffening", -0.08, "a gain of 8 % of stiffness in deck (between 6 and 10 %)"),
+        ("E lower", "parameter", -0.08, "a fall of 8 % in E (between 6 and 10 %)"),
+        ("E higher", "parameter", 0.08, "a rise of 8 % in E (between 6 and 10 %)"),
+        ("ballast", "mass", 0.8, "added mass of 80 % of ballast (between 78 and 82 %)"),
+    ],
+)
+def test_other_causes_than_damage_are_said_by_what_they_change(cause, kind, amount, text):
+    only = {cause: (0.97, {cause: (amount, 0.012)}), "something else": (0.03, {})}
+    (first, *_) = said(identified(only, kinds={cause: kind}))
+    assert first == f"Most probable: {text}, probability 97 %."
+
+
+def test_strengthening_that_was_sought_is_not_named_as_a_cause():
+    names = {"deck stiffer": "stiffening"}
     sought = identified(ELSE, groups=["deck", *names], kinds=names, shifts=shifts([0.02, -0.001, 0.012, 0.0]))
     assert "strengthening" not in sought.summary()
+
+
+def test_three_causes_are_listed():
+    three = {"a": (0.1, 0.006), "b": (0.05, 0.006), "c": (0.03, 0.006)}
+    (first, *_) = said(identified({"a + b + c + something else": (0.95, three), "no damage": (0.05, {})}))
+    assert first == (
+        "Most probable: a loss of 10.0 % of stiffness in a (between 9.0 and 11.0 %), of 5.0 % in b (between 4.0 and "
+        "6.0 %), of 3.0 % in c (between 2.0 and 4.0 %) and something else, probability 95 %."
+    )
 
 
 def test_what_the_most_probable_explanation_leaves_is_told():

@@ -19,6 +19,7 @@ from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.surrogate.chain._fit_report import mode_warnings
+from skthermo.updating import ModelUpdater
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
@@ -312,3 +313,26 @@ class TestReduced:
             fem = DataInformedFEM(z24, **parts, mapper=TemperatureMapper(Ridge()), random_state=0).fit(air, measured)
         with pytest.warns(UserWarning, match=r"2001 rows are solved by the full model .*reduce=True"):
             fem.simulator_._hint(2001)
+
+
+def aligned(model, n=365, factor=1.0):
+    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
+    inverse = InverseSurrogate(model, quadratic, bounds=0.2, n_samples=200, noise=0.01)
+    parts = {"inverse": inverse, "mapper": TemperatureMapper(), "aligner": BiasAligner(model, method="scale")}
+    return DataInformedFEM(model, random_state=0, **parts).fit(T[:n], factor * F[:n])
+
+
+def test_offsets_that_an_aligner_hides_are_named_unless_weather_or_a_common_factor_explains_them():
+    wrong = TRUSS.rescaled([0.95, 1.0, 1.05, 1.0])
+    with pytest.warns(UserWarning, match=r"aligner hides offsets .*\('f1' \+1.\d %, .*\(ModelUpdater\)") as given:
+        fem = aligned(wrong)
+    assert len([w for w in given if "hides" in str(w.message)]) == 1
+    assert fem.report_.has_hidden_offsets
+    assert "The aligner hides offsets" in repr(fem.report_)
+    np.testing.assert_allclose(fem.report_.hidden_offsets, fem.report_.offsets, atol=1e-9)
+    calibrated = ModelUpdater(wrong, bounds=0.5, prior=0.3).fit(F, frequency_std=0.005 * F.mean()).model_
+    assert not aligned(calibrated).report_.has_hidden_offsets
+    right, alike = aligned(TRUSS).report_, aligned(TRUSS, factor=1.03).report_
+    assert not right.has_hidden_offsets
+    assert alike.unexplained_offset == pytest.approx(right.unexplained_offset, rel=0.02)
+    assert not aligned(TRUSS, n=60).report_.has_hidden_offsets  # of a winter

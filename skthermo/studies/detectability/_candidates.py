@@ -38,6 +38,16 @@ class Candidate:
         return None if offset is None else -float(np.squeeze(offset))
 
     @property
+    def memory(self) -> int:
+        """Number of records, up to the one that is judged, on which a decision depends: those of the longest window."""
+        parts, longest = [self.detector], 1
+        while parts:
+            part = parts.pop()
+            longest = max(longest, getattr(part, "width_", 1))
+            parts += [step for _, step in getattr(part, "steps", ())] + list(getattr(part, "detectors_", ()))
+        return longest
+
+    @property
     def arrangement(self) -> Arrangement:
         """What is measured and learned."""
         columns = [self.view.names[i] for i in self.view.positions]

@@ -73,10 +73,12 @@ class JudgedRecords:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Decisions of each repeat by detector, scenario and source; those on healthy records with noise of other seeds by
-    detector and source; damage indices of the first repeat; errors of the detectors that failed."""
+    """Decisions of each repeat by detector, scenario and source; those on records that are damaged after some onsets
+    only, of detectors with windows; those on healthy records with noise of other seeds by detector and source; damage
+    indices of the first repeat; errors of the detectors that failed."""
 
     decisions: dict[Key, list[Array]] = field(default_factory=dict)
+    transitions: dict[Key, list[Array]] = field(default_factory=dict)
     calibration: dict[Key, list[Array]] = field(default_factory=dict)
     indices: dict[Key, pd.Series] = field(default_factory=dict)
     errors: dict[str, Exception] = field(default_factory=dict)
@@ -96,7 +98,8 @@ class Judgement:
 
     def extend(self, later: "Judgement") -> None:
         """Add the decisions of a later repeat, and the errors of detectors that failed there."""
-        for mine, added in ((self.decisions, later.decisions), (self.calibration, later.calibration)):
+        for name in ("decisions", "transitions", "calibration"):
+            mine, added = getattr(self, name), getattr(later, name)
             for key, decisions in added.items():
                 if key in mine:
                     mine[key].extend(decisions)

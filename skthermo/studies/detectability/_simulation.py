@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
+from skthermo.studies.detectability._waits import damaged_rows, transitions_of
 from skthermo.studies.scenarios import BaseScenario
 
 LARGEST_SEED = np.iinfo(np.int32).max
@@ -24,13 +26,25 @@ LARGEST_SEED = np.iinfo(np.int32).max
 @dataclass(frozen=True, eq=False)
 class Records:
     """Records of a scenario from one source: simulated frequencies of all modes at the temperatures T, or others, which
-    may have temperatures of their own; ``rows`` are those whose times they have."""
+    may have temperatures of their own; ``rows`` are those whose times they have. ``healthy`` are simulated frequencies
+    of the healthy structure with the same noise."""
 
     scenario: BaseScenario
     source: str
     values: Any
     T: Any
     rows: Any
+    healthy: Array | None = None
+
+    @property
+    def has_onsets(self) -> bool:
+        """Whether damage that is there from the beginning may be thought to begin at any record."""
+        return self.source == SIMULATED and not self.scenario.is_healthy and self.scenario.onset is None
+
+    def beginning(self, memory: int) -> "Records":
+        """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
+        damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
+        return replace(self, values=np.where(damaged, self.values, self.healthy))
 
     def seen_by(self, candidate: Candidate) -> Any:
         """The columns that a detector sees."""
@@ -108,7 +122,8 @@ class Simulation:
         noise, T = self.measurement.of(self.fem, self.T, int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * (1 + noise), T, self.T)
+            values, healthy = draws[repeat % len(draws)] * (1 + noise), self._healthy * (1 + noise)
+            yield Records(scenario, SIMULATED, values, T, self.T, healthy)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 shape = as_columns(values).shape
@@ -119,17 +134,30 @@ class Simulation:
                     )
                 yield Records(scenario, REFERENCE, values, self.T, self.T)
 
+    @cached_property
+    def _healthy(self) -> Array:
+        """Frequencies of the healthy structure before noise."""
+        names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
+        with without_warnings():
+            return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
+
     def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
         """Add the decisions of every detector and, if asked, its damage indices."""
 
-        def judged(name: str) -> tuple[Any, Array]:
+        def judged(name: str) -> tuple[Any, Array, Array | None]:
             candidate = self.candidates[name]
-            seen = records.seen_by(candidate)
-            return candidate.damage_index(seen, records.rows) if with_indices else None, candidate.decisions(seen)
+            seen, memory, during = records.seen_by(candidate), candidate.memory, None
+            if memory > 1 and records.has_onsets:
+                with without_warnings():
+                    during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
+            index = candidate.damage_index(seen, records.rows) if with_indices else None
+            return index, candidate.decisions(seen), during
 
-        for name, (index, decisions) in judgement.ask(self.candidates, judged).items():
+        for name, (index, decisions, during) in judgement.ask(self.candidates, judged).items():
             key = name, records.scenario.name, records.source
             judgement.decisions[key] = [decisions]
+            if during is not None:
+                judgement.transitions[key] = [during]
             if with_indices:
                 judgement.indices[key] = index
 

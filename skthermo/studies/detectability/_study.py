@@ -29,6 +29,7 @@ from skthermo.studies.detectability._simulation import (
     Simulation,
     clean_frequencies,
 )
+from skthermo.studies.detectability._waits import waits_table
 from skthermo.studies.detectability._world_rates import WorldRates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.worlds import Worlds
@@ -86,6 +87,9 @@ class DetectabilityStudy(BaseEstimator):
         Threshold less damage index in every repeat, by detector, scenario and source: negative is an alarm, and NaN is
         not judged. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and a
         year of hours 155 MB.
+    transitions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_onsets, n_window)
+        Such decisions of detectors with windows, such as `~skthermo.detection.WindowedAlarm`, after onsets of damage
+        with two windows from one to the next, while a window still holds healthy records; for `time_to_find`.
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is judged by them. Measured records have none.
@@ -245,7 +249,7 @@ class DetectabilityStudy(BaseEstimator):
         scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, int(seeds[0, 0]))
+        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, seeds[0])
         T = worlds.years[0]
         judgement, stages = Judgement(), Stages(self, 4 + bool(worlds.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
@@ -280,6 +284,7 @@ class DetectabilityStudy(BaseEstimator):
         records = [one for name in rows for one in judgement.records(name, scenarios)]
         self.indices_ = {(one.detector, one.scenario.name, one.source): one.damage_index for one in records}
         self.decisions_ = {(one.detector, one.scenario.name, one.source): one.decisions for one in records}
+        self.transitions_ = {key: np.array(found) for key, found in judgement.transitions.items() if key[0] in rows}
         self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
         table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
         columns = list(next(iter(rows.values()))[0])
@@ -380,6 +385,111 @@ class DetectabilityStudy(BaseEstimator):
             return table
         bands = [self.worlds_.smallest(one, level, method, self.confidence_) for one in families.values()]
         return table.assign(**dict(zip(["band_lowest", "band_highest"], np.transpose(bands), strict=True)))
+
+    def time_to_find(
+        self,
+        within: Sequence[str | int] | None = None,
+        level: float = 0.95,
+        *,
+        source: str = "data-informed",
+        confidence: float | None = None,
+        detector: str | None = None,
+    ) -> pd.DataFrame:
+        """How soon damage is found: the chance to find it within some times, and the time within which it is found.
+
+        Damage may begin at any time of the records, so that each season counts with its own weather: all onsets count
+        alike, and after the last record comes the first one again. The damage of a scenario with an onset of its own
+        begins there. It is found with the first alarm.
+
+        Parameters
+        ----------
+        within : sequence of str or int, optional
+            Times such as "7D", or numbers of records where the weather has no ``DatetimeIndex``. By default a day, a
+            week and 30 days, or 1, 7 and 30 records.
+        level : float, default=0.95
+            Share of the cases in which damage is found reliably.
+        source : str, default="data-informed"
+            "data-informed" or "reference".
+        confidence : float, optional
+            Of the bounds, two-sided; by default that of the study.
+        detector : str, optional
+            Name of one of several detectors; by default all.
+
+        Returns
+        -------
+        DataFrame
+            One row for each detector and scenario:
+
+            - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
+            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D lowest`` and
+              ``7D highest``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
+              within the same time, which would have come without damage, too (NaN without a healthy scenario). NaN
+              where the time is shorter than that between two records, or longer than all of them;
+            - ``median``: time within which half of the cases are found;
+            - ``reliable``: the same for the share ``level``, and ``reliable highest``: time from which the lower
+              bound of the probability is as high. NaT (NaN) where that takes longer than the records;
+            - ``not_judged``: share of the time without a record that is judged, which delays what is found.
+
+            Times are counted in the usual time between records, from the one before the onset on. They are numbers of
+            records where there are no stamps.
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If a time is none, the level is not between 0 and 1, or there is no such source or detector.
+
+        Notes
+        -----
+        A probability is the share of onsets in all repeats. Those next to each other wait for the same alarm: bounds
+        allow for this dependence as those of rates do. They hold the noise alone, as all of the study's.
+
+        An alarm within the time may be a false one: compare the two probabilities. With a probability h of the
+        healthy structure, damage that changes nothing is "found" in the share h of the cases.
+
+        Windows that begin before the damage and end in it are judged as such, at the onsets of ``transitions_``, which
+        are fewer.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.detection import MahalanobisDetector
+        >>> from skthermo.studies import DetectabilityStudy, sweep
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
+        >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
+        >>> results = study.run(weather)
+        >>> waits = study.time_to_find(["1D", "7D"]).set_index("scenario")
+        >>> waits[["1D", "7D", "7D lowest", "7D highest", "7D healthy"]].round(2)
+                       1D    7D  7D lowest  7D highest  7D healthy
+        scenario
+        healthy      0.02  0.11       0.07        0.15        0.11
+        bottom 10 %  0.23  0.82       0.77        0.86        0.11
+        bottom 20 %  0.91  1.00       1.00        1.00        0.11
+        >>> waits[["median", "reliable"]]
+                     median reliable
+        scenario
+        healthy     42 days 151 days
+        bottom 10 %  3 days  13 days
+        bottom 20 %  1 days   2 days
+        """
+        results = self._results()
+        check_probability(level, "level")
+        asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
+        known = results["source"].dropna().unique().tolist()
+        if source not in known:
+            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
+        chosen = None if detector is None else self.detector_name(detector)
+        scenarios = {one.name: one for one in self.scenarios_}
+        records = {
+            key: JudgedRecords(key[0], scenarios[key[1]], source, self.indices_[key], decisions)
+            for key, decisions in self.decisions_.items()
+            if key[2] == source and chosen in (None, key[0])
+        }
+        return waits_table(records, self.transitions_, within, level, asked)
 
     def is_undetected(self, family: str, source: str = "data-informed", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.

@@ -21,7 +21,7 @@ from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
 from skthermo.studies.worlds import Worlds
 
-N_DRAWS = 4  # draws of the noise in each world, which tell its share from that of what else varies
+N_DRAWS = 3  # draws of the noise in each world, which tell its share from that of what else varies
 MOST_FAILURES = 0.5  # share of worlds that may fail
 
 
@@ -39,6 +39,7 @@ class WorldRates:
     @classmethod
     def of(cls, simulation: Simulation, worlds: Worlds, n_jobs: int | None, verbose: int = 0) -> "WorldRates":
         """Judge the records of every world; those that fail are counted in a warning, unless most fail."""
+        simulation = replace(simulation, clean={}, reference=None)
         jobs = (delayed(_rates_of_world)(simulation, worlds, number) for number in range(len(worlds.seeds)))
         with without_warnings():
             outcomes = Parallel(n_jobs=n_jobs, verbose=verbose)(jobs)
@@ -162,7 +163,7 @@ def _rates_of_world(simulation: Simulation, worlds: Worlds, number: int) -> Any:
 def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms, (n_draws,), and the mean number of judged records, by detector and scenario."""
     clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first)
-    drawn = replace(simulation, fem=chain, T=T, clean=clean, reference=None)
+    drawn = replace(simulation, fem=chain, T=T, clean=clean)
     judgement = Judgement()
     for number, pair in enumerate(seeds):
         one = Judgement(errors=judgement.errors)

@@ -5,7 +5,7 @@ from scipy.special import log_ndtr, ndtri_exp
 
 from skthermo._arrays import Array
 
-N_NODES = 24  # quadrature nodes in each dimension but the last
+N_NODES = 12  # quadrature nodes in each dimension but the last
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(N_NODES)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 OVERSAMPLED = 4  # candidates for each draw
@@ -28,6 +28,12 @@ def log_probability(mean: Array, covariance: Array, lowest: Array, highest: Arra
     return largest + np.log((weights * np.exp(logs - largest[..., np.newaxis])).sum(axis=-1))
 
 
+def log_marginal(mean: Array, covariance: Array, lowest: Array, highest: Array) -> Array:
+    """Logarithm of the smallest probability of a single variable to be within its bounds, (...,)."""
+    scale = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    return _log_between((lowest - mean) / scale, (highest - mean) / scale)[0].min(axis=-1, initial=0.0)
+
+
 def draws(
     mean: Array, covariance: Array, lowest: Array, highest: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
@@ -48,10 +54,7 @@ def _sequence(mean: Array, covariance: Array, lowest: Array, highest: Array, sha
         )
         scale = factor[..., i, i, np.newaxis]
         lower, upper = (lowest[..., i, np.newaxis] - shift) / scale, (highest[..., i, np.newaxis] - shift) / scale
-        flipped = lower > 0  # the lower tail is the one with accurate logarithms
-        lower, upper = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
-        below, above = log_ndtr(lower), log_ndtr(upper)
-        inside = above + np.log(-np.expm1(np.minimum(below - above, -1e-300)))
+        inside, below, lower, upper, flipped = _log_between(lower, upper)
         total = total + inside
         if i < len(shares):
             share = np.where(flipped, 1 - shares[i], shares[i])
@@ -63,3 +66,11 @@ def _sequence(mean: Array, covariance: Array, lowest: Array, highest: Array, sha
     standard = np.stack(known, axis=-2)
     n = standard.shape[-2]
     return mean[..., :n, np.newaxis] + factor[..., :n, :n] @ standard, total
+
+
+def _log_between(lower: Array, upper: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Logarithm of a standard normal probability, by the lower tail, with the bounds there and what was turned."""
+    flipped = lower > 0  # the lower tail is the one with accurate logarithms
+    lower, upper = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
+    below, above = log_ndtr(lower), log_ndtr(upper)
+    return above + np.log(-np.expm1(np.minimum(below - above, -1e-300))), below, lower, upper, flipped

@@ -18,14 +18,12 @@ FARTHEST = 0.3  # amount up to which effects are tabulated; beyond, they are com
 class Curves:
     """Effects of each cause at ``nodes`` (n_causes, n_nodes), in the coordinates of what was observed.
 
-    ``values``, ``slopes`` and ``errors``, those of the model, relative to its effects, have the shape (n_causes,
-    n_nodes, n_observed).
+    ``values`` and ``slopes`` have the shape (n_causes, n_nodes, n_observed).
     """
 
     nodes: Array
     values: Array
     slopes: Array
-    errors: Array
 
     @classmethod
     def of(cls, effects: Effects, causes: list[Cause], observed: Observed) -> Curves:
@@ -34,14 +32,12 @@ class Curves:
         sets = (nodes[:, :, np.newaxis] * np.eye(len(causes))[:, np.newaxis]).reshape(-1, len(causes))
         values, slopes = (found.reshape(*nodes.shape, *found.shape[1:]) for found in effects(sets))
         own = np.stack([slopes[column, :, :, column] for column in range(len(causes))])
-        rotated = values @ observed.rotation.T
-        errors = np.sqrt(values**2 @ (observed.rotation**2).T)
-        return cls(nodes, rotated, own @ observed.rotation.T, errors)
+        return cls(nodes, values @ observed.rotation.T, own @ observed.rotation.T)
 
-    def at(self, sets: Array, amounts: Array) -> tuple[Array, Array, Array]:
-        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), derivatives, and variances of the model."""
+    def at(self, sets: Array, amounts: Array) -> tuple[Array, Array]:
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), and their derivatives."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
-        change, variance, slopes = np.zeros(shape), np.zeros(shape), []
+        change, slopes = np.zeros(shape), []
         for i in range(sets.shape[-1]):
             column, amount = sets[:, i, np.newaxis], amounts[..., i]
             nodes = self.nodes[sets[:, i]]
@@ -67,9 +63,7 @@ class Curves:
                 + (3 * t**2 - 2 * t) * tangents[1]
             )
             slopes.append(slope / width)
-            errors = self.errors[column, left], self.errors[column, left + 1]
-            variance += (errors[0] + share * (errors[1] - errors[0])) ** 2
-        return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0)), variance
+        return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0))
 
 
 def _nodes(lowest: float, highest: float) -> tuple[float, float, float]:

@@ -10,12 +10,13 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._boxes import log_probability
+from skthermo.studies.identification._boxes import log_marginal, log_probability
 
-ELSE_SIZES = np.geomspace(2e-4, 0.1, 10)  # relative shifts by which something else may move the modes
+ELSE_SIZES = 0.0005 * 2.0 ** np.arange(7)  # relative shifts by which something else may move the modes
+COMMON_SHARE = 0.3  # share of the mean square of all shifts in the error of the model's effect on one of them
 FARTHEST = 1e-6  # probability of scales of Student's law beyond the smallest one that counts
 WIDTHS = 1.5  # standard deviations of the posterior of ln scale between two of them
-NEGLIGIBLE = 25.0  # difference of a logarithm of a probability below which a term adds nothing
+NEGLIGIBLE = 18.0  # difference of a logarithm of a probability below which a term adds nothing
 SWEEPS = 25  # steps of a search along each amount in turn
 
 
@@ -36,11 +37,15 @@ class Observed:
     log_scales: Array
 
     @classmethod
-    def of(cls, parts: list[tuple[Array, Array, float]]) -> Observed:
-        """Of parts with measured shifts, their covariance, and the freedom of their errors."""
+    def of(cls, parts: list[tuple[Array, Array, float]], model_error: float = 0.0) -> Observed:
+        """Of parts with measured shifts, their covariance, and the freedom of their errors.
+
+        The model is wrong by a share of what it explains, which is about what was measured.
+        """
         rotations, variances = [], []
-        for _, covariance, _ in parts:
-            values, vectors = np.linalg.eigh(covariance)
+        for measured, covariance, _ in parts:
+            squares = (1 - COMMON_SHARE) * measured**2 + COMMON_SHARE * (measured**2).mean()
+            values, vectors = np.linalg.eigh(covariance + model_error**2 * np.diag(squares))
             rotations.append((vectors / np.sqrt(values)).T)
             variances.append(1 / values)
         is_scaled = np.concatenate([np.full(len(part[0]), np.isfinite(part[2])) for part in parts])
@@ -132,9 +137,15 @@ def weighed(
     logs = observed.log_scales - (np.log(2 * np.pi * spread) + target[:, :, np.newaxis] ** 2 / spread).sum(axis=-1) / 2
     logs = logs + ((right * means).sum(axis=-1) - np.linalg.slogdet(inner)[1]) / 2
     logs = logs + (np.log(law.precisions).sum(axis=-1) / 2 - law.log_inside())[:, np.newaxis, np.newaxis]
+    # the probability of the bounds only lowers them, and is at most that of any one of them
     most = logs + log_prior[..., np.newaxis]
-    where = np.nonzero(most > most.max() - NEGLIGIBLE)  # the probability of the bounds only lowers them
-    inside = log_probability(means[where], covariances[where], law.lowest[where[0]], law.highest[where[0]])
+    where = np.nonzero(most > most.max() - NEGLIGIBLE)
+    lowest, highest = law.lowest[where[0]], law.highest[where[0]]
+    one = log_marginal(means[where], covariances[where], lowest, highest)
+    most[where] += one
+    kept = most[where] > most[where].max() - NEGLIGIBLE
+    where = tuple(place[kept] for place in where)
+    inside = log_probability(means[where], covariances[where], lowest[kept], highest[kept])
     log_evidence = np.full(logs.shape, -np.inf)
     log_evidence[where] = logs[where] + inside
     return Weighed(log_evidence, means, covariances)

@@ -27,7 +27,7 @@ MOST_SETS = 5000  # sets of as many causes that are all weighed; beyond it, only
 AT_ONCE = 400  # sets in memory
 N_PARENTS = 50  # smaller sets that are extended then
 STEPS = 8  # Gauss-Newton steps on tabulated effects
-EXACT_STEPS, SETTLED = 10, 1e-5  # on exact effects, and the change of an amount that ends them
+EXACT_STEPS, SETTLED = 10, 0.05  # on exact effects, and the change of an amount, in standard errors, that ends them
 MATTERS = 1e-3  # probability of an explanation from which on its effects are computed exactly
 
 Set = tuple[int, ...]
@@ -48,6 +48,20 @@ class Weight:
     best: Array
     change: Array
     variances: Array
+
+    def amounts(self, log_sizes: Array) -> Array:
+        """The most probable amounts with the most probable size of something else."""
+        return self.best[self._size(log_sizes)]
+
+    def is_as(self, other: Weight, log_sizes: Array) -> bool:
+        """Whether the amounts differ from others by much less than their standard errors."""
+        size = self._size(log_sizes)
+        variances = np.diagonal(self.covariances[size, self.log_evidence[size].argmax()], axis1=-2, axis2=-1)
+        change = self.amounts(log_sizes) - other.amounts(log_sizes)
+        return bool((np.abs(change) < SETTLED * np.sqrt(variances)).all())
+
+    def _size(self, log_sizes: Array) -> int:
+        return int((logsumexp(self.log_evidence, axis=-1) + log_sizes).argmax())
 
 
 @dataclass(frozen=True)
@@ -95,9 +109,10 @@ class Scale:
         """Weights of sets of causes (n_sets, k), by tabulated effects that may be corrected."""
         law, sizes = self.law(sets), np.append(0.0, ELSE_SIZES)
         amounts = np.zeros((len(sets), len(sizes), sets.shape[1]))
-        other = 1 + sizes[:, np.newaxis] ** 2 * self.observed.elsewhere
+        variances = 1 + sizes[:, np.newaxis] ** 2 * self.observed.elsewhere
+        variances = np.broadcast_to(variances, (len(sets), *variances.shape))
         for step in range(STEPS if sets.shape[1] else 1):
-            change, slopes, variances = self.curves.at(sets, amounts)
+            change, slopes = self.curves.at(sets, amounts)
             if corrections is not None:
                 centre, offset, slope = (
                     np.stack([getattr(one, name) for one in corrections])[:, np.newaxis]
@@ -105,7 +120,6 @@ class Scale:
                 )
                 change = change + offset + (slope @ (amounts - centre)[..., np.newaxis])[..., 0]
                 slopes = slopes + slope
-            variances = other + self.prior.model_error**2 * variances
             target = self.observed.measured - change + (slopes @ amounts[..., np.newaxis])[..., 0]
             if step < STEPS - 1:
                 amounts = most_probable(slopes, target, variances, law)
@@ -117,27 +131,19 @@ class Scale:
             )
         ]
 
-    def refined(self, weight: Weight, log_prior: float) -> Weight:
-        """The same set by its exact effects at its most probable amounts."""
-        sets = np.array([weight.causes], dtype=int)
-        before = None
-        for _ in range(EXACT_STEPS):
-            size = int((logsumexp(weight.log_evidence, axis=-1) + self.log_sizes).argmax())
-            amounts = weight.best[size]
-            if before is not None and np.abs(amounts - before).max(initial=0.0) < SETTLED:
-                break
-            before = amounts
-            full = np.zeros(len(self.causes))
-            full[list(weight.causes)] = amounts
-            change, slopes = self.effects(full)
-            tabulated, tangents, _ = self.curves.at(sets, amounts[np.newaxis, np.newaxis])
-            correction = Correction(
-                amounts,
-                self.observed.rotation @ change - tabulated[0, 0],
-                self.observed.rotation @ slopes[:, list(weight.causes)] - tangents[0, 0],
-            )
-            weight = self.weigh(sets, np.array([log_prior]), [correction])[0]
-        return weight
+    def exact(self, weights: Sequence[Weight]) -> list[Correction]:
+        """Exact less tabulated effects of sets of causes at their most probable amounts."""
+        full = np.zeros((len(weights), len(self.causes)))
+        for row, weight in zip(full, weights, strict=True):
+            row[list(weight.causes)] = weight.amounts(self.log_sizes)
+        changes, slopes = self.effects(full)
+        changes, slopes = changes @ self.observed.rotation.T, self.observed.rotation @ slopes
+        found = []
+        for row, change, slope, weight in zip(full, changes, slopes, weights, strict=True):
+            columns = list(weight.causes)
+            tabulated, tangents = self.curves.at(np.array([columns], dtype=int), row[columns][np.newaxis, np.newaxis])
+            found.append(Correction(row[columns], change - tabulated[0, 0], slope[:, columns] - tangents[0, 0]))
+        return found
 
     def needs_refinement(self, weight: Weight) -> bool:
         """Whether tabulated effects are not those of its most probable amounts."""
@@ -152,27 +158,37 @@ def weigh(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> lis
     return refine(scale, screen(scale, sets, log_priors), log_priors)
 
 
-def screen(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> list[Weight]:
-    """Weights of sets of causes by tabulated effects."""
+def screen(
+    scale: Scale, sets: Sequence[Set], log_priors: Sequence[float], corrections: Sequence[Correction] | None = None
+) -> list[Weight]:
+    """Weights of sets of causes by tabulated effects, which may be corrected."""
     found: list[Weight] = [None] * len(sets)  # type: ignore[list-item]
     for size in sorted({len(one) for one in sets}):
         places = [place for place, one in enumerate(sets) if len(one) == size]
         for first in range(0, len(places), AT_ONCE):
             some = places[first : first + AT_ONCE]
             columns = np.array([sets[place] for place in some], dtype=int).reshape(len(some), size)
-            for place, weight in zip(some, scale.weigh(columns, np.array([log_priors[p] for p in some])), strict=True):
+            corrected = None if corrections is None else [corrections[place] for place in some]
+            weights = scale.weigh(columns, np.array([log_priors[place] for place in some]), corrected)
+            for place, weight in zip(some, weights, strict=True):
                 found[place] = weight
     return found
 
 
 def refine(scale: Scale, found: list[Weight], log_priors: Sequence[float]) -> list[Weight]:
-    """The same weights, exact for the sets that matter."""
-    found = list(found)
-    logs = np.array([log_prior + total(scale, weight) for weight, log_prior in zip(found, log_priors, strict=True)])
-    probable = np.exp(logs - logsumexp(logs))
-    for place in np.flatnonzero(probable > MATTERS):
-        if scale.needs_refinement(found[place]):
-            found[place] = scale.refined(found[place], log_priors[place])
+    """The same weights, with exact effects of the sets that matter at their most probable amounts."""
+    found, settled = list(found), np.zeros(len(found), dtype=bool)
+    for _ in range(EXACT_STEPS):
+        logs = np.array([log_prior + total(scale, weight) for weight, log_prior in zip(found, log_priors, strict=True)])
+        matter = np.flatnonzero((logs - logsumexp(logs) > np.log(MATTERS)) & ~settled)
+        unsettled = [place for place in matter if scale.needs_refinement(found[place])]
+        if not unsettled:
+            break
+        before = [found[place] for place in unsettled]
+        priors = [log_priors[place] for place in unsettled]
+        after = screen(scale, [weight.causes for weight in before], priors, scale.exact(before))
+        for place, old, new in zip(unsettled, before, after, strict=True):
+            found[place], settled[place] = new, new.is_as(old, scale.log_sizes)
     return found
 
 

@@ -40,7 +40,9 @@ def findings(
     The comparisons are with the effects of the causes in the weather of the records and at the model's nominal state.
     """
     names, observed = [cause.name for cause in causes], comparison.observed()
-    factor, slopes, at_nominal = two_errors(shift.freedom), comparison.slopes(len(causes)), nominal.slopes(len(causes))
+    signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
+    slopes, at_nominal = (signs * each.slopes(len(causes)) for each in (comparison, nominal))
+    factor = two_errors(shift.freedom)
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)
     groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])

@@ -153,7 +153,7 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     random = as_random_state(random_state)
-    scale = Scale.of(every.observed(), every.effects, causes, prior)
+    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     posterior = Posterior.of(scale, *explanations(scale), random)
     found = findings(posterior, every, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())

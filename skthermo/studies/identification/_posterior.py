@@ -55,23 +55,16 @@ class Posterior:
     def of(cls, scale: Scale, weights: Sequence[Weight], log_priors: Array, random: np.random.RandomState) -> Posterior:
         """Of weighed sets of causes."""
         terms = [w.log_evidence + scale.log_sizes[:, np.newaxis] + p for w, p in zip(weights, log_priors, strict=True)]
-        everything = logsumexp(np.stack(terms))
-        names, found = [cause.name for cause in scale.causes], []
-        for weight, term in zip(weights, terms, strict=True):
+        totals = np.array([logsumexp(term) for term in terms])
+        everything, found = logsumexp(totals), []
+        holds = np.array([[cause in weight.causes for weight in weights] for cause in range(len(scale.causes))])
+        best_of_causes = set(np.where(holds, totals, -np.inf).argmax(axis=1).tolist())
+        for place, (weight, term) in enumerate(zip(weights, terms, strict=True)):
             for sizes, more in ((slice(0, 1), ()), (slice(1, None), (SOMETHING_ELSE,))):
                 logs = term[sizes] - everything
                 probability = float(np.exp(logsumexp(logs)))
-                if probability < KEPT:
-                    continue
-                law = scale.law(np.array([weight.causes], dtype=int))
-                drawn = _drawn(logs, weight.means[sizes], weight.covariances[sizes], law, probability, random)
-                size = int(logsumexp(logs, axis=-1).argmax()) + sizes.start
-                rest = scale.observed.measured - weight.change[size]
-                change = np.linalg.solve(scale.observed.rotation, weight.change[size])
-                causes = tuple(names[c] for c in weight.causes) + more
-                found.append(
-                    Explanation(causes, probability, drawn, change, float((rest**2 / weight.variances[size]).sum()))
-                )
+                if probability > KEPT or (place in best_of_causes and probability > 0):
+                    found.append(_explanation(scale, weight, logs, sizes, more, random))
         return cls(sorted(found, key=lambda one: -one.probability))
 
     @classmethod
@@ -140,10 +133,13 @@ class Posterior:
         inside, weight = np.concatenate([*values, np.zeros(0)]), np.concatenate([*weights, np.zeros(0)])
         everything = sum(one.probability for one in self.explanations)
         probability = weight.sum() / everything
-        present = _summary(inside, weight) if weight.sum() > 0 else {"severity": np.nan, "highest": np.nan}
+        present = (
+            _summary(inside, weight) if weight.sum() > 0 else dict.fromkeys(("severity", "lowest", "highest"), np.nan)
+        )
         all_values, all_weights = np.append(inside, 0.0), np.append(weight, max(everything - weight.sum(), 0.0))
         averages = _summary(all_values, all_weights)
-        extremes = {"if_damaged": present["severity"], "highest_if_damaged": present["highest"]}
+        farthest = present["lowest" if present["severity"] < 0 else "highest"]
+        extremes = {"if_damaged": present["severity"], "highest_if_damaged": farthest}
         return {"probability": probability, **averages, **extremes}
 
 
@@ -156,6 +152,19 @@ def _summary(values: Array, weights: Array) -> dict[str, float]:
     ends = [float(values[order][min(np.searchsorted(shares, share - 1e-12), len(values) - 1)]) for share in BAND]
     error = float(np.sqrt(max(weights @ (values - mean) ** 2, 0.0)))
     return {"severity": mean, "standard_error": error, "lowest": ends[0], "highest": ends[1]}
+
+
+def _explanation(
+    scale: Scale, weight: Weight, logs: Array, sizes: slice, more: tuple[str, ...], random: np.random.RandomState
+) -> Explanation:
+    """One set of causes as an explanation, with some sizes of something else, by the logarithms of their weights."""
+    probability, law = float(np.exp(logsumexp(logs))), scale.law(np.array([weight.causes], dtype=int))
+    drawn = _drawn(logs, weight.means[sizes], weight.covariances[sizes], law, probability, random)
+    size = int(logsumexp(logs, axis=-1).argmax()) + sizes.start
+    rest = scale.observed.measured - weight.change[size]
+    change = np.linalg.solve(scale.observed.rotation, weight.change[size])
+    causes = tuple(scale.causes[cause].name for cause in weight.causes) + more
+    return Explanation(causes, probability, drawn, change, float((rest**2 / weight.variances[size]).sum()))
 
 
 def _drawn(

@@ -18,7 +18,7 @@ class DamagePrior:
 
     Parameters
     ----------
-    numbers : tuple of float, default=(0.5, 0.35, 0.1, 0.05)
+    numbers : tuple of float, default=(0.5, 0.3, 0.15, 0.05)
         Probabilities that none, one, two or three causes changed the structure; at most four numbers, which add up
         to 1. All sets of as many causes are equally probable.
     severity : float, default=0.2
@@ -26,7 +26,7 @@ class DamagePrior:
         largest severity of the uniform law.
     law : {"half-normal", "uniform"}, default="half-normal"
         Law of severities.
-    something_else : float, default=0.1
+    something_else : float, default=0.05
         Probability that something else shifted the frequencies too: a shift of each mode, independent from mode to
         mode, of unknown size; 0 leaves it out.
     model_error : float, default=0.05
@@ -44,10 +44,10 @@ class DamagePrior:
     'half-normal'
     """
 
-    numbers: tuple[float, ...] = (0.5, 0.35, 0.1, 0.05)
+    numbers: tuple[float, ...] = (0.5, 0.3, 0.15, 0.05)
     severity: float = 0.2
     law: Literal["half-normal", "uniform"] = "half-normal"
-    something_else: float = 0.1
+    something_else: float = 0.05
     model_error: float = 0.05
 
     def __post_init__(self) -> None:

@@ -41,7 +41,8 @@ def answer(found: Any) -> Iterator[str]:
         yield f"It could also be: {'; '.join(f'{one.phrase()} ({chance_text(one.probability)})' for one in named)}."
     if not first.is_healthy:
         unchanged = sum(one.probability for one in explanations if one.is_healthy)
-        yield f"The probability that nothing has changed{shown} is {chance_text(unchanged)}."
+        nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
+        yield f"The probability {nothing} is {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
         yield from _averages(found)
     if first.is_healthy:
@@ -104,7 +105,7 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
-            f"something else has a probability of {chance_text(found.probability_of_else)}"
+            f"probability of something else {chance_text(found.probability_of_else)}"
             if best.has_else
             else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
         )
@@ -151,7 +152,7 @@ def likely_causes(found: Any) -> str:
 
 
 def _signed(shift: float) -> str:
-    return f"{100 * shift:+.2f}{SPACE}%"
+    return f"{100 * shift + 0.0:+.2f}{SPACE}%".replace("-0.00", "+0.00")
 
 
 def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:

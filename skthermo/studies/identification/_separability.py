@@ -1,7 +1,6 @@
 """Which damage groups can be told apart by their effects."""
 
 import numpy as np
-from scipy.optimize import nnls
 
 from skthermo._arrays import Array
 
@@ -21,17 +20,29 @@ def errors_alone(slopes: Array) -> Array:
 
 
 def confused_groups(slopes: Array) -> list[tuple[int, ...]]:
-    """Sets of groups of which damage in one looks like damage in the others, most similar first.
+    """Sets of two or three groups of which one looks like the other or the other two together, most similar first.
 
-    Only the part of an effect that no non-negative combination of other groups reproduces is informative.
+    Only the part of an effect that no non-negative combination of the others reproduces is informative.
     """
-    found: dict[tuple[int, ...], float] = {}
     lengths = np.linalg.norm(slopes, axis=0)
-    unit = slopes / lengths
-    for group in range(unit.shape[1] if unit.shape[1] > 1 else 0):
-        others = np.delete(np.arange(unit.shape[1]), group)
-        shares, rest = nnls(unit[:, others], unit[:, group])
-        if rest * lengths[group] * VISIBLE < 1:
-            members = tuple(sorted([group, *others[shares >= IMITATING_SHARE].tolist()]))
-            found[members] = min(rest, found.get(members, 1.0))
-    return sorted((members for members in found if len(members) > 1), key=lambda members: found[members])
+    alike, size = cosines(slopes), slopes.shape[1]
+    found: dict[tuple[int, ...], float] = {}
+    for group in range(size):
+        others = np.delete(np.arange(size), group)
+        rest = np.sqrt(np.maximum(1 - np.maximum(alike[group, others], 0.0) ** 2, 0.0))
+        for other in np.flatnonzero(rest * lengths[group] * VISIBLE < 1):
+            members = tuple(sorted((group, int(others[other]))))
+            found[members] = min(float(rest[other]), found.get(members, 1.0))
+    pairs = list(found)
+    for group in range(size):
+        first, second = np.triu_indices(size, 1)
+        along, first_along, second_along = alike[first, second], alike[group, first], alike[group, second]
+        left = np.maximum(1 - along**2, np.finfo(float).eps)
+        shares = (first_along - along * second_along) / left, (second_along - along * first_along) / left
+        rest = np.sqrt(np.maximum(1 - shares[0] * first_along - shares[1] * second_along, 0.0))
+        looks = (rest * lengths[group] * VISIBLE < 1) & (np.minimum(*shares) >= IMITATING_SHARE)
+        for place in np.flatnonzero(looks & (first != group) & (second != group)):
+            members = tuple(sorted((group, int(first[place]), int(second[place]))))
+            if not any(set(pair) <= set(members) for pair in pairs):
+                found[members] = min(float(rest[place]), found.get(members, 1.0))
+    return sorted(found, key=lambda members: found[members])

@@ -9,17 +9,18 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._formatting import SPACE, significant
+from skthermo._formatting import SPACE, listed
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
 
 ALIKE = 0.95  # cosine between effects from which on causes that are confused are said together
 TOLD = {
-    "damage": ("a loss of {size}{of stiffness} in {name}", "of {size} in {name}"),
-    "stiffening": ("a gain of {size}{of stiffness} in {name}", "of {size} in {name}"),
-    "parameter": ("a change of {size} in {name}", "of {size} in {name}"),
-    "mass": ("added mass of {size} times {name}", "of {size} times {name}"),
+    "damage": ("a loss of {size}{of stiffness} in {name}", "of {size} in {name}", ""),
+    "stiffening": ("a gain of {size}{of stiffness} in {name}", "of {size} in {name}", " stiffer"),
+    "lower": ("a fall of {size} in {name}", "of {size} in {name}", " lower"),
+    "higher": ("a rise of {size} in {name}", "of {size} in {name}", " higher"),
+    "mass": ("added mass of {size} of {name}", "of {size} of {name}", ""),
 }
-"""What is said of a cause by its kind: of the first of the kind, and of those that follow it."""
+"""What is said of a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
 
 
 def either(names: Sequence[str]) -> str:
@@ -40,29 +41,31 @@ class Amount:
     @property
     def size(self) -> str:
         """The amount, with the digits that its band carries."""
-        return f"{self._number(self.value)}{self._unit}"
+        return f"{self._number(self.value)}{SPACE}%"
 
     @property
     def band(self) -> str:
         """The band, from the smaller to the larger amount."""
-        low, high = sorted((self.lowest, self.highest), key=abs if self.kind == "stiffening" else float)
-        return f"between {self._number(low)} and {self._number(high)}{self._unit}"
+        low, high = sorted((self.lowest, self.highest), key=abs)
+        return f"between {self._number(low)} and {self._number(high)}{SPACE}%"
 
     @property
-    def _unit(self) -> str:
-        return "" if self.kind == "mass" else f"{SPACE}%"
+    def saying(self) -> str:
+        """What is said of it: a key of ``TOLD``."""
+        return self.kind if self.kind != "parameter" else "lower" if self.value < 0 else "higher"
+
+    @property
+    def subject(self) -> str:
+        """The name of what changed, without the direction."""
+        return self.cause.removesuffix(TOLD[self.saying][2])
 
     def _number(self, value: float) -> str:
-        if self.kind == "mass":
-            return significant(value)
         width = abs(self.highest - self.lowest)
-        decimals = 0 if width >= 0.03 else 1 if width >= 0.003 else 2
-        sign = "+" if self.kind == "parameter" else ""
-        return f"{100 * (abs(value) if self.kind == 'stiffening' else value):{sign}.{decimals}f}"
+        return f"{100 * abs(value):.{0 if width >= 0.03 else 1 if width >= 0.003 else 2}f}"
 
     def agrees(self, other: Amount) -> bool:
         """Whether another cause's amount is of the same kind and within the band of this one."""
-        return self.kind == other.kind and self.lowest <= other.value <= self.highest
+        return self.saying == other.saying and self.lowest <= other.value <= self.highest
 
 
 @dataclass(frozen=True)
@@ -96,11 +99,13 @@ class Told:
         """Causes with their amounts as part of a sentence; in full with what is lost, and the bands."""
         if self.is_else:
             return "something else than damage of these groups"
-        said, kinds = [], set()
-        for amounts in self.changes:
-            said.append(_phrase(amounts, amounts[0].kind in kinds, in_full))
-            kinds.add(amounts[0].kind)
-        return " and ".join(said + [SOMETHING_ELSE] * self.has_else).rstrip(",") or NO_DAMAGE
+        said: list[str] = []
+        for place, amounts in enumerate(self.changes):
+            is_further = place > 0 and amounts[0].saying == self.changes[place - 1][0].saying
+            said.append(_phrase(amounts, is_further, in_full))
+        said += [SOMETHING_ELSE] * self.has_else
+        joined = listed(said) if not any(part.endswith(",") for part in said) else " and ".join(said)
+        return joined.rstrip(",") or NO_DAMAGE
 
 
 def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
@@ -108,8 +113,8 @@ def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
     first, texts = amounts[0], []
     shared = [one for one in amounts if first.agrees(one)]
     for one in [first, *(one for one in amounts if one not in shared)]:
-        saying = TOLD[one.kind][is_further or (one is not first and one.kind == first.kind)]
-        names = either([other.cause for other in (shared if one is first else [one])])
+        saying = TOLD[one.saying][is_further or (one is not first and one.saying == first.saying)]
+        names = either([other.subject for other in (shared if one is first else [one])])
         text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
         texts.append(text + (f" ({one.band})" if in_full else ""))
     return " or ".join(texts) + (", which these modes cannot tell apart," if len(amounts) > 1 else "")
@@ -122,12 +127,12 @@ def told(found: Any) -> list[Told]:
     """
     sets = alike_sets(found.confused, found.similarity)
     together: dict[frozenset[Any], list[tuple[float, tuple[str, ...]]]] = {}
-    listed: set[tuple[str, ...]] = set()
+    known: set[tuple[str, ...]] = set()
     for name, probability in found.explanations["probability"].items():
         causes = causes_of(found, str(name))
         seen = tuple(cause for cause in causes if cause not in found.unseen)
-        shown = seen if seen in listed else causes
-        listed.add(causes)
+        shown = seen if seen in known else causes
+        known.add(causes)
         key = frozenset(next((group for group in sets if cause in group), cause) for cause in shown)
         together.setdefault(key, []).append((float(probability), causes))
     said = [_joined(found, members, sets) for members in together.values()]

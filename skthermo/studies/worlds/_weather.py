@@ -22,6 +22,8 @@ def resampled_days(T: Any, random: np.random.RandomState) -> Any:
 
     Rows keep their stamps, so that onsets of damage and waits keep their meaning. Rows without stamps count as a year.
     """
+    if len(T) < 2:
+        return T
     times = row_times(T) / DAY if has_stamps(T) else np.arange(len(T)) * (WEEKS * BLOCK / max(len(T), 1))
     if has_stamps(T):
         times = times + (T.index[0].as_unit("ns").value % DAY) / DAY

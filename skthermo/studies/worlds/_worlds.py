@@ -13,6 +13,7 @@ from skthermo.studies.worlds._weather import other_years, resampled_days
 PARTS = ("noise", "weather", "baseline", "model")
 """What a world draws, in the order in which one is added to the others."""
 
+LEAST_WORLDS = 2
 LARGEST_SEED = np.iinfo(np.int32).max
 
 
@@ -31,12 +32,14 @@ class Worlds:
     seeds: Sequence[int]
 
     @classmethod
-    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: int) -> "Worlds":
+    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: Any) -> "Worlds":
         """So many worlds in which the named parts vary; without models, these are drawn from the training records."""
         asked = checked_parts(uncertainty)
         years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
+        if positive_integer(number, "n_worlds") < LEAST_WORLDS:
+            raise ValueError(f"n_worlds is {number}; expected at least {LEAST_WORLDS}, 20 or more for bands of 90 %")
         random = np.random.RandomState(seed)
-        seeds = random.randint(LARGEST_SEED, size=positive_integer(number, "n_worlds") + 1)
+        seeds = random.randint(LARGEST_SEED, size=number + 1)
         if models is not None:
             models = checked_models(fem, models)
         elif "model" in asked:
@@ -47,23 +50,18 @@ class Worlds:
     def world(self, number: int) -> Iterator[tuple[str, Any, Any]]:
         """One part after the other, with a chain and temperatures in which it and those before vary.
 
-        A chain of other training records has learned its own healthy simulation, with fitted noise, in the weather of
-        the training records: records that this structure could have given as well.
+        Other training records are those that the chain's structure could have given as well in the same weather.
         """
-        random = np.random.RandomState(self.seeds[number])
-        chain, T, years = self.fem, self.years[0], len(self.years)
-        weather, noise = (int(one) for one in random.randint(LARGEST_SEED, size=2))
-        known, F = None, None
+        weather, records = np.random.RandomState(self.seeds[number]).randint(LARGEST_SEED, size=2)
+        chain, T, n_years = self.fem, self.years[0], len(self.years)
         for part in self.parts:
             if part == "weather":
-                other = np.random.RandomState(weather)
-                T = self.years[number % years] if years > 1 else resampled_days(T, other)
+                T = self.years[number % n_years] if n_years > 1 else resampled_days(T, np.random.RandomState(weather))
             elif part == "baseline":
-                known = self.fem.training_records_[0]
-                F = self.fem.simulate(known, noise="fitted", random_state=noise)
-                chain = self.fem.refitted(known, F)
+                chain = self.fem.resampled(int(records))
             else:
-                chain = self.fem.refitted(known, F, model=self.models[number % len(self.models)])
+                chain = self.fem.refitted(model=self.models[number % len(self.models)])
+                chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from numbers import Integral, Real
 from typing import Any, Literal, TypeAlias, overload
 
@@ -10,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, RegressorMixin, clone
 
 from skthermo._arguments import as_mapping, check_flag, check_noise, integer_row
 from skthermo._arrays import HUGE, Array, MatrixLike, as_columns, as_floats, as_random_state, is_real, real_array
@@ -318,6 +320,48 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         chain = with_quick_start(self, self.model if model is None else model).set_params(random_state=random_state)
         weights = None if counted.all() or X is not None else counted.astype(float)
         return chain.fit(T if X is None else X, F if y is None else y, sample_weight=weights)
+
+    def resampled(self, random_state: int | np.random.RandomState | None = None) -> DataInformedFEM:
+        """A chain that has learned other records, as this structure could have given them in the training weather.
+
+        Such chains differ from this one as it differs from the structure, if its model is right.
+
+        Parameters
+        ----------
+        random_state : int, RandomState or None, default=None
+            Seed of the records.
+
+        Returns
+        -------
+        DataInformedFEM
+            With a temperature mapper, ``records_``, ``parameters_`` and fitted noise of its own; all else, such as
+            ``report_``, is this chain's.
+
+        Notes
+        -----
+        A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
+        weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
+        correlated. No record comes twice, so that lags, folds and neighbours are what they are in measured records.
+        The FE model is solved for the frequencies alone and nothing is inverted: only the temperature mapper is fitted.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year = make_truss_campaign(random_state=0)
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> others = [fem.resampled(seed) for seed in range(3)]
+        >>> [round(float(other.predict(year.temperatures)["f1"].mean()), 2) for other in (fem, *others)]
+        [7.56, 7.56, 7.55, 7.55]
+        """
+        chain, random = copy(self), as_random_state(random_state)
+        records = self.records_.resampled(self.residuals_, self._frequencies, random)
+        filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
+        targets = frame_like(filled, records.targets, self.parameter_names_)
+        chain.mapper_ = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
+        learned = possible(chain.mapper_.predict(filled))[0]
+        chain.records_, chain.parameters_ = replace(records, learned=learned), targets
+        return chain
 
     @overload
     def estimate_parameters(self, F: pd.DataFrame, shapes: ArrayLike | None = None) -> pd.DataFrame: ...

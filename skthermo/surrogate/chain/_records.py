@@ -1,7 +1,7 @@
 """The records that a chain was fitted to, and its residuals by weather: their spread, intervals, realistic noise."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_columns, as_floats, patterns
+from skthermo._frames import frame_like
 from skthermo._gaussian import Gaussian
 from skthermo._regressors import fit_weighted
 from skthermo._saved_frames import SavesFrames
@@ -51,7 +52,8 @@ class WeatherResiduals:
     ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
-    of the training records they are.
+    of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
+    out-of-fold predictions.
     """
 
     weather: Array
@@ -59,6 +61,7 @@ class WeatherResiduals:
     own: Array
     folds: NDArray[np.intp]
     rows: NDArray[np.intp] | None = None
+    ratios: Array | None = None
 
     @cached_property
     def coordinates(self) -> Pipeline:
@@ -130,7 +133,7 @@ class WeatherResiduals:
         of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
         Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self.values[self._drawn(known, random_state)])
+        return self._where_known(weather, lambda known: self.values[self.draw_records(known, random_state)])
 
     def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
         """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
@@ -139,7 +142,8 @@ class WeatherResiduals:
         same.
         """
         return self._where_known(
-            weather, lambda known: self._completed(self._drawn(known, random_state), random_state, without_outliers)
+            weather,
+            lambda known: self._completed(self.draw_records(known, random_state), random_state, without_outliers),
         )
 
     def _completed(
@@ -171,7 +175,7 @@ class WeatherResiduals:
             found = Gaussian.of(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
-    def _drawn(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+    def draw_records(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records drawn for each row."""
         places, n_records = self.coordinates.transform(weather), len(self.places)
         mean_length = max(1.0, 2 * self.correlation_time - 1)
@@ -288,6 +292,36 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
+    def resampled(
+        self,
+        residuals: WeatherResiduals,
+        frequencies_of: Callable[[Array], Array],
+        random_state: np.random.RandomState,
+    ) -> "TrainingRecords":
+        """Records that this structure could have given as well in the same weather, before a mapper learns them.
+
+        Each takes what a record of similar weather left unexplained, of its parameters and of its frequencies, in runs.
+        """
+        known = ~np.isnan(self.inputs).any(axis=1)
+        order = np.argsort(row_times(self.temperatures), kind="stable")
+        order = order[known[order]]
+        taken = residuals.draw_records(self.inputs[order], random_state)
+        targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
+        targets[order] = self.learned[order] * residuals.ratios[taken]
+        measured[order] = frequencies_of(self.learned[order]) * (1 + residuals.values[taken])
+        weights = None
+        if self.weights is not None:
+            weights = np.zeros(len(targets))
+            weights[order] = self.weights[residuals.rows[taken]]
+        return replace(
+            self,
+            frequencies=frame_like(self.frequencies, measured),
+            targets=targets,
+            weights=weights,
+            residuals=None,
+            service=None,
+        )
+
     def out_of_fold(
         self, mapper: Any, frequencies_of: Callable[[Array], Array], folds: BaseCrossValidator | None = None
     ) -> WeatherResiduals:
@@ -319,7 +353,8 @@ class TrainingRecords(SavesFrames):
         warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
         values = measured / frequencies_of(predicted) - 1
         known = ~np.isnan(values).all(axis=1)
-        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known], order[known])
+        ratios = (theta / predicted)[known]
+        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios)
 
 
 def as_frame(table: Any) -> pd.DataFrame:

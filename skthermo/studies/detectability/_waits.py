@@ -1,0 +1,212 @@
+"""How soon damage is found: the chance to find it within a time, and the time within which it is found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._arrays import Array, is_real
+from skthermo._times import has_stamps, row_times, time_of
+from skthermo.studies.detectability._intervals import rate_of
+from skthermo.studies.detectability._judged import JudgedRecords
+
+MOST_STEPS = 200_000  # into which the time of the records is divided
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Time in steps of the usual time between records: the step of each, and its length, or None for numbers."""
+
+    steps: NDArray[np.intp]
+    length: pd.Timedelta | None
+
+    @classmethod
+    def of(cls, rows: Any) -> "Clock":
+        """The median time between records, or their numbers where they have no stamps."""
+        times = row_times(rows)
+        if not has_stamps(rows):
+            return cls(times.astype(np.intp), None)
+        since, apart = times - times.min(), np.diff(np.unique(times))
+        length = max(float(np.median(apart)) if apart.size else 1.0, since.max() / MOST_STEPS)
+        return cls(np.rint(since / length).astype(np.intp), pd.Timedelta(int(length), "ns"))
+
+    @property
+    def n_steps(self) -> int:
+        """Number of steps from the first record to the last."""
+        return int(self.steps.max()) + 1
+
+    def count(self, within: Any) -> int:
+        """Number of records that come within a time; 0 if that is shorter than a step."""
+        if self.length is None:
+            return int(within)
+        return int(np.floor(within / self.length + 0.05))
+
+    def time(self, steps: float) -> Any:
+        """A number of steps as a time, or as a number of records; missing if it is infinite."""
+        if self.length is None:
+            return float(steps) if np.isfinite(steps) else float("nan")
+        return self.length * int(steps) if np.isfinite(steps) else pd.NaT
+
+    def any_in_step(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Whether any record of each step is marked, (n_repeats, n_steps)."""
+        order = np.argsort(self.steps, kind="stable")
+        taken, first = np.unique(self.steps[order], return_index=True)
+        found = np.zeros((len(rows), self.n_steps), dtype=bool)
+        found[:, taken] = np.logical_or.reduceat(rows[:, order], first, axis=1)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Waits:
+    """Number of steps from each onset of damage to the first alarm, (n_repeats, n_onsets), 1 for an alarm of the first
+    record; infinite where there is none. ``share_not_judged`` is of the steps, also those without any record."""
+
+    clock: Clock
+    steps: Array
+    share_not_judged: float
+    whole_repeats: bool
+
+    @classmethod
+    def of(
+        cls, records: JudgedRecords, onset: Any = None, transitions: Array | None = None, memory: int = 1
+    ) -> "Waits":
+        """Waits from onsets in every step, or from the onset of the scenario or another one alone.
+
+        After the last record comes the first one again, so that each season has as many onsets as it has steps.
+        Decisions that depend on so many records before them follow from ``transitions``, decisions on records that are
+        damaged for as many records after each onset.
+        """
+        clock = Clock.of(records.damage_index)
+        alarms = clock.any_in_step(records.decisions < 0)
+        judged = clock.any_in_step(~np.isnan(records.decisions))
+        onset = records.scenario.onset if onset is None else onset
+        whole = records.scenario.n_draws > 1
+        if onset is not None:
+            times, start = row_times(records.damage_index), time_of(records.damage_index, onset, "onset")
+            first = int(clock.steps[times >= start].min())
+            steps = np.where(alarms[:, first:].any(axis=1), alarms[:, first:].argmax(axis=1) + 1.0, np.inf)
+            return cls(clock, steps[:, np.newaxis], float(1 - judged[:, first:].mean()), True)
+        steps = _until_next(alarms)
+        if transitions is not None:
+            steps = _after_transitions(clock, steps, transitions < 0)
+        return cls(clock, steps, float(1 - judged.mean()), whole)
+
+    def found(self, number: int, confidence: float) -> tuple[float, float, float]:
+        """Share of the onsets after which there is an alarm within a number of steps, and its bounds.
+
+        NaN if there is no such step, or if the records are shorter.
+        """
+        if not 1 <= number <= self.clock.n_steps:
+            return float("nan"), float("nan"), float("nan")
+        late = np.minimum(self.steps, 2.0 * self.clock.n_steps) - number - 0.5
+        rate = rate_of(late, confidence, whole_repeats=self.whole_repeats)
+        return rate.rate, rate.lowest, rate.highest
+
+    def within(self, probability: float) -> float:
+        """Smallest number of steps within which this share of the onsets is found; infinite if none is."""
+        return float(np.quantile(self.steps, probability, method="inverted_cdf"))
+
+    def surely_within(self, probability: float, confidence: float) -> float:
+        """The same with the lower bounds of the shares."""
+        lowest, highest = 0, self.clock.n_steps + 1
+        while highest - lowest > 1:
+            middle = (lowest + highest) // 2
+            is_enough = self.found(middle, confidence)[1] >= probability
+            lowest, highest = (lowest, middle) if is_enough else (middle, highest)
+        return float(highest) if highest <= self.clock.n_steps else float("inf")
+
+
+def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
+    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
+    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
+    return onsets if onsets.size else np.array([n_records // 2])
+
+
+def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
+    """Which records are damaged, a window after each of these onsets."""
+    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
+    return ((after >= 0) & (after < n_window)).any(axis=1)
+
+
+def transitions_of(decisions: Array, n_window: int) -> Array:
+    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
+    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
+    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
+
+
+def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:
+    """Times by their names in a table: durations, or numbers of records where there are no stamps."""
+    if within is None:
+        within = ("1D", "7D", "30D") if is_stamped else (1, 7, 30)
+    many = [within] if isinstance(within, str) or np.ndim(within) == 0 else list(within)
+    return {str(one): _time(one, is_stamped) for one in many}
+
+
+def _time(one: Any, is_stamped: bool) -> Any:
+    expected = "times such as '7D'" if is_stamped else "numbers of records, as the weather has no stamps"
+    try:
+        is_number = is_real(one)
+        time = (pd.NaT if is_number else pd.Timedelta(one)) if is_stamped else (one if is_number else np.nan)
+        if (is_stamped and time > pd.Timedelta(0)) or (not is_stamped and time >= 1 and time == int(time)):
+            return time
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(f"within has {one!r:.100}; expected {expected}")
+
+
+def waits_table(
+    records: Mapping[tuple[str, str, str], JudgedRecords],
+    transitions: Mapping[tuple[str, str, str], Array],
+    within: Any,
+    level: float,
+    confidence: float,
+) -> pd.DataFrame:
+    """A row for each of the records by detector, scenario and source, beside the waits of the healthy structure."""
+    healthy = {key[0]: one for key, one in reversed(records.items()) if one.scenario.is_healthy}
+    rows = []
+    for key, one in records.items():
+        scenario, twin = one.scenario, healthy.get(one.detector)
+        waits = Waits.of(one, transitions=transitions.get(key))
+        false = None if twin is None else waits if twin is one else Waits.of(twin, scenario.onset)
+        row = {
+            "detector": one.detector,
+            "scenario": scenario.name,
+            "family": scenario.family,
+            "severity": scenario.severity,
+            "source": one.source,
+        }
+        for name, time in read_within(within, waits.clock.length is not None).items():
+            number = waits.clock.count(time)
+            found = waits.found(number, confidence)
+            row |= dict(zip([name, f"{name} lowest", f"{name} highest"], found, strict=True))
+            row[f"{name} healthy"] = np.nan if false is None else false.found(number, confidence)[0]
+        row["median"] = waits.clock.time(waits.within(0.5))
+        row["reliable"] = waits.clock.time(waits.within(level))
+        row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
+        row["not_judged"] = waits.share_not_judged
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _until_next(alarms: NDArray[np.bool_]) -> Array:
+    """Steps from the beginning of each step to the end of the next one with an alarm; the first follows the last."""
+    n_steps = alarms.shape[1]
+    places = np.where(np.hstack([alarms, alarms]), np.arange(2 * n_steps), np.inf)
+    following = np.minimum.accumulate(places[:, ::-1], axis=1)[:, ::-1][:, :n_steps]
+    return following - np.arange(n_steps) + 1
+
+
+def _after_transitions(clock: Clock, steps: Array, alarms: NDArray[np.bool_]) -> Array:
+    """Waits from the onsets of transitions: to an alarm there, or else to one after, (n_repeats, n_onsets)."""
+    n_records, n_window = len(clock.steps), alarms.shape[2]
+    onsets = onsets_of(n_records, n_window)
+    first, after = clock.steps[onsets], clock.steps[(onsets + n_window) % n_records]
+    places = np.minimum(onsets[:, np.newaxis] + np.arange(n_window), n_records - 1)
+    during = clock.steps[places] - first[:, np.newaxis] + 1.0
+    found = np.take_along_axis(np.broadcast_to(during, alarms.shape), alarms.argmax(axis=2)[:, :, np.newaxis], axis=2)[
+        :, :, 0
+    ]
+    return np.where(alarms.any(axis=2), found, (after - first) % clock.n_steps + steps[:, after])
