@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array, Matrix
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
-LEVELS = (1 / 3, 2 / 3, 1.0)  # shares of the bounds for which reduced models are made, when they are needed
+NEAR = 1 / 3  # share of the bounds up to which amounts have a reduced model; one for all of them would be large
+BEYOND = 0.02  # margin of what multiplies a column
+AROUND = 0.05  # margin of theta around the weather's, within which a reduced model is accurate
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,15 @@ class Changes:
         further = np.ones((len(theta), len(self.groups) + len(self.masses)))
         return np.hstack([theta, further]) * self.factors(amounts)[:, np.newaxis]
 
-    def levels(self, amounts: Array) -> Array:
-        """The level of each set of amounts, (n_sets,)."""
-        shares = np.abs(amounts / np.abs(self.bounds).max(axis=1)).max(axis=1, initial=0.0)
-        return np.array(LEVELS)[np.minimum(np.searchsorted(LEVELS, shares), len(LEVELS) - 1)]
+    def are_near(self, amounts: Array) -> NDArray[np.bool_]:
+        """Which sets of amounts a reduced model covers, (n_sets,)."""
+        return (np.abs(amounts) <= NEAR * np.abs(self.bounds).max(axis=1)).all(axis=1)
 
-    def ranges(self, level: float) -> Array:
-        """Lowest and highest factor of each column up to a level, (n_columns, 2)."""
-        ends = 1 + self.directions * level * self.bounds.T[:, :, np.newaxis]
-        return np.column_stack([ends.min(axis=0).prod(axis=0), ends.max(axis=0).prod(axis=0)])
+    def near(self) -> Array:
+        """Lowest and highest factor of each column by the amounts that a reduced model covers, (n_columns, 2)."""
+        ends = 1 + self.directions * NEAR * self.bounds.T[:, :, np.newaxis]
+        margin = BEYOND * self.directions.any(axis=0)
+        return np.column_stack([ends.min(axis=0).prod(axis=0) - margin, ends.max(axis=0).prod(axis=0) + margin])
 
     def severities(self, amounts: Array) -> Array:
         """Severities of the model's groups, (..., n_groups)."""
@@ -70,12 +72,12 @@ class Changes:
 class ChangedStructure:
     """A fitted chain's model with further columns of theta for the amounts of changes.
 
-    Simulators are kept by the highest level that their reduced model covers.
+    Simulators are kept, one for large amounts and one for those that a reduced model covers.
     """
 
     fem: Any
     changes: Changes
-    simulators: dict[float, Any] = field(default_factory=dict, repr=False)
+    simulators: dict[bool, Any] = field(default_factory=dict, repr=False)
 
     @property
     def is_exact(self) -> bool:
@@ -89,12 +91,13 @@ class ChangedStructure:
 
         With ``dofs``, also the shapes there, (n_sets, n_rows, n_dofs, n_modes), and their derivatives.
         """
-        rows, levels = self.changes.rows(theta, sets), self.changes.levels(sets)
+        rows = self.changes.rows(theta, sets)
+        are_near = self.changes.are_near(sets) & self._is_slow
         results: list[Array] = []
-        for level in np.unique(levels):
-            own = levels == level
+        for near in np.unique(are_near):
+            own = are_near == near
             flat = rows[own].reshape(-1, rows.shape[2])
-            solved = self._simulator(level).linearise(flat, self.fem.n_jobs, dofs, relative=True)
+            solved = self._simulator(bool(near), theta).linearise(flat, self.fem.n_jobs, dofs, relative=True)
             results = results or [np.empty((*rows.shape[:2], *array.shape[1:])) for array in solved]
             for result, array in zip(results, solved, strict=True):
                 result[own] = array.reshape(-1, *result.shape[1:])
@@ -114,9 +117,20 @@ class ChangedStructure:
             simulator = simulator.changed("with_added", mass=number * mass) if number else simulator
         return simulator, theta * factors[: theta.shape[1]]
 
-    def _simulator(self, level: float) -> Any:
-        """The simulator that has the amounts as further columns of theta."""
-        if level not in self.simulators:
-            groups, masses, ranges = self.changes.groups, self.changes.masses, self.changes.ranges(level)
-            self.simulators[level] = self.fem.simulator_.with_columns(groups, masses, ranges)
-        return self.simulators[level]
+    @property
+    def _is_slow(self) -> bool:
+        """Whether a reduced model saves time."""
+        model = self.fem.model
+        is_sparse = getattr(model, "prefer", "threads") == "processes" and hasattr(model, "reduced")
+        return is_sparse or hasattr(model, "full") or self.fem.simulator_.reduced is not None
+
+    def _simulator(self, near: bool, theta: Array) -> Any:
+        """The simulator that has the amounts as further columns of theta, around some rows of it."""
+        if near not in self.simulators:
+            groups, masses, simulator = self.changes.groups, self.changes.masses, self.fem.simulator_
+            box = simulator.box
+            if box is None:
+                box = np.column_stack([(1 - AROUND) * theta.min(axis=0), (1 + AROUND) * theta.max(axis=0)])
+            box = np.vstack([box, np.ones((len(groups) + len(masses), 2))]) * self.changes.near()
+            self.simulators[near] = simulator.with_columns(groups, masses, box if near else None)
+        return self.simulators[near]

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skthermo._arguments import check_names
-from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._arrays import Array, as_floats
 from skthermo._changes import ChangedStructure, Changes
 
-MOST_ROWS, MOST_SLOW_ROWS = 100, 24
-"""Number of records over which effects are averaged; fewer for models that are slow to solve."""
-
+MOST_AXES = 6  # largest number of directions in which parameters vary with the weather
+SMALLEST = 3e-4  # standard deviation of ln theta along a direction, below which it does not count
 MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
 STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
 
@@ -21,7 +21,8 @@ STEP = 1e-3  # step of differences in amounts, for models without parameters for
 class FrequencyEffects:
     """Mean change of the logarithms of the measured frequencies that some amounts of change cause.
 
-    It is the mean over rows of theta in the weather of some records, with weights (n_rows, n_modes).
+    The mean is that over the weather of some records, as a weighted sum over a few rows of theta, with weights
+    (n_rows, n_modes).
     """
 
     structure: ChangedStructure
@@ -32,16 +33,20 @@ class FrequencyEffects:
     @classmethod
     def of(cls, fem: Any, theta: Array, F: Array, changes: Changes) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
-        is_slow = fem.simulator_.reduced is not None or getattr(fem.model, "prefer", "processes") == "processes"
-        present = ~(np.isnan(F) | np.isnan(theta).any(axis=1, keepdims=True))
-        rows = np.flatnonzero(present.any(axis=1))
-        most = MOST_SLOW_ROWS if is_slow else MOST_ROWS
-        rows = spread_evenly(rows, most)
-        healthy = np.log(healthy_frequencies(fem, theta[rows]))
-        weights = np.where(np.isnan(healthy), 0.0, present[rows])
-        weights = np.where(weights.any(axis=0), weights, ~np.isnan(healthy))
-        weights = weights / np.maximum(weights.sum(axis=0), 1)
-        return cls(ChangedStructure(fem, changes), theta[rows], weights, healthy)
+        known = ~(np.isnan(theta).any(axis=1) | np.isnan(F).all(axis=1))
+        present = ~np.isnan(F[known])
+        few, weights = typical_rows(theta[known], np.where(present.any(axis=0), present, True))
+        return cls.at(ChangedStructure(fem, changes), few, weights)
+
+    @classmethod
+    def at(cls, structure: ChangedStructure, theta: Array, weights: Array) -> "FrequencyEffects":
+        """Effects at some rows of theta; without changes, they are 0 also where the model is reduced."""
+        if structure.is_exact:
+            frequencies = structure.linearise(theta, np.zeros((1, len(structure.changes.bounds))))[0][0]
+            healthy = as_floats(structure.fem.aligner_.inverse_transform(frequencies))
+        else:
+            healthy = healthy_frequencies(structure.fem, theta)
+        return cls(structure, theta, weights, np.log(healthy))
 
     def nominal(self) -> "FrequencyEffects":
         """The same effects at the model's nominal state.
@@ -50,8 +55,7 @@ class FrequencyEffects:
         symmetric and mirrored groups would seem to differ.
         """
         theta = np.ones((1, self.theta.shape[1]))
-        healthy = np.log(healthy_frequencies(self.structure.fem, theta))
-        return FrequencyEffects(self.structure, theta, np.ones_like(healthy), healthy)
+        return FrequencyEffects.at(self.structure, theta, np.ones((1, self.healthy.shape[1])))
 
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).
@@ -93,6 +97,28 @@ class FrequencyEffects:
         weights = self.weights if values.ndim == 3 else self.weights[..., np.newaxis]
         known = np.where(np.isnan(values), 0.0, weights)
         return (known * np.nan_to_num(values)).sum(axis=1) / np.maximum(known.sum(axis=1), np.finfo(float).tiny)
+
+
+def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """A few rows of theta, and weights (n_rows, n_modes) that stand for all rows that have a mode.
+
+    They are the mean and a point to either side of it along each principal direction of ln theta. The weights give the
+    mean and the mean square along each direction of those rows of theta that have the mode, so that the mean of any
+    quadratic function of them is exact, but for products of different directions.
+    """
+    shares = present / present.sum(axis=0)
+    if len(theta) <= 3:
+        return theta, shares
+    logs = np.log(theta)
+    centre = logs.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(logs - centre, full_matrices=False)
+    deviations = sizes / np.sqrt(len(logs))
+    n_axes = min(int((deviations > SMALLEST).sum()), MOST_AXES)
+    axes, steps = axes[:n_axes], np.sqrt(max(n_axes, 3)) * deviations[:n_axes, np.newaxis]
+    places = ((logs - centre) @ axes.T).T / steps
+    mean, square = places @ shares, places**2 @ shares
+    rows = np.vstack([centre[np.newaxis], centre + steps * axes, centre - steps * axes])
+    return np.exp(rows), np.vstack([1 - square.sum(axis=0), (square + mean) / 2, (square - mean) / 2])
 
 
 def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:

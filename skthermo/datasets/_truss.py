@@ -63,7 +63,20 @@ def make_truss(n_modes: int = 6) -> AffineModel:
 
 
 def truss_structure() -> Structure:
-    """The truss with its member groups and its thermal zones as named groups."""
+    """Nodes and members of the truss of `make_truss`.
+
+    Returns
+    -------
+    Structure
+        With the groups ``bottom``, ``top``, ``diagonal`` and ``vertical``, and the thermal zones ``T1``, ``T2`` and
+        ``T3``.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import truss_structure
+    >>> sorted(truss_structure().groups["bottom"], key=int)
+    ['1', '4', '9', '19', '24']
+    """
     sheet = json.loads(files("skthermo.datasets").joinpath("data", "truss28.json").read_text())
     steel = {"E": sheet["E_Pa"], "A": sheet["A_m2"], "density": sheet["rho_kg_m3"]}
     groups = sheet["groups"] | sheet["thermal_groups"]

@@ -3,6 +3,7 @@
 from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
 from skthermo.studies.extension import what_to_add
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage
+from skthermo.studies.location import LocatedDamage, locate_damage
 from skthermo.studies.scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
 
 __all__ = [
@@ -10,12 +11,14 @@ __all__ = [
     "DetectabilityStudy",
     "DetectionTask",
     "IdentifiedDamage",
+    "LocatedDamage",
     "PODCurve",
     "ProgressiveDamage",
     "Scenario",
     "UncertainDamage",
     "detection_task",
     "identify_damage",
+    "locate_damage",
     "pod_curve",
     "sweep",
     "what_to_add",

@@ -69,18 +69,16 @@ class Simulator:
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
 
-    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], ranges: Array) -> "Simulator":
+    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None) -> "Simulator":
         """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
 
-        A reduced model is made for the ranges of what multiplies each column, (n_columns, 2).
+        Within the box, (n_columns, 2), a reduced model is used, if there is a box.
         """
-        model: Any = self.changed("with_damage_parameters", groups).model if groups else self.model
-        model = Simulator(model).changed("with_mass_parameters", masses).model if masses else model
-        if self.box is None:
+        model: Any = getattr(self.model, "full", self.model)
+        model = model.with_damage_parameters(groups) if groups else model
+        model = model.with_mass_parameters(masses) if masses else model
+        if box is None:
             return Simulator(model)
-        ends = np.vstack([self.box, np.ones((len(ranges) - len(self.box), 2))])
-        margins = MARGIN_OF_SEVERITY * (ranges != 1).any(axis=1)
-        box = ends * (ranges + np.outer(margins, [-1, 1]))
         return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)
 
     def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:

@@ -195,7 +195,7 @@ def test_draws_make_a_scenario(fem):
     scenario = found.scenario("as found")
     assert scenario.draws["top"].mean() == pytest.approx(found.severities["top"], abs=0.003)
     assert scenario.draws["top"].std() == pytest.approx(found.standard_errors["top"], rel=0.2)
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=3, random_state=0, uncertainty="noise")
     results = study.run(WEATHER)
     assert results["scenario"].tolist() == ["as found"]
     assert results["rate"].between(0.5, 1).all()

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from skthermo._changes import Changes
-from skthermo._frequency_effects import FrequencyEffects
+from skthermo._frequency_effects import FrequencyEffects, typical_rows
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._causes import read_causes
 
-WEATHER = make_truss_campaign(random_state=1).temperatures[::24]
+YEAR = make_truss_campaign(random_state=1).temperatures
+WEATHER = YEAR[::150]  # so few records that they are solved one by one
 TRUSS = make_truss()
 ASPHALT = np.full(TRUSS.n_dof, 300.0)
 CAUSES, CHANGES = read_causes(TRUSS, None, ["top"], ["diagonal"], {"asphalt": ASPHALT})
@@ -49,7 +50,37 @@ def test_effects_are_those_of_simulated_records(fem, reduced_fem, which):
     tolerance = 1e-9 if which == "full" else 3e-5
     np.testing.assert_allclose(change, np.log(changed / fem.predict(WEATHER)).mean(axis=0), atol=tolerance)
     np.testing.assert_allclose(slopes, differences(lambda at: effects(at)[0], AT), rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(effects(np.zeros(8))[0], 0, atol=tolerance)
+    np.testing.assert_allclose(effects(np.zeros(8))[0], 0, atol=1e-12)
+
+
+def test_means_over_a_year_need_few_rows(fem):
+    """Modes that were measured in parts of the year, or never, which then counts as always."""
+    theta, F = fem.predict_parameters(YEAR).to_numpy(copy=True), fem.predict(YEAR).to_numpy(copy=True)
+    F[:200, 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
+    theta[7] = np.nan
+    found = FrequencyEffects.of(fem, theta, F, CHANGES)
+    assert len(found.theta) == 9
+    damaged = fem.simulate(YEAR, damage={"bottom": 0.2, "top": 0.1})
+    ratios = np.log(damaged / fem.predict(YEAR)).to_numpy(copy=True)
+    ratios[7] = np.nan
+    expected = np.nanmean(np.where(np.isnan(F) & ~np.isnan(F).all(axis=0), np.nan, ratios), axis=0)
+    amounts = np.array([0.2, 0.1, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(found(amounts)[0], expected, rtol=1e-3)
+    assert abs(np.nanmean(ratios, axis=0)[1] / expected[1] - 1) > 3e-3  # gaps matter
+
+
+def test_typical_rows_have_the_moments_of_all_rows():
+    random = np.random.RandomState(0)
+    theta = np.exp(random.standard_normal((200, 3)) @ random.uniform(-0.1, 0.1, (3, 5)))
+    present = random.uniform(size=(200, 4)) > np.linspace(0, 0.9, 4)
+    rows, weights = typical_rows(theta, present)
+    assert rows.shape == (7, 5)
+    shares, centre = present / present.sum(axis=0), np.log(theta).mean(axis=0)
+    axes = np.linalg.svd(np.log(theta) - centre)[2][:3]
+    few, all_rows = ((np.log(table) - centre) @ axes.T for table in (rows, theta))
+    for power in (0, 1, 2):
+        np.testing.assert_allclose((few**power).T @ weights, (all_rows**power).T @ shares, atol=1e-12)
+    assert typical_rows(np.tile(theta[:1], (9, 1)), present[:9])[0] == pytest.approx(theta[:1])
 
 
 def test_many_sets_of_amounts_at_once(fem):
@@ -121,7 +152,8 @@ def test_factors_and_their_slopes():
     np.testing.assert_allclose(changes.factors(at), [1, 1, 1, 1, 0.7, 1.1])
     slopes = differences(lambda a: np.log(changes.factors(a)), at)
     np.testing.assert_allclose(changes.slopes(at), slopes, atol=1e-7)
-    np.testing.assert_allclose(changes.ranges(1.0), [[1, 1]] * 4 + [[0.05, 1]] * 2)
+    np.testing.assert_allclose(changes.near(), [[1, 1]] * 4 + [[1 - 0.95 / 3 - 0.02, 1.02]] * 2)
+    assert changes.are_near(np.array([[0.3, 0.0], [0.3, 0.4], [-0.2, 0.1]])).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize(

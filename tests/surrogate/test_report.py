@@ -334,5 +334,5 @@ def test_offsets_that_an_aligner_hides_are_named_unless_weather_or_a_common_fact
     assert not aligned(calibrated).report_.has_hidden_offsets
     right, alike = aligned(TRUSS).report_, aligned(TRUSS, factor=1.03).report_
     assert not right.has_hidden_offsets
-    assert alike.unexplained_offset == pytest.approx(right.unexplained_offset, rel=0.02)
+    assert alike.unexplained_offset == pytest.approx(right.unexplained_offset, rel=0.1)
     assert not aligned(TRUSS, n=60).report_.has_hidden_offsets  # of a winter

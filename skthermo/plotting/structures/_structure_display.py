@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from skthermo._arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import Axes, legend_columns
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, ORANGE, drawing, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
     add_lines,
     add_points,
@@ -28,6 +28,13 @@ from skthermo.plotting.structures._members import (
 from skthermo.plotting.structures._view import View
 
 WIDTH, THIN = 2.5, 0.8
+DAMAGE_COLOURS = ["#BFC5CC", "#F0C04A", ORANGE, "#7A0019"]  # from grey, as nothing there asks for attention
+LABELS = {
+    "probability": "probability of damage",
+    "severity": "mean loss of stiffness",
+    "if_damaged": "loss of stiffness where damaged",
+}
+"""What the columns of located damage are called beside a colour bar."""
 
 
 @dataclass(eq=False, repr=False)
@@ -39,7 +46,7 @@ class StructureDisplay:
 
     Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
-    It is best made by `from_structure`.
+    It is best made by `from_structure`, or by `from_located`.
 
     Parameters
     ----------
@@ -120,6 +127,34 @@ class StructureDisplay:
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
 
+    @classmethod
+    def from_located(cls, located: Any, quantity: str = "probability", **options: Any) -> StructureDisplay:
+        """Draw where a structure is damaged, member by member.
+
+        Parameters
+        ----------
+        located : LocatedDamage
+            From `~skthermo.studies.locate_damage`.
+        quantity : {"probability", "severity", "if_damaged"}, default="probability"
+            Column of its table that colours the members; those of no group are grey.
+        **options : dict
+            Options of `plot`; by default the colours go from 0 to 1.
+
+        Returns
+        -------
+        StructureDisplay
+
+        Raises
+        ------
+        ValueError
+            If the quantity is unknown.
+        """
+        if quantity not in LABELS:
+            raise ValueError(f"quantity is {quantity!r}; expected one of {list(LABELS)}")
+        cmap = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("damage", DAMAGE_COLOURS)
+        options = {"cmap": cmap, "limits": (0.0, 1.0)} | options
+        return cls.from_structure(located.structure, located.table[quantity], label=LABELS[quantity], **options)
+
     def plot(
         self,
         ax: Axes = None,
@@ -176,7 +211,7 @@ class StructureDisplay:
         nodes = view.nodes
         of_member = dict(zip(self.structure.members, values, strict=True))
         points, lines, surfaces = sort_members(
-            self.structure, sorted(of_member, key=lambda m: np.isfinite(of_member[m]))
+            self.structure, sorted(of_member, key=lambda m: np.nan_to_num(of_member[m], nan=-np.inf))
         )
         surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
         for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):

@@ -14,6 +14,7 @@ from skthermo._formatting import counted, listed, significant
 from skthermo._weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import Shift
 
+IN_A_ROW = 3  # number of last records, all far from those before, that is no chance
 FEW, FEW_TRAINED = 3.0, 20.0
 """Numbers of independent records, new ones and those of the training, below which a warning is given."""
 
@@ -36,6 +37,8 @@ class ComparedRecords:
     wider : mapping of str to float
         Modes that scatter clearly more widely than in the training records, and how many times; their standard errors
         allow for it.
+    n_latest : int, default=0
+        Number of the last records that were all left out because they are far from those before.
     """
 
     n_given: int
@@ -44,15 +47,18 @@ class ComparedRecords:
     n_trained: int
     n_trained_independent: float
     wider: Mapping[str, float]
+    n_latest: int = 0
 
     @classmethod
-    def of(cls, left_out: Mapping[str, NDArray[np.bool_]], shift: Shift, n_trained: int) -> ComparedRecords:
+    def of(
+        cls, left_out: Mapping[str, NDArray[np.bool_]], shift: Shift, n_trained: int, n_latest: int = 0
+    ) -> ComparedRecords:
         """The records of a shift, and rows that were left out of it by reason."""
         counts = {reason: int(rows.sum()) for reason, rows in left_out.items() if rows.any()}
         n_given = max(len(rows) for rows in left_out.values())
         measured = shift.n_independent[shift.n_records > 0]
         wider = {str(mode): float(f) for mode, f in zip(shift.modes, shift.wider, strict=True) if f > 1}
-        return cls(n_given, counts, float(measured.min(initial=n_given)), n_trained, shift.n_trained, wider)
+        return cls(n_given, counts, float(measured.min(initial=n_given)), n_trained, shift.n_trained, wider, n_latest)
 
     @property
     def n_compared(self) -> int:
@@ -65,6 +71,9 @@ class ComparedRecords:
         yield f"Compared: {new}; with {_worth('training record', self.n_trained, self.n_trained_independent)}."
         if self.left_out:
             yield f"{self._left_out()}."
+        if self.n_latest >= IN_A_ROW:
+            latest = self._latest()
+            yield f"{latest[0].upper()}{latest[1:]}."
         for mode, factor in self.wider.items():
             yield (
                 f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its "
@@ -75,6 +84,8 @@ class ComparedRecords:
         """What is doubtful, by kind and text."""
         if self.left_out:
             yield "records that were not compared", self._left_out()
+        if self.n_latest >= IN_A_ROW:
+            yield "the last records differ", self._latest()
         few = [(self.n_independent, self.n_compared, "record", FEW)]
         few += [(self.n_trained_independent, self.n_trained, "training record", FEW_TRAINED)]
         for independent, number, noun, least in few:
@@ -84,6 +95,12 @@ class ComparedRecords:
                     f"too few independent {noun}s: {_worth(noun, number, independent)}; expected {least:g} or more, "
                     "since probabilities and standard errors are rough with fewer",
                 )
+
+    def _latest(self) -> str:
+        return (
+            f"the last {counted(self.n_latest, 'record')} are all far from those before and were left out: perhaps the "
+            "structure has just changed; expected records of one state, so identify the last ones on their own"
+        )
 
     def _left_out(self) -> str:
         n_left = sum(self.left_out.values())

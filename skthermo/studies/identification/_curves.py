@@ -18,24 +18,28 @@ FARTHEST = 0.3  # amount up to which effects are tabulated; beyond, they are com
 class Curves:
     """Effects of each cause at ``nodes`` (n_causes, n_nodes), in the coordinates of what was observed.
 
-    ``values`` and ``slopes`` have the shape (n_causes, n_nodes, n_observed).
+    ``values`` and ``slopes`` have the shape (n_causes, n_nodes, n_observed). ``first``, (n_observed, n_causes), are the
+    derivatives where nothing has changed, of what was observed itself.
     """
 
     nodes: Array
     values: Array
     slopes: Array
+    first: Array
 
     @classmethod
     def of(cls, effects: Effects, causes: list[Cause], observed: Observed) -> Curves:
         """Curves of exact effects."""
         nodes = np.array([_nodes(cause.lowest, cause.highest) for cause in causes])
         sets = (nodes[:, :, np.newaxis] * np.eye(len(causes))[:, np.newaxis]).reshape(-1, len(causes))
-        values, slopes = (found.reshape(*nodes.shape, *found.shape[1:]) for found in effects(sets))
+        different, place = np.unique(sets + 0.0, axis=0, return_inverse=True)  # all begin with no change
+        values, slopes = (found[place.ravel()].reshape(*nodes.shape, *found.shape[1:]) for found in effects(different))
         own = np.stack([slopes[column, :, :, column] for column in range(len(causes))])
-        return cls(nodes, values @ observed.rotation.T, own @ observed.rotation.T)
+        none = slopes.reshape(-1, *slopes.shape[2:])[~sets.any(axis=1)][0]
+        return cls(nodes, values @ observed.rotation.T, own @ observed.rotation.T, none)
 
     def at(self, sets: Array, amounts: Array) -> tuple[Array, Array]:
-        """Changes by sets (n_sets, k) of amounts (n_sets, n_sizes, k), and their derivatives."""
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_errors, k), and their derivatives."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, slopes = np.zeros(shape), []
         for i in range(sets.shape[-1]):
@@ -68,4 +72,4 @@ class Curves:
 
 def _nodes(lowest: float, highest: float) -> tuple[float, float, float]:
     lowest, highest = max(lowest, -FARTHEST), min(highest, FARTHEST)
-    return lowest, (lowest + highest) / 2, highest
+    return lowest, 0.0 if lowest < 0 < highest else (lowest + highest) / 2, highest

@@ -12,7 +12,8 @@ from scipy.special import logsumexp
 from skthermo._arrays import Array
 from skthermo.studies.identification._boxes import log_marginal, log_probability
 
-ELSE_SIZES = 0.0005 * 2.0 ** np.arange(7)  # relative shifts by which something else may move the modes
+ELSE_SIZES = 0.0005 * 4.0 ** np.arange(5)  # relative shifts by which something else may move the modes
+ERROR_FACTORS = np.array([1 / 3, 1.0, 3.0])  # of the model's error, which is not well known either
 COMMON_SHARE = 0.3  # share of the mean square of all shifts in the error of the model's effect on one of them
 FARTHEST = 1e-6  # probability of scales of Student's law beyond the smallest one that counts
 WIDTHS = 1.5  # standard deviations of the posterior of ln scale between two of them
@@ -24,14 +25,16 @@ SWEEPS = 25  # steps of a search along each amount in turn
 class Observed:
     """Measured shifts and their errors in coordinates in which these are independent, with unit variance.
 
-    ``rotation`` leads to them; ``elsewhere`` (n_observed,) are the variances there of a shift of something else of size
-    1. Errors of those coordinates that ``is_scaled`` marks follow Student's law, as a mixture of normal laws whose
-    precisions are ``scales`` times 1, with the logarithms of their weights, ``log_scales``.
+    ``rotation`` leads to them. There, ``elsewhere`` (n_observed,) are the variances of a shift by something else of
+    size 1, and ``of_model`` the part of the unit variance that is the model's error. Errors of those coordinates that
+    ``is_scaled`` marks follow Student's law, as a mixture of normal laws whose precisions are ``scales`` times 1, with
+    the logarithms of their weights, ``log_scales``.
     """
 
     measured: Array
     rotation: Array
     elsewhere: Array
+    of_model: Array
     is_scaled: Array
     scales: Array
     log_scales: Array
@@ -42,10 +45,12 @@ class Observed:
 
         The model is wrong by a share of what it explains, which is about what was measured.
         """
-        rotations, variances = [], []
+        rotations, variances, of_model = [], [], []
         for measured, covariance, _ in parts:
             squares = (1 - COMMON_SHARE) * measured**2 + COMMON_SHARE * (measured**2).mean()
-            values, vectors = np.linalg.eigh(covariance + model_error**2 * np.diag(squares))
+            squares *= model_error**2
+            values, vectors = np.linalg.eigh(covariance + np.diag(squares))
+            of_model.append((vectors**2).T @ squares / values)
             rotations.append((vectors / np.sqrt(values)).T)
             variances.append(1 / values)
         is_scaled = np.concatenate([np.full(len(part[0]), np.isfinite(part[2])) for part in parts])
@@ -53,7 +58,13 @@ class Observed:
         scales, log_scales = student_scales(freedom, int(is_scaled.sum()))
         rotation = block_diag(*rotations)
         measured = rotation @ np.concatenate([part[0] for part in parts])
-        return cls(measured, rotation, np.concatenate(variances), is_scaled, scales, log_scales)
+        return cls(
+            measured, rotation, np.concatenate(variances), np.concatenate(of_model), is_scaled, scales, log_scales
+        )
+
+    def variances(self, sizes: Array, factors: Array) -> Array:
+        """Variances with something else of some sizes and the model's error times factors, (n_errors, n_observed)."""
+        return 1 + sizes[:, np.newaxis] ** 2 * self.elsewhere + (factors[:, np.newaxis] ** 2 - 1) * self.of_model
 
 
 def student_scales(freedom: float, n_observed: int) -> tuple[Array, Array]:
@@ -90,7 +101,7 @@ class Amounts:
 
 
 def most_probable(slopes: Array, target: Array, variances: Array, law: Amounts) -> Array:
-    """Amounts within their bounds, (n_sets, n_sizes, k), of linear effects (n_sets, n_sizes, n_observed, k)."""
+    """Amounts within their bounds, (n_sets, n_errors, k), of linear effects (n_sets, n_errors, n_observed, k)."""
     weighted = slopes / variances[..., np.newaxis]
     inner = np.swapaxes(weighted, -1, -2) @ slopes
     size = inner.shape[-1]
@@ -108,7 +119,7 @@ def most_probable(slopes: Array, target: Array, variances: Array, law: Amounts) 
 
 @dataclass(frozen=True)
 class Weighed:
-    """Log evidence of sets of causes, (n_sets, n_sizes, n_scales), with the normal laws of their amounts.
+    """Log evidence of sets of causes, (n_sets, n_errors, n_scales), with the normal laws of their amounts.
 
     ``means`` and ``covariances`` have one or two axes more, for the causes of a set; the laws end at the bounds.
     """
@@ -123,10 +134,11 @@ def weighed(
 ) -> Weighed:
     """Evidence of linear effects, for each scale of Student's law.
 
-    ``log_prior``, (n_sets, n_sizes), counts in what may be neglected, and not in the evidence.
+    ``log_prior``, (n_sets, n_errors), counts in what may be neglected, and not in the evidence.
     """
     size = slopes.shape[-1]
-    inverse = np.where(observed.is_scaled, 1 / observed.scales[:, np.newaxis] - 1, 0.0)  # what a scale adds
+    own = np.where(observed.is_scaled, 1 - observed.of_model, 0.0)  # without the model's error
+    inverse = own * (1 / observed.scales[:, np.newaxis] - 1)  # what a scale adds
     spread = variances[:, :, np.newaxis, :] + inverse
     weighted = slopes[:, :, np.newaxis] / spread[..., np.newaxis]
     inner = np.swapaxes(weighted, -1, -2) @ slopes[:, :, np.newaxis]

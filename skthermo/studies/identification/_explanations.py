@@ -16,6 +16,7 @@ from skthermo.studies.identification._comparison import Effects
 from skthermo.studies.identification._curves import Curves
 from skthermo.studies.identification._evidence import (
     ELSE_SIZES,
+    ERROR_FACTORS,
     Amounts,
     Observed,
     most_probable,
@@ -35,10 +36,10 @@ Set = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Weight:
-    """One set of causes: ``log_evidence`` by size of something else, the first of which is 0, and scale (Student).
+    """One set of causes: ``log_evidence`` by errors (`Scale.variances`) and scale (Student).
 
-    ``means`` and ``covariances`` of the amounts have one or two axes more; ``best`` are the most probable ones by size,
-    (n_sizes, k), and ``change`` (n_sizes, n_observed) and ``variances`` the effects and variances there.
+    ``means`` and ``covariances`` of the amounts have one or two axes more; ``best``, (n_errors, k), are the most
+    probable ones by errors, and ``change`` and ``variances``, (n_errors, n_observed), the effects and variances there.
     """
 
     causes: Set
@@ -49,19 +50,19 @@ class Weight:
     change: Array
     variances: Array
 
-    def amounts(self, log_sizes: Array) -> Array:
-        """The most probable amounts with the most probable size of something else."""
-        return self.best[self._size(log_sizes)]
+    def amounts(self, log_errors: Array) -> Array:
+        """The most probable amounts with the most probable errors."""
+        return self.best[self._likely(log_errors)]
 
-    def is_as(self, other: Weight, log_sizes: Array) -> bool:
+    def is_as(self, other: Weight, log_errors: Array) -> bool:
         """Whether the amounts differ from others by much less than their standard errors."""
-        size = self._size(log_sizes)
-        variances = np.diagonal(self.covariances[size, self.log_evidence[size].argmax()], axis1=-2, axis2=-1)
-        change = self.amounts(log_sizes) - other.amounts(log_sizes)
+        errors = self._likely(log_errors)
+        variances = np.diagonal(self.covariances[errors, self.log_evidence[errors].argmax()], axis1=-2, axis2=-1)
+        change = self.amounts(log_errors) - other.amounts(log_errors)
         return bool((np.abs(change) < SETTLED * np.sqrt(variances)).all())
 
-    def _size(self, log_sizes: Array) -> int:
-        return int((logsumexp(self.log_evidence, axis=-1) + log_sizes).argmax())
+    def _likely(self, log_errors: Array) -> int:
+        return int((logsumexp(self.log_evidence, axis=-1) + log_errors).argmax())
 
 
 @dataclass(frozen=True)
@@ -89,11 +90,20 @@ class Scale:
         return cls(observed, effects, causes, prior, Curves.of(effects, list(causes), observed))
 
     @property
-    def log_sizes(self) -> Array:
-        """Logarithms of the prior probabilities of the sizes of something else, the first of which is 0."""
-        some = self.prior.something_else
+    def log_errors(self) -> Array:
+        """Logarithms of the prior probabilities of `errors`."""
+        some, alone, beside = self.prior.something_else, len(ERROR_FACTORS), len(ELSE_SIZES)
         with np.errstate(divide="ignore"):
-            return np.log(np.append(1 - some, np.full(len(ELSE_SIZES), some / len(ELSE_SIZES))))
+            return np.log(np.repeat([(1 - some) / alone, some / beside], [alone, beside]))
+
+    @property
+    def variances(self) -> Array:
+        """Variances of what was observed, (n_errors, n_observed).
+
+        First without something else and with different errors of the model, then with something else of different size.
+        """
+        nothing, usual = np.zeros(len(ERROR_FACTORS)), np.ones(len(ELSE_SIZES))
+        return self.observed.variances(np.append(nothing, ELSE_SIZES), np.append(ERROR_FACTORS, usual))
 
     def law(self, sets: Array) -> Amounts:
         """Law of the amounts of sets of causes (n_sets, k) before the records are seen."""
@@ -107,10 +117,9 @@ class Scale:
 
     def weigh(self, sets: Array, log_prior: Array, corrections: Sequence[Correction] | None = None) -> list[Weight]:
         """Weights of sets of causes (n_sets, k), by tabulated effects that may be corrected."""
-        law, sizes = self.law(sets), np.append(0.0, ELSE_SIZES)
-        amounts = np.zeros((len(sets), len(sizes), sets.shape[1]))
-        variances = 1 + sizes[:, np.newaxis] ** 2 * self.observed.elsewhere
-        variances = np.broadcast_to(variances, (len(sets), *variances.shape))
+        law = self.law(sets)
+        variances = np.broadcast_to(self.variances, (len(sets), *self.variances.shape))
+        amounts = np.zeros((*variances.shape[:2], sets.shape[1]))
         for step in range(STEPS if sets.shape[1] else 1):
             change, slopes = self.curves.at(sets, amounts)
             if corrections is not None:
@@ -123,7 +132,7 @@ class Scale:
             target = self.observed.measured - change + (slopes @ amounts[..., np.newaxis])[..., 0]
             if step < STEPS - 1:
                 amounts = most_probable(slopes, target, variances, law)
-        found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_sizes)
+        found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_errors)
         return [
             Weight(tuple(causes.tolist()), *parts)
             for causes, *parts in zip(
@@ -135,7 +144,7 @@ class Scale:
         """Exact less tabulated effects of sets of causes at their most probable amounts."""
         full = np.zeros((len(weights), len(self.causes)))
         for row, weight in zip(full, weights, strict=True):
-            row[list(weight.causes)] = weight.amounts(self.log_sizes)
+            row[list(weight.causes)] = weight.amounts(self.log_errors)
         changes, slopes = self.effects(full)
         changes, slopes = changes @ self.observed.rotation.T, self.observed.rotation @ slopes
         found = []
@@ -188,13 +197,13 @@ def refine(scale: Scale, found: list[Weight], log_priors: Sequence[float]) -> li
         priors = [log_priors[place] for place in unsettled]
         after = screen(scale, [weight.causes for weight in before], priors, scale.exact(before))
         for place, old, new in zip(unsettled, before, after, strict=True):
-            found[place], settled[place] = new, new.is_as(old, scale.log_sizes)
+            found[place], settled[place] = new, new.is_as(old, scale.log_errors)
     return found
 
 
 def total(scale: Scale, weight: Weight) -> float:
     """Log evidence of a set of causes, with or without something else."""
-    return float(logsumexp(weight.log_evidence + scale.log_sizes[:, np.newaxis]))
+    return float(logsumexp(weight.log_evidence + scale.log_errors[:, np.newaxis]))
 
 
 def explanations(scale: Scale) -> tuple[list[Weight], Array]:

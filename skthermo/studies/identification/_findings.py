@@ -26,7 +26,7 @@ OF_GROUPS = ("damage", "stiffening")
 
 def findings(
     posterior: Posterior,
-    comparison: Comparison,
+    slopes: Array,
     nominal: Comparison,
     shift: Shift,
     records: ComparedRecords,
@@ -37,11 +37,12 @@ def findings(
 ) -> IdentifiedDamage:
     """Tables of a posterior, and what the causes' effects have in common.
 
-    The comparisons are with the effects of the causes in the weather of the records and at the model's nominal state.
+    ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
+    what the causes have in common is judged at the model's nominal state, too.
     """
-    names, observed = [cause.name for cause in causes], comparison.observed()
+    names, observed = [cause.name for cause in causes], nominal.observed()
     signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
-    slopes, at_nominal = (signs * each.slopes(len(causes)) for each in (comparison, nominal))
+    slopes, at_nominal = signs * slopes, signs * nominal.slopes(len(causes))
     factor = two_errors(shift.freedom)
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)

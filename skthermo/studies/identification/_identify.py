@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import MatrixLike, as_random_state
+from skthermo._arguments import check_jobs
+from skthermo._arrays import MatrixLike, as_floats, as_random_state
 from skthermo._frequency_effects import FrequencyEffects
-from skthermo._warnings import warn_each
+from skthermo._warnings import warn_each, without_warnings
 from skthermo.studies.identification._causes import read_causes
 from skthermo.studies.identification._comparison import Comparison, Part
 from skthermo.studies.identification._explanations import Scale, explanations
@@ -23,6 +25,7 @@ from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._separability import VISIBLE, errors_alone
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from skthermo.studies.scenarios import check_chain
+from skthermo.studies.worlds import checked_models
 
 
 def identify_damage(
@@ -39,6 +42,8 @@ def identify_damage(
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: ArrayLike | None = None,
     shape_noise: ArrayLike = 0.01,
+    models: Sequence[Any] | None = None,
+    n_jobs: int | None = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> IdentifiedDamage:
     """Severities of damage groups that explain how measured frequencies have shifted.
@@ -72,6 +77,12 @@ def identify_damage(
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of a component of a measured shape, relative to the shape's largest component.
+    models : sequence of FE model, optional
+        Models that may be the structure's, all as probable, as `~skthermo.updating.ModelUpdater.sample_models` gives
+        them. The chain learns its training records anew with each of them; probabilities and amounts are averages over
+        the models. By default the chain's own model counts as right.
+    n_jobs : int, optional
+        Parallel jobs (joblib) over the models. Results do not depend on it.
     random_state : int, RandomState or None, default=None
         Seed of the draws behind standard errors and p-values.
 
@@ -145,7 +156,9 @@ def identify_damage(
         return Comparison(parts)
 
     every, nominal = compared(effects), compared(effects.nominal())
-    alone = errors_alone(every.slopes(len(causes)))
+    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+    whitened = every.observed().rotation @ scale.curves.first
+    alone = errors_alone(whitened)
     if alone.min() > VISIBLE:
         errors = ", ".join(f"{cause.name} {error:.2g}" for cause, error in zip(causes, alone, strict=True))
         raise ValueError(
@@ -153,9 +166,24 @@ def identify_damage(
             f"{errors}. More records or other modes would lower them"
         )
     random = as_random_state(random_state)
-    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
-    posterior = Posterior.of(scale, *explanations(scale), random)
-    found = findings(posterior, every, nominal, seen.shift, seen.records, causes, changes, prior, random)
+    if models is None:
+        posterior = Posterior.of(scale, *explanations(scale), random)
+    else:
+
+        def with_model(model: Any, seed: int) -> Posterior:
+            with without_warnings():  # the chain itself has given them
+                chain = fem.refitted(model=model)
+                theta = as_floats(chain.predict_parameters(seen.temperatures))
+                other = compared(FrequencyEffects.of(chain, theta, seen.frequencies, changes))
+                scale = Scale.of(other.observed(prior.model_error), other.effects, causes, prior)
+            return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
+
+        models = checked_models(fem, models)
+        check_jobs(n_jobs)
+        seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
+        jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
+        posterior = Posterior.mean(Parallel(n_jobs=n_jobs)(jobs))
+    found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
 

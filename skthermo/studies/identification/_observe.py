@@ -7,22 +7,26 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_same_rows
+from skthermo._times import has_stamps, row_times
 from skthermo._validation import check_array
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
-from skthermo.studies.identification._shift import Shift, measured_shift
+from skthermo.studies.identification._shift import Shift, measured_shift, outlying, record_shifts, scatter_of
+
+FAR_FROM_OTHERS = "far from the other records"
 
 
 @dataclass(frozen=True)
 class Observation:
-    """Records that were compared: their shift, parameters theta, and frequencies, NaN where a record was left out."""
+    """Records that were compared: their shift, temperatures, parameters theta, and frequencies; NaN where left out."""
 
     shift: Shift
     records: ComparedRecords
+    temperatures: Any
     theta: Array
     frequencies: Array
 
@@ -36,9 +40,20 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
     is_compared = ~np.any(list(left_out.values()), axis=0)
     frequencies = np.where(is_compared[:, np.newaxis], frequencies, np.nan)
     with warnings_once():
-        shift = measured_shift(fem, T, theta, frequencies, noise)
-    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values))
-    return Observation(shift, records, theta, frequencies)
+        shifts = record_shifts(fem, T, theta, frequencies)
+        outliers = outlying(shifts, np.sqrt(scatter_of(fem, noise).variances))
+        left_out[FAR_FROM_OTHERS] = outliers
+        frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
+        shift = measured_shift(fem, T, shifts, noise)
+    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values), latest(T, outliers))
+    return Observation(shift, records, T, theta, frequencies)
+
+
+def latest(T: Any, rows: NDArray[np.bool_]) -> int:
+    """Number of rows in a row at the end of the records, in their order in time."""
+    order = np.argsort(row_times(T), kind="stable") if has_stamps(T) else np.arange(len(rows))
+    others = np.flatnonzero(~rows[order])
+    return len(rows) - 1 - int(others[-1]) if len(others) else len(rows)
 
 
 def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:

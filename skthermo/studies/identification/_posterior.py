@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from skthermo._arrays import Array
 from skthermo.studies.identification._boxes import draws, log_probability
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
-from skthermo.studies.identification._evidence import Amounts
+from skthermo.studies.identification._evidence import ERROR_FACTORS, Amounts
 from skthermo.studies.identification._explanations import Scale, Weight
 
 KEPT = 1e-5  # probability of explanations that are kept
@@ -54,17 +54,18 @@ class Posterior:
     @classmethod
     def of(cls, scale: Scale, weights: Sequence[Weight], log_priors: Array, random: np.random.RandomState) -> Posterior:
         """Of weighed sets of causes."""
-        terms = [w.log_evidence + scale.log_sizes[:, np.newaxis] + p for w, p in zip(weights, log_priors, strict=True)]
+        terms = [w.log_evidence + scale.log_errors[:, np.newaxis] + p for w, p in zip(weights, log_priors, strict=True)]
         totals = np.array([logsumexp(term) for term in terms])
         everything, found = logsumexp(totals), []
+        alone, beside = slice(0, len(ERROR_FACTORS)), slice(len(ERROR_FACTORS), None)
         holds = np.array([[cause in weight.causes for weight in weights] for cause in range(len(scale.causes))])
         best_of_causes = set(np.where(holds, totals, -np.inf).argmax(axis=1).tolist())
         for place, (weight, term) in enumerate(zip(weights, terms, strict=True)):
-            for sizes, more in ((slice(0, 1), ()), (slice(1, None), (SOMETHING_ELSE,))):
-                logs = term[sizes] - everything
+            for errors, more in ((alone, ()), (beside, (SOMETHING_ELSE,))):
+                logs = term[errors] - everything
                 probability = float(np.exp(logsumexp(logs)))
                 if probability > KEPT or (place in best_of_causes and probability > 0):
-                    found.append(_explanation(scale, weight, logs, sizes, more, random))
+                    found.append(_explanation(scale, weight, logs, errors, more, random))
         return cls(sorted(found, key=lambda one: -one.probability))
 
     @classmethod
@@ -155,16 +156,19 @@ def _summary(values: Array, weights: Array) -> dict[str, float]:
 
 
 def _explanation(
-    scale: Scale, weight: Weight, logs: Array, sizes: slice, more: tuple[str, ...], random: np.random.RandomState
+    scale: Scale, weight: Weight, logs: Array, errors: slice, more: tuple[str, ...], random: np.random.RandomState
 ) -> Explanation:
-    """One set of causes as an explanation, with some sizes of something else, by the logarithms of their weights."""
+    """One set of causes as an explanation, with some errors, by the logarithms of their weights."""
     probability, law = float(np.exp(logsumexp(logs))), scale.law(np.array([weight.causes], dtype=int))
-    drawn = _drawn(logs, weight.means[sizes], weight.covariances[sizes], law, probability, random)
-    size = int(logsumexp(logs, axis=-1).argmax()) + sizes.start
-    rest = scale.observed.measured - weight.change[size]
-    change = np.linalg.solve(scale.observed.rotation, weight.change[size])
+    drawn = _drawn(logs, weight.means[errors], weight.covariances[errors], law, probability, random)
+    # what a misfit cannot show: an effect that is too large or too small by the same factor in all modes
+    factors = np.exp(scale.prior.model_error * random.standard_normal(drawn.shape))
+    drawn = np.clip(drawn * factors, law.lowest[0], law.highest[0])
+    likely = int(logsumexp(logs, axis=-1).argmax()) + errors.start
+    rest = scale.observed.measured - weight.change[likely]
+    change = np.linalg.solve(scale.observed.rotation, weight.change[likely])
     causes = tuple(scale.causes[cause].name for cause in weight.causes) + more
-    return Explanation(causes, probability, drawn, change, float((rest**2 / weight.variances[size]).sum()))
+    return Explanation(causes, probability, drawn, change, float((rest**2 / weight.variances[likely]).sum()))
 
 
 def _drawn(

@@ -29,8 +29,9 @@ class DamagePrior:
     something_else : float, default=0.05
         Probability that something else shifted the frequencies too: a shift of each mode, independent from mode to
         mode, of unknown size; 0 leaves it out.
-    model_error : float, default=0.05
-        Standard deviation of the error of the model's effect on each mode, relative to that effect.
+    model_error : float, default=0.03
+        Standard deviation of the error of the model's effect on each mode, relative to that effect. It may be three
+        times as large or as small, as the misfit of the modes says; the effect on all modes together is as uncertain.
 
     Raises
     ------
@@ -48,7 +49,7 @@ class DamagePrior:
     severity: float = 0.2
     law: Literal["half-normal", "uniform"] = "half-normal"
     something_else: float = 0.05
-    model_error: float = 0.05
+    model_error: float = 0.03
 
     def __post_init__(self) -> None:
         numbers = as_floats(self.numbers)

@@ -1,5 +1,6 @@
 """Shift of measured frequencies from the healthy structure's in the same weather, and its error."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,6 +14,9 @@ from skthermo._arrays import Array, as_floats
 from skthermo._frequency_effects import healthy_frequencies
 from skthermo._times import has_stamps, row_times
 
+FEWEST_TO_JUDGE = 8  # records among which one may be called far from the others
+FAR = 6.0  # standard deviations beyond which a record is far from the others
+MAD_TO_DEVIATION = 1.4826
 WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
 
 
@@ -37,11 +41,30 @@ class Shift:
     modes: Sequence[Any]
 
 
-def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
-    """The shift at temperatures T with parameters theta, and its covariance from the training records."""
+def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
+    """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
     residuals = as_floats(fem.expected_residuals(T))
-    shifts = np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals)))
-    scatter = _scatter(fem, noise, F.shape[1])
+    return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals)))
+
+
+def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
+    """Records far from the others in a mode, in units of their scatter or of the known one where that is larger.
+
+    None are if there are too few to tell, or if more than half of them would be.
+    """
+    if len(shifts) < FEWEST_TO_JUDGE or np.isnan(shifts).all():
+        return np.zeros(len(shifts), dtype=bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of modes that were not measured
+        away = np.abs(shifts - np.nanmedian(shifts, axis=0))
+        scale = np.fmax(MAD_TO_DEVIATION * np.nanmedian(away, axis=0), deviations)
+    rows = (np.nan_to_num(away) > FAR * scale).any(axis=1)
+    return rows if rows.sum() < len(rows) / 2 else np.zeros(len(rows), dtype=bool)
+
+
+def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["fitted"]) -> Shift:
+    """The mean of shifts of records at temperatures T, and its covariance from the training records."""
+    scatter = scatter_of(fem, noise)
     shifts = np.where(scatter.variances > 0, shifts, np.nan)
     order, places = _places(fem.training_records_[0], T)
     n_records, mean = (~np.isnan(shifts)).sum(axis=0), _mean(shifts)
@@ -65,12 +88,13 @@ def measured_shift(fem: Any, T: Any, theta: Array, F: Array, noise: ArrayLike | 
     return Shift(mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_)
 
 
-def _scatter(fem: Any, noise: ArrayLike | Literal["fitted"], n_modes: int) -> Any:
+def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
+    """How records scatter: as in training, or as stated."""
     if isinstance(noise, str):
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
         return fem.residuals_.scatter
-    deviations = check_noise(noise, n_modes, fem.mode_names_)
+    deviations = check_noise(noise, len(fem.mode_names_), fem.mode_names_)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
     return fem.residuals_.independent_scatter(deviations)

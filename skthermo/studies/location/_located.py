@@ -1,0 +1,288 @@
+"""Located damage, as `locate_damage` returns it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arrays import is_real
+from skthermo._formatting import SPACE, listed, percent, share_text
+from skthermo.fem import Structure
+from skthermo.studies.identification import IdentifiedDamage
+from skthermo.studies.location._places import Places
+from skthermo.studies.location._weighing import Answer, Explained
+
+LIKELY, PROBABLE = 0.9, 0.5
+"""Probabilities with which a summary says where damage is: almost surely, and more likely than not."""
+
+WORTH_TELLING = 0.1  # probability of a group from which on a summary says where in it
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedDamage:
+    """Where in its groups a structure is damaged, member by member, as far as records tell.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a member of a group: ``group``; ``element``, its number along the group; ``probability`` that it is
+        among the damaged members; ``severity``, its mean over all explanations, where those without it count as 0;
+        ``if_damaged``, its mean where it is damaged; ``is_likely``, whether it is in the smallest set that holds all
+        damaged members with a probability of 90 %, given that there are any, and but for groups that these modes do not
+        show.
+    groups : DataFrame
+        One row a group: ``probability`` that a part of it is damaged, or all; ``severity``, ``elements``, their number;
+        ``pieces``, into how many it was divided; ``likely``, how many elements hold its damage with a probability of
+        90 %.
+    levels : DataFrame
+        One row a division and group: ``pieces``; ``stretches`` of neighbouring pieces of which was asked whether they
+        are damaged; ``probability`` of the group; ``likely``, how many elements held its damage with a probability of
+        90 %.
+    found : IdentifiedDamage
+        What was found for whole groups.
+    structure : Structure
+        Whose members these are.
+    probability_of_damage : float
+        Probability that a member is damaged.
+    probability_of_else : float
+        Probability that something else shifted the frequencies, beside damage or alone.
+    alike : mapping of str to str
+        Group -> two places in it that these modes cannot tell apart, in words.
+    explained : sequence of explanations
+        Those of the finest division, each with its ``probability``, and the damaged ``members`` and the ``severities``
+        by group.
+    places : mapping of str to places
+        Group -> its members, line by line.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
+    >>> from skthermo.studies import locate_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+    >>> structure, model = truss_structure(), make_truss()
+    >>> fem = DataInformedFEM(model, random_state=0).fit(year.temperatures, year.frequencies)
+    >>> divided = structure.divide(model, {"top": {"middle": ["13"]}})
+    >>> healthy, damaged = (m.frequencies([[1.0] * 4]) for m in (divided, divided.damaged({"middle": 0.4})))
+    >>> F = later.frequencies * damaged / healthy
+    >>> located = locate_damage(fem, structure, later.temperatures, F, ["top", "diagonal"], random_state=0)
+    >>> print(located.summary())
+    top is damaged with a probability of over 99.9 %, probably in element 3 of 5 (x = 10.4 to 15.6 m) (over 99.9 %).
+    The rest of top is unlikely.
+    >>> located.table.loc["13", "severity"].round(1)
+    np.float64(0.4)
+    """
+
+    table: pd.DataFrame
+    groups: pd.DataFrame
+    levels: pd.DataFrame
+    found: IdentifiedDamage
+    structure: Structure = field(repr=False)
+    probability_of_damage: float
+    probability_of_else: float
+    alike: Mapping[str, str]
+    explained: Sequence[Explained] = field(repr=False)
+    places: Mapping[str, Places] = field(repr=False)
+
+    def likely_members(self, probability: float = LIKELY, group: str | None = None) -> list[Hashable]:
+        """The fewest members that hold all damaged ones with a probability, given that there are any.
+
+        Parameters
+        ----------
+        probability : float, default=0.9
+            Between 0 and 1.
+        group : str, optional
+            Only damage in this group. By default in any that these modes show.
+
+        Returns
+        -------
+        list of members
+            The most probable first; none if there is no damage.
+
+        Raises
+        ------
+        ValueError
+            If the group is unknown, or the probability is not between 0 and 1.
+        """
+        if group is not None and group not in self.places:
+            raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
+        if not is_real(probability) or not 0 < probability < 1:
+            raise ValueError(f"probability is {probability!r}; expected a number between 0 and 1, such as 0.9")
+        return fewest(self._sets(group), probability)[0]
+
+    def answer(self) -> list[str]:
+        """Where the structure is damaged, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences.
+        """
+        return list(self._answer())
+
+    def summary(self) -> str:
+        """What was found, where in each group, and what cannot be told apart.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        return "\n".join(self.answer()).replace(SPACE, " ")
+
+    def _sets(self, group: str | None) -> list[tuple[frozenset[Hashable], float]]:
+        """Sets of damaged members and their probabilities."""
+        if group is not None:
+            return [(e.members[group], e.probability) for e in self.explained if group in e.members]
+        return visible_sets(self.explained, self.found.unseen)
+
+    def _answer(self) -> Iterator[str]:
+        is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unseen)
+        probable = self.groups[is_told]
+        if probable.empty:
+            yield (
+                f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "
+                "name."
+            )
+        for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
+            yield from self._of_group(str(group), row)
+        if self.probability_of_else >= WORTH_TELLING:
+            yield f"Something else may have shifted the frequencies ({_share(self.probability_of_else)})."
+        if self.found.unseen:
+            yield f"Damage in {listed(self.found.unseen)} would hardly show in these modes."
+
+    def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
+        damaged = f"{group} is damaged with a probability of {_share(row['probability'])}"
+        places = self.places[group]
+        if row["pieces"] == 1:
+            yield damaged + (", of one element." if row["elements"] == 1 else "; it was not divided.")
+            return
+        (small, in_small), (wide, in_wide) = (fewest(self._sets(group), level) for level in (PROBABLE, LIKELY))
+        if len(small) == len(places.members):
+            whole = self._share_of_whole(group)
+            yield damaged + (
+                f", probably all {len(small)} elements alike ({_share(whole)})."
+                if whole >= PROBABLE
+                else "; these records do not say where in it."
+            )
+            return
+        yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({_share(in_small)})."
+        if len(wide) == len(places.members):
+            yield f"The rest of {group} cannot be excluded."
+        elif set(wide) != set(small):
+            where = places.text(wide, alternatives=True)
+            yield f"It lies in {where} with {_share(in_wide)}; the rest of {group} is unlikely."
+        else:
+            yield f"The rest of {group} is unlikely."
+        if group in self.alike:
+            yield f"These modes cannot tell {self.alike[group]}."
+
+    def _share_of_whole(self, group: str) -> float:
+        """Probability that all of a group is damaged alike, given that it is damaged."""
+        sets, everything = self._sets(group), frozenset(self.places[group].members)
+        return sum(share for members, share in sets if members == everything) / sum(share for _, share in sets)
+
+    def __repr__(self) -> str:
+        best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
+        return f"LocatedDamage({', '.join(f'{group} {share:.0%}' for group, share in best.items())})"
+
+
+def located_damage(
+    answer: Answer,
+    found: IdentifiedDamage,
+    places: Mapping[str, Places],
+    pieces: Mapping[str, int],
+    levels: pd.DataFrame,
+) -> LocatedDamage:
+    """From the explanations of the finest division, and the number of pieces of each group that was divided."""
+    explained = answer.explained
+    total = sum(one.probability for one in explained)
+    likely, rows = set(fewest(visible_sets(explained, found.unseen), LIKELY)[0]), {}
+    for group, where in places.items():
+        for member, number in where.numbers.items():
+            if member not in rows:
+                shares = [
+                    (one.probability / total, one.severities[name])
+                    for one in explained
+                    for name, inside in one.members.items()
+                    if member in inside
+                ]
+                rows[member] = _averages(shares) | {
+                    "group": group,
+                    "element": number,
+                    "is_likely": member in likely,
+                }
+    columns = ["group", "element", "probability", "severity", "if_damaged", "is_likely"]
+    table = pd.DataFrame(list(rows.values()), pd.Index(list(rows), tupleize_cols=False, name="member"), columns)
+    by_group = {}
+    for group, where in places.items():
+        inside = [one for one in explained if group in one.members]
+        of_group = [(one.members[group], one.probability) for one in inside]
+        by_group[group] = _averages([(one.probability / total, one.severities[group]) for one in inside]) | {
+            "elements": len(where.members),
+            "pieces": pieces.get(group, 1),
+            "likely": len(fewest(of_group, LIKELY)[0]),
+        }
+    groups = pd.DataFrame.from_dict(by_group, orient="index")
+    alike = {
+        group: " from ".join(places[group].text(members) for members in pair)
+        for group, pair in answer.alike.items()
+        if pieces.get(group, 1) > 1
+    }
+    return LocatedDamage(
+        table=table,
+        groups=groups,
+        levels=levels,
+        found=found,
+        structure=next(iter(places.values())).structure,
+        probability_of_damage=sum(one.probability for one in explained if one.members) / total,
+        probability_of_else=sum(one.probability for one in explained if one.has_else) / total,
+        alike=alike,
+        explained=explained,
+        places=places,
+    )
+
+
+def visible_sets(explained: Sequence[Explained], unseen: Sequence[str]) -> list[tuple[frozenset[Hashable], float]]:
+    """Sets of damaged members and their probabilities, less groups of which the modes show nothing."""
+    found = []
+    for one in explained:
+        members = [inside for group, inside in one.members.items() if group not in unseen]
+        if members:
+            found.append((frozenset().union(*members), one.probability))
+    return found
+
+
+def _averages(shares: Sequence[tuple[float, float]]) -> dict[str, float]:
+    """Probability, mean severity where the rest counts as 0, and mean severity where there is damage."""
+    probability = sum(share for share, _ in shares)
+    mean = sum(share * severity for share, severity in shares)
+    return {
+        "probability": probability,
+        "severity": mean,
+        "if_damaged": mean / probability if probability > 0 else float("nan"),
+    }
+
+
+def _share(probability: float) -> str:
+    """A probability in percent, which is never quite 100."""
+    return share_text(min(probability, 1 - 1e-6))
+
+
+def fewest(sets: Collection[tuple[frozenset[Hashable], float]], probability: float) -> tuple[list[Hashable], float]:
+    """The fewest members, by their own probabilities, that hold all damaged ones with a probability, and theirs."""
+    shares: dict[Hashable, float] = {}
+    for members, share in sets:
+        for member in members:
+            shares[member] = shares.get(member, 0.0) + share
+    ordered = sorted(shares, key=lambda member: -shares[member])
+    rank = {member: position for position, member in enumerate(ordered)}
+    held = np.zeros(len(ordered))
+    for members, share in sets:
+        held[max(rank[member] for member in members)] += share
+    held = np.cumsum(held) / max(held.sum(), np.finfo(float).tiny)
+    number = int(np.searchsorted(held, probability * (1 - 1e-9))) + 1
+    return ordered[:number], float(held[number - 1]) if ordered else 0.0
