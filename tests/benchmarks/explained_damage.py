@@ -22,7 +22,7 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from explained_structures import STRUCTURES, World
+from explained_structures import STRUCTURES, World, memory_of
 
 from skthermo.studies import identify_damage
 
@@ -38,6 +38,7 @@ ENSEMBLE_WORLDS, N_MODELS = 6, 6
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named
 NORMAL = 1.645  # standard errors of a band of 90 %, where there are no bands
 BINS = [0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.001]
+RIGHT = ["right model", "shapes"]
 SHOWN = ["right model", "shapes", "wrong model", "ensemble"]
 
 
@@ -91,6 +92,8 @@ def answered(found, truth, groups):
         "true one": true_one,
         "truth": ", ".join(f"{g} {100 * truth[g]:g}" for g in truth.index if truth[g] > 0) or "healthy",
         "said": " + ".join(sorted(said)) or "no damage",
+        "p": found.p_value,
+        "p of misfit": found.misfit_p_value,
     }
     of_groups = pd.DataFrame(
         {
@@ -132,7 +135,7 @@ def measured(name, design, seeds, verbose):
             start = time.process_time()
             state, of_groups = answered(asked(world, truth, number, design, models), truth, list(structure.groups))
             spent["identify"] += time.process_time() - start
-            at = {"structure": name, "design": design, "seed": seed}
+            at = {"structure": name, "design": design, "correlation": memory_of(seed)}
             states.append(at | state)
             groups.append(of_groups.assign(**at))
             if verbose:
@@ -193,6 +196,21 @@ def coverage_table(groups):
     return pd.DataFrame(rows).T
 
 
+def dependence_table(states, groups):
+    """The same by the correlation of records with those before."""
+    rows = {}
+    for memory, some in states.groupby("correlation"):
+        healthy, held = some[some["n"] == 0], groups.loc[groups["correlation"] == memory].dropna(subset="held")
+        rows[memory] = {
+            "healthy": share(healthy["hit"]),
+            "healthy, p < .05": share(healthy["p"] < 0.05),
+            "12 %": share(some.loc[(some["severity"] == 0.12) & some["visible"], "hit"]),
+            "misfit, p < .05": share(some["p of misfit"] < 0.05),
+            "damaged, seen": share(held.loc[held["seen"] & (held["truth"] > 0), "held"]),
+        }
+    return pd.DataFrame(rows).T.rename_axis("correlation")
+
+
 def reliability(probability, is_true):
     """What is called so probable, and how often it is true."""
     cut = pd.cut(probability, BINS, right=False)
@@ -205,7 +223,7 @@ def targets(states, groups):
     for key, some in states.groupby(["structure", "design"], sort=False):
         what = ", ".join(key)
         at_12 = some[(some["severity"] == 0.12) & some["visible"]]
-        if key[1] in ("right model", "shapes"):
+        if key[1] in RIGHT:
             yield f"{what}: healthy, no damage", 100 * some.loc[some["n"] == 0, "hit"].mean(), 95, 100
             if len(at_12):
                 yield f"{what}: 12 % named", 100 * at_12["hit"].mean(), 90, 100
@@ -214,7 +232,7 @@ def targets(states, groups):
         if len(known):
             yield f"{', '.join(key)}: bands, damaged groups", 100 * known["held"].mean(), 85, 95
     for right in (True, False):
-        some = states[(states["design"].isin(["right model", "shapes"])) == right]
+        some = states[(states["design"].isin(RIGHT)) == right]
         called = some[some["probability"].between(0.7, 0.9)]
         if len(called):
             what = "right models" if right else "wrong models"
@@ -268,13 +286,15 @@ def main():
     print(found_table(states).to_string())
     print("\nSeverities in their bands of 90 %, % of groups (seen: Cramer-Rao deviation alone below 6 %)")
     print(coverage_table(groups).to_string())
-    if states["probability"].notna().any():
-        for right in (True, False):
-            of = [frame[frame["design"].isin(["right model", "shapes"]) == right] for frame in (states, groups)]
-            if len(of[0]):
-                print(f"\nReliability, {'right' if right else 'wrong'} models: most probable explanation; each group")
-                print(reliability(of[0]["probability"], of[0]["hit"]).to_string())
-                print(reliability(of[1]["probability"], of[1]["truth"] > 0).to_string())
+    for which in ("right", "wrong"):
+        some, of_groups = (frame[frame["design"].isin(RIGHT) == (which == "right")] for frame in (states, groups))
+        if len(some):
+            print(f"\nBy correlation of records, {which} models, %")
+            print(dependence_table(some, of_groups).to_string())
+        if some["probability"].notna().any():
+            print(f"\nReliability, {which} models, %: most probable explanation; each group")
+            print(reliability(some["probability"], some["hit"]).to_string())
+            print(reliability(of_groups["probability"], of_groups["truth"] > 0).to_string())
     print()
     missed = 0
     for what, value, lowest, highest in targets(states, groups):
