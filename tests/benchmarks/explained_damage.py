@@ -16,9 +16,11 @@ version of the library without explanations, the most probable one is the set of
 """
 
 import argparse
+import os
 import sys
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -239,17 +241,14 @@ def targets(states, groups):
             yield f"{what}: called {100 * called['probability'].mean():.0f} %", 100 * called["hit"].mean(), 70, 90
 
 
-def z24():
+def z24(folder):
     """Explanations of the damage of Z24: only reported."""
-    import os
-    from pathlib import Path
-
     sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
     from z24_damage_recipes import identify
-    from z24_recipes import load
+    from z24_recipes import Bridge, find
 
-    found = identify(load(os.environ["SKTHERMO_DATA"]))[1]
-    print("\nZ24:\n" + found.summary())
+    found = identify(Bridge(find(Path(folder))))[1]
+    print(found.summary())
     if hasattr(found, "explanations"):
         print(found.explanations.round(3).to_string())
     print(found.table.round(3).to_string())
@@ -269,7 +268,7 @@ def main():
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.z24:
-        z24()
+        z24(os.environ["SKTHERMO_DATA"])
         return 0
     every = []
     for name in options.structures:
