@@ -34,9 +34,10 @@ DESIGNS = {
     "frame": ("right model", "wrong model"),
     "footbridge": ("right model", "wrong model", "ensemble"),
 }
-WORLDS = {"truss": 60, "KW51": 12, "frame": 12, "footbridge": 20}
-N_HEALTHY = {"truss": 2, "KW51": 5, "frame": 5, "footbridge": 3}  # windows without damage of each world
-ENSEMBLE_WORLDS, N_MODELS = 6, 6
+WORLDS = {"truss": 60, "KW51": 5, "frame": 5, "footbridge": 12}
+SHARE = {"right model": 1.0, "shapes": 1.0, "wrong model": 0.4, "ensemble": 0.1}  # of these
+N_HEALTHY = {"truss": 2, "KW51": 4, "frame": 4, "footbridge": 3}  # windows without damage of each world
+N_MODELS = 6  # of an ensemble
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named
 NORMAL = 1.645  # standard errors of a band of 90 %, where there are no bands
 BINS = [0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.001]
@@ -275,8 +276,7 @@ def main():
         for design in [one for one in DESIGNS[name] if one in options.designs]:
             if design == "ensemble" and "models" not in identify_damage.__kwdefaults__:
                 continue
-            number = options.worlds or (ENSEMBLE_WORLDS if design == "ensemble" else WORLDS[name])
-            number = max(number // 6, 2) if options.quick else number
+            number = options.worlds or max(round(SHARE[design] * WORLDS[name] / (6 if options.quick else 1)), 1)
             seeds = range(options.first, options.first + number)
             every.append(measured(name, design, seeds, options.verbose))
     states, groups = (pd.concat(parts, ignore_index=True) for parts in zip(*every, strict=True))
