@@ -216,7 +216,6 @@ class IdentifiedDamage:
         text : str
             Of the warning.
         """
-        yield from self.records.warnings()
         yield from warnings(self)
 
     def __repr__(self) -> str:

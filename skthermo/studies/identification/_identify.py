@@ -25,6 +25,7 @@ from skthermo.studies.identification._posterior import Posterior
 from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._separability import VISIBLE, errors_alone
 from skthermo.studies.identification._shape_effects import ShapeEffects
+from skthermo.studies.identification._shift import Shift
 from skthermo.studies.scenarios import check_chain
 from skthermo.studies.worlds import checked_models
 
@@ -154,14 +155,7 @@ def identify_damage(
     causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
     seen = observe(fem, T, F, noise)
     effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
-
-    def compared(effects: FrequencyEffects) -> Comparison:
-        parts = [Part(effects, seen.shift.mean, seen.shift.covariance, seen.shift.freedom)]
-        if shapes is not None:
-            parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
-        return Comparison(parts)
-
-    every = compared(effects)
+    every = compared(effects, seen.shift, shapes, dofs, shape_noise)
     nominal = Comparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
     scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     whitened = every.observed().rotation @ scale.curves.first
@@ -181,7 +175,8 @@ def identify_damage(
             with without_warnings():  # the chain itself has given them
                 chain = fem.refitted(model=model)
                 theta = as_floats(chain.predict_parameters(seen.temperatures))
-                other = compared(FrequencyEffects.of(chain, theta, seen.frequencies, changes))
+                of_chain = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
+                other = compared(of_chain, seen.shift, shapes, dofs, shape_noise)
                 scale = Scale.of(other.observed(prior.model_error), other.effects, causes, prior)
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 
@@ -193,6 +188,20 @@ def identify_damage(
     found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
+
+
+def compared(
+    effects: FrequencyEffects,
+    shift: Shift,
+    shapes: Any,
+    dofs: ArrayLike | None,
+    shape_noise: ArrayLike | Literal["fitted"],
+) -> Comparison:
+    """Measured shifts of frequencies, and of shapes if there are any, beside the effects of causes."""
+    parts = [Part(effects, shift.mean, shift.covariance, shift.freedom)]
+    if shapes is not None:
+        parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
+    return Comparison(parts)
 
 
 def _of_shapes(
