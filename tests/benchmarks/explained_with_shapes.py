@@ -4,10 +4,10 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/explained_with_shapes.py --seeds 4 --days 60
 
 One or two things change, damage groups of the deck and its mass; records are daily, of 0.2 % of noise, and shapes are
-means of some records at the bridge's twelve sensors, of 1 % of noise. For every case the probability of the true explanation,
-without and with shapes, the mean error of the amounts, and the least standard errors (Cramer-Rao) of each cause
-beside all others. The exit code is 1 if shapes do not lower the mean least error of the deck's causes to a half, or if
-they make the true explanations less probable in the mean.
+means of some records at the bridge's twelve sensors, of 1 % of noise. For every case the probability of the true
+explanation, without and with shapes, the mean error of the amounts, and the least standard errors (Cramer-Rao) of each
+cause beside all others. The exit code is 1 if shapes do not lower the mean least error of the deck's causes to a half,
+or if they make the true explanations less probable in the mean.
 """
 
 import argparse
@@ -92,7 +92,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=2, help="campaigns of each case")
     parser.add_argument("--days", type=int, default=20, help="daily records after the change")
     asked = parser.parse_args()
-    inverse = InverseSurrogate(noise=NOISE, n_samples=300)
+    inverse = InverseSurrogate(noise=NOISE, n_samples=300, bounds=0.1)
     fem = DataInformedFEM(bridge(), inverse=inverse, random_state=0).fit(*records(365, 0))
     rows, precision = [], None
     for case in CASES:
