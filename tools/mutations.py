@@ -325,6 +325,19 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/drift/_explanations.py", "monitoring/drift"): [
         ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
     ],
+    ("_changes.py", "studies/test_identify_causes.py"): [
+        (
+            "derivatives by relative changes",
+            "(self.directions / (1 + self.directions * amounts",
+            "(self.directions / (1 + 0 * amounts",
+        ),
+    ],
+    ("_frequency_effects.py", "studies/test_identify_causes.py"): [
+        ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
+    ],
+    ("studies/identification/measured/_shape_effects.py", "studies/test_identify_shapes.py"): [
+        ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
+    ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
