@@ -129,14 +129,15 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 # %%
 # .. code-block:: none
 #
-#    Most probable: a loss of 3.2 % of stiffness in girder_torsion (between 2.0 and 4.4 %), of 10 % in abutments (between
-#    6 and 14 %) and of 18 % in soil (between 15 and 21 %), probability 39 %.
+#    Most probable: a loss of 3.2 % of stiffness in girder_torsion (between 2.0 and 4.4 %), of 10 % in abutments
+#    (between 6 and 14 %) and of 18 % in soil (between 15 and 21 %), probability 39 %.
 #    It could also be: about the same and something else (2 %); a loss of 18 % in soil and something else (30 %); a loss
 #    of 10 % in abutments, of 18 % in soil and something else (6 %); something else than damage of these groups (6 %); a
 #    loss of 11 % in piers, of 17 % in soil and something else (5 %).
 #    The probability that nothing has changed is below 0.1 %.
-#    Averaged over all explanations: soil 17 % (between 0 and 22 %; damaged with probability 91 %); abutments 5 % (between
-#    0 and 14 %; damaged with probability 50 %); girder_torsion 2 % (between 0 and 4 %; damaged with probability 48 %).
+#    Averaged over all explanations: soil 17 % (between 0 and 22 %; damaged with probability 91 %); abutments 5 %
+#    (between 0 and 14 %; damaged with probability 50 %); girder_torsion 2 % (between 0 and 4 %; damaged with
+#    probability 48 %).
 #    girder_bending and piers cannot be told apart by these modes: only their common effect is known.
 #    Compared: 110 records, worth 7.5 independent ones; with 2,800 training records, worth 103 independent ones.
 #    20 of 130 records could not be compared: 17 in weather far outside that of the training records and 3 far from the
@@ -158,15 +159,15 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 #    f4     -1.67      -1.14            0.32
 #
 # That something has changed is sure, and the soil under the piers is where, with a probability of 91 %. What else has
-# changed is not: three damaged groups explain the shifts about as well as the soil and something that no damage of these
-# groups is. The truth, a pier that was lowered, is not a loss of stiffness of one group.
+# changed is not: three damaged groups explain the shifts about as well as the soil and something that no damage of
+# these groups is. The truth, a pier that was lowered, is not a loss of stiffness of one group.
 
 IdentifiedDamageDisplay.from_predictions(found)
 
 # %%
 # .. image:: /images/z24_damage.png
-#    :alt: Explanations with their probabilities, 39 % for three groups and 30 % for the soil and something else; average
-#          severities of five groups with 90 % bands, that of the soil the largest; shifts of four modes
+#    :alt: Explanations with their probabilities, 39 % for three groups and 30 % for the soil and something else;
+#          average severities of five groups with 90 % bands, that of the soil the largest; shifts of four modes
 #
 # Would a simulation have told the same?
 # --------------------------------------
