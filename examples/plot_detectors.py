@@ -55,7 +55,7 @@ def truth(scenario, seed):
     return add_noise(clean[scenario.name], 0.01, random_state=seed)
 
 
-study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=5, random_state=0)
+study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=5, random_state=0, uncertainty="noise")
 study.run(later.temperatures, baseline, reference=truth)
 ranking = study.ranking(max_false_alarms=0.03)
 print((100 * ranking[["false_alarms", "pod", "pod_equal", "behind"]]).round(1).to_string())
@@ -96,7 +96,9 @@ print(f"rank correlation of damage found: {true['pod'].corr(ranking['pod'], meth
 
 cold = later.temperatures - 10
 clean_cold = later.model.frequencies(steel_modulus(cold))
-colder = DetectabilityStudy(fem, {name: detectors[name] for name in few}, scenarios[:1], n_repeats=5, random_state=0)
+colder = DetectabilityStudy(
+    fem, {name: detectors[name] for name in few}, scenarios[:1], n_repeats=5, random_state=0, uncertainty="noise"
+)
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", ".*temperatures far outside")  # as they are meant to be
     colder.run(cold, baseline, reference=lambda scenario, seed: add_noise(clean_cold, 0.01, random_state=seed))

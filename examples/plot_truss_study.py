@@ -110,7 +110,7 @@ def study_of(severities):
     """Alarms in simulated and in true years with damage of these severities."""
     detector = MahalanobisDetector(threshold="quantile")
     settings = {"noise": NOISE, "n_repeats": 10, "random_state": 0}
-    study = DetectabilityStudy(fem, detector, sweep(fem, severities, GROUPS), **settings)
+    study = DetectabilityStudy(fem, detector, sweep(fem, severities, GROUPS), uncertainty="noise", **settings)
     study.run(later.temperatures, year.frequencies, reference=true_records)
     return study
 
@@ -150,7 +150,9 @@ for ax, group in zip(axes, GROUPS, strict=True):
 several = field_detectors(list(year.frequencies))
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "broken lines"]
 tenth = [{}, *({group: 0.1} for group in GROUPS)]
-bench = DetectabilityStudy(fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0)
+bench = DetectabilityStudy(
+    fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0, uncertainty="noise"
+)
 bench.run(later.temperatures, reference=true_records)
 print(bench.ranking()[["false_alarms", "pod", "behind", "clearly_behind"]].round(2).to_string())
 print(bench.summary())

@@ -56,7 +56,9 @@ class Realisation:
         scenarios = sweep(self.fem, severities, GROUPS)
         clean = {one.name: self.later.model.damaged(one.damage).frequencies(self.later.theta) for one in scenarios}
         options = {"noise": noise, "n_repeats": n_repeats, "random_state": self.seed}
-        study = DetectabilityStudy(self.fem, MahalanobisDetector(threshold="quantile"), scenarios, **options)
+        study = DetectabilityStudy(
+            self.fem, MahalanobisDetector(threshold="quantile"), scenarios, uncertainty="noise", **options
+        )
         truth = {"reference": lambda one, seed: add_noise(clean[one.name], NOISE, random_state=seed)}
         study.run(self.later.temperatures, self.year.frequencies, **truth)
         return study

@@ -67,7 +67,9 @@ def bench(bridge, fem, damage, candidates=None, n_repeats=40):
         (later, Scenario("healthy"), records.later),
         (bridge.T_damaged, damage, records.damaged),
     ):
-        study = DetectabilityStudy(fem, candidates or detectors(), [scenario], n_repeats=n_repeats, random_state=0)
+        study = DetectabilityStudy(
+            fem, candidates or detectors(), [scenario], n_repeats=n_repeats, random_state=0, uncertainty="noise"
+        )
         results.append(study.run(weather, records.baseline, reference={scenario.name: measured}))
     return pd.concat(results, ignore_index=True)
 
@@ -110,6 +112,8 @@ def choose(bridge, candidates=None, n_repeats=10, ahead=True):
     T, F = bridge.split()[:2]
     n = 3 * len(T) // 4 if ahead else len(T)
     fem = chain(bridge_model()).fit(T, F)
-    study = DetectabilityStudy(fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0)
+    study = DetectabilityStudy(
+        fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0, uncertainty="noise"
+    )
     study.run(T[n:] if ahead else T[::4], T.join(F)[:n])
     return study

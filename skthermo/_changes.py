@@ -121,9 +121,8 @@ class ChangedStructure:
     def _is_slow(self) -> bool:
         """Whether a reduced model saves time."""
         model = self.fem.model
-        return self.fem.simulator_.reduced is not None or (
-            getattr(model, "prefer", "threads") == "processes" and hasattr(model, "reduced")
-        )
+        is_sparse = getattr(model, "prefer", "threads") == "processes" and hasattr(model, "reduced")
+        return is_sparse or hasattr(model, "full") or self.fem.simulator_.reduced is not None
 
     def _simulator(self, near: bool, theta: Array) -> Any:
         """The simulator that has the amounts as further columns of theta, around some rows of it."""

@@ -36,8 +36,17 @@ class FrequencyEffects:
         known = ~(np.isnan(theta).any(axis=1) | np.isnan(F).all(axis=1))
         present = ~np.isnan(F[known])
         few, weights = typical_rows(theta[known], np.where(present.any(axis=0), present, True))
-        healthy = np.log(healthy_frequencies(fem, few))
-        return cls(ChangedStructure(fem, changes), few, weights, healthy)
+        return cls.at(ChangedStructure(fem, changes), few, weights)
+
+    @classmethod
+    def at(cls, structure: ChangedStructure, theta: Array, weights: Array) -> "FrequencyEffects":
+        """Effects at some rows of theta; without changes, they are 0 also where the model is reduced."""
+        if structure.is_exact:
+            frequencies = structure.linearise(theta, np.zeros((1, len(structure.changes.bounds))))[0][0]
+            healthy = as_floats(structure.fem.aligner_.inverse_transform(frequencies))
+        else:
+            healthy = healthy_frequencies(structure.fem, theta)
+        return cls(structure, theta, weights, np.log(healthy))
 
     def nominal(self) -> "FrequencyEffects":
         """The same effects at the model's nominal state.
@@ -46,8 +55,7 @@ class FrequencyEffects:
         symmetric and mirrored groups would seem to differ.
         """
         theta = np.ones((1, self.theta.shape[1]))
-        healthy = np.log(healthy_frequencies(self.structure.fem, theta))
-        return FrequencyEffects(self.structure, theta, np.ones_like(healthy), healthy)
+        return FrequencyEffects.at(self.structure, theta, np.ones((1, self.healthy.shape[1])))
 
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).

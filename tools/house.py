@@ -48,7 +48,9 @@ def actions():
     damage = {"bottom": 0.2}
     simulate, _ = entered(chain.simulate, later.temperatures, damage=damage, noise="fitted", random_state=0)
     scenarios = sweep(chain, (0.1, 0.2), groups=["bottom"])
-    study = DetectabilityStudy(chain, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0)
+    study = DetectabilityStudy(
+        chain, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0, uncertainty="noise"
+    )
     run, _ = entered(study.run, later.temperatures)
     return {"fit": fit, "simulate": simulate, "run": run}
 

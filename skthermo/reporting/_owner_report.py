@@ -101,7 +101,8 @@ def owner_report(
     >>> from skthermo.surrogate import DataInformedFEM
     >>> year = make_truss_campaign(random_state=0)
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    >>> study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.3), ["bottom"]), n_repeats=2)
+    >>> scenarios = sweep(fem, (0.1, 0.3), ["bottom"])
+    >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, uncertainty="noise")
     >>> results = study.run(year.temperatures)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = owner_report(study, f"{folder}/bridge.html", title="Truss bridge")

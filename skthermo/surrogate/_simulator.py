@@ -74,8 +74,9 @@ class Simulator:
 
         Within the box, (n_columns, 2), a reduced model is used, if there is a box.
         """
-        model: Any = Simulator(self.model).changed("with_damage_parameters", groups).model if groups else self.model
-        model = Simulator(model).changed("with_mass_parameters", masses).model if masses else model
+        model: Any = getattr(self.model, "full", self.model)
+        model = model.with_damage_parameters(groups) if groups else model
+        model = model.with_mass_parameters(masses) if masses else model
         if box is None:
             return Simulator(model)
         return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)

@@ -1615,7 +1615,7 @@ ARGUMENTS = {"fem": (CHAIN, models() | {"not fitted": surrogate.DataInformedFEM(
 use(
     "studies.DetectabilityStudy",
     lambda **a: studies.DetectabilityStudy(
-        **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}
+        **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}, uncertainty="noise"
     ).run(a["T"], a["baseline"], reference=a["reference"], confidence=a["confidence"])["rate"],
     **ARGUMENTS,
     detectors=(

@@ -31,7 +31,9 @@ def predicted(seed, noise):
     year, later = (make_truss_campaign(noise=NOISE, random_state=1000 * seed + i) for i in range(2))
     fem = DataInformedFEM(make_truss(), random_state=seed).fit(year.temperatures, year.frequencies)
     scenarios = [s for g, severities in SEVERITIES.items() for s in sweep(fem, severities, [g])[1:]]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, noise=noise, random_state=seed)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, noise=noise, random_state=seed, uncertainty="noise"
+    )
     study.run(later.temperatures)
     start = time.perf_counter()
     with warnings.catch_warnings():

@@ -68,7 +68,13 @@ def main():
 
     def run(chosen):
         study = DetectabilityStudy(
-            fem, chosen, scenarios, n_repeats=options.repeats, n_jobs=options.jobs, random_state=0
+            fem,
+            chosen,
+            scenarios,
+            n_repeats=options.repeats,
+            n_jobs=options.jobs,
+            random_state=0,
+            uncertainty="noise",
         )
         before, cpu, start = solved.n_rows, time.process_time(), time.perf_counter()
         study.run(later.temperatures)

@@ -226,7 +226,7 @@ def both_studies(structure, n_repeats, seed):
 
     def study_of(scenarios, **truth):
         options = {"n_repeats": n_repeats, "noise": wrong.noise, "random_state": seed}
-        study = DetectabilityStudy(structure.fem, structure.detectors, scenarios, **options)
+        study = DetectabilityStudy(structure.fem, structure.detectors, scenarios, uncertainty="noise", **options)
         study.run(structure.weather, structure.baseline, **truth)
         return study
 

@@ -41,7 +41,7 @@ def fitted_chain(n_records=120, index=True, random_state=0):
 
 
 def run_study(fem, T, scenarios, **options):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0, uncertainty="noise")
     study.run(T, **options)
     return study
 

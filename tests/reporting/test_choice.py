@@ -27,7 +27,9 @@ def study():
         FAILING: OutlierDetector(GaussianMixture(1000)),
         HOSTILE: MahalanobisDetector(contamination=0.02, threshold="quantile"),
     }
-    study = DetectabilityStudy(fem, detectors, sweep(fem, (0.1, 0.2), [HOSTILE]), n_repeats=5, random_state=0)
+    study = DetectabilityStudy(
+        fem, detectors, sweep(fem, (0.1, 0.2), [HOSTILE]), n_repeats=5, random_state=0, uncertainty="noise"
+    )
     study.run(T)
     return study
 
@@ -56,7 +58,9 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
 
 def test_the_rest_is_that_of_a_study_with_this_detector_alone(study):
     choice = Choice.of(study, LOUD, 0.1)
-    alone = DetectabilityStudy(study.fem, study.detectors[LOUD], study.scenarios, n_repeats=5, random_state=0)
+    alone = DetectabilityStudy(
+        study.fem, study.detectors[LOUD], study.scenarios, n_repeats=5, random_state=0, uncertainty="noise"
+    )
     alone.run(fitted_chain()[1])
     one = choice.only()
     columns = ["scenario", "source", "rate", "lowest", "highest"]

@@ -159,7 +159,7 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
     assert "No damage of these groups explains the shifts; mode" in headline
     warned = page.text[page.text.rindex("Warnings") :]
     assert (
-        "Identified damage: damage of these groups does not explain the shifts (probability of something else above"
+        "Identified damage: damage of these groups alone does not explain the shifts (probability of something"
         in warned
     )
 

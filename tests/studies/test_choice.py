@@ -34,7 +34,7 @@ def study(fem):
         "in-sample": compensated(InSample, KNeighborsRegressor(4)),
     }
     scenarios = sweep(fem, (0.1, 0.2), ["bottom", "top"])
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=3, random_state=0, uncertainty="noise")
 
     def later_year(scenario, seed):
         year = make_truss_campaign(damage=scenario.damage, random_state=seed)

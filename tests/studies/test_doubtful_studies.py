@@ -14,7 +14,9 @@ WEATHER = make_truss_campaign(random_state=1).temperatures
 
 
 def study(fem, scenarios, **options):
-    return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **({"n_repeats": 2, "random_state": 0} | options))
+    return DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, uncertainty="noise", **({"n_repeats": 2, "random_state": 0} | options)
+    )
 
 
 @pytest.mark.parametrize(("n_repeats", "expected"), [(39, 0.95), (99, 0.95), (10, 9 / 11), (2, 1 / 3)])
@@ -108,7 +110,7 @@ def test_what_is_no_chain_or_no_detector_is_named(fem):
         (Ridge(), r"Ridge\(\), without \['decision_function', 'score_samples'\]"),
     ):
         with pytest.raises(ValueError, match=message):
-            DetectabilityStudy(fem, detector, [Scenario("healthy")]).run(WEATHER)
+            DetectabilityStudy(fem, detector, [Scenario("healthy")], uncertainty="noise").run(WEATHER)
 
 
 def test_strengthening_is_compared_by_its_magnitude(fem):

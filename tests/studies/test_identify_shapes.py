@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from skthermo._changes import ChangedStructure
-from skthermo.datasets import make_truss
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import mac
-from skthermo.studies.identification._causes import read_causes
+from skthermo.studies import identify_damage
+from skthermo.studies.identification._causes import Cause, read_causes
 from skthermo.studies.identification._measured_shapes import ShapeShift
+from skthermo.studies.identification._separability import precision
 from skthermo.studies.identification._shape_effects import ShapeEffects
 from tests.studies.test_identify_causes import OnlyDamaged, differences
 
@@ -82,7 +84,7 @@ def test_models_without_exact_derivatives(fem, effects):
     np.testing.assert_allclose(other(AT)[1] * signs[:, np.newaxis], exact[1], rtol=1e-4, atol=1e-4)
 
 
-def noisy(shapes, n_records, deviation=0.01):
+def noisy(shapes, n_records, deviation=0.01, random=random):
     largest = np.abs(shapes).max(axis=0)
     return shapes + deviation * largest * random.standard_normal((n_records, *shapes.shape))
 
@@ -90,14 +92,14 @@ def noisy(shapes, n_records, deviation=0.01):
 def test_change_and_variance_of_records(effects):
     """Means of many records: errors are of unit variance, and the noise is found."""
     healthy, changed = shapes_at(), shapes_at(AT)
-    exact = ShapeShift.of(effects, (healthy, -2j * changed), 0.02, MODES)
+    exact = ShapeShift.of([effects], (healthy, -2j * changed), 0.02, MODES)
     np.testing.assert_allclose(exact.change, effects(AT)[0], atol=1e-9)
     np.testing.assert_allclose(exact.variances, 2 * 0.02**2)
-    found = ShapeShift.of(effects, (noisy(healthy, 40), noisy(changed, 10)), "fitted", MODES)
+    found = ShapeShift.of([effects], (noisy(healthy, 40), noisy(changed, 10)), "fitted", MODES)
     np.testing.assert_allclose(found.variances, 0.01**2 * (1 / 40 + 1 / 10), rtol=0.3)
     errors = [
         (shift.change - exact.change) / np.sqrt(shift.variances)
-        for shift in (ShapeShift.of(effects, (noisy(healthy, 4), noisy(changed, 2)), 0.001, MODES) for _ in range(60))
+        for shift in (ShapeShift.of([effects], (noisy(healthy, 4), noisy(changed, 2)), 0.001, MODES) for _ in range(60))
     ]
     assert np.var(errors) == pytest.approx(1, abs=0.15)
 
@@ -106,7 +108,7 @@ def test_sensors_and_modes_that_were_not_measured(effects):
     healthy, changed = noisy(shapes_at(), 6, 1e-6), noisy(shapes_at(AT), 3, 1e-6)
     healthy[:, 0, 2], changed[0, :, 1], changed[:, 1:, 4] = np.nan, np.nan, np.nan
     healthy[:4, 3, 0] = np.nan
-    shift = ShapeShift.of(effects, (healthy, changed), 0.01, MODES)
+    shift = ShapeShift.of([effects], (healthy, changed), 0.01, MODES)
     assert np.bincount(shift.effects.modes, minlength=6).tolist() == [4, 5, 4, 5, 0, 5]
     np.testing.assert_allclose(shift.change, shift.effects(AT)[0], atol=1e-5)
     per_mode = dict(zip(shift.effects.modes.tolist(), shift.variances.tolist(), strict=True))
@@ -118,11 +120,11 @@ def test_shapes_of_another_mode_are_left_out_with_a_warning(effects):
     healthy, changed = shapes_at(), shapes_at(AT)
     healthy[:, 2] = healthy[:, 3]
     with pytest.warns(UserWarning, match="shapes of 1 of 6 modes have a MAC below 0.5 with the model's, f3 the first"):
-        shift = ShapeShift.of(effects, (healthy, changed), 0.01, MODES)
+        shift = ShapeShift.of([effects], (healthy, changed), 0.01, MODES)
     assert 2 not in shift.effects.modes
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        ShapeShift.of(effects, (shapes_at(), changed), 0.01, MODES)
+        ShapeShift.of([effects], (shapes_at(), changed), 0.01, MODES)
 
 
 @pytest.mark.parametrize(
@@ -139,4 +141,49 @@ def test_shapes_of_another_mode_are_left_out_with_a_warning(effects):
 )
 def test_errors_of_shapes(effects, shapes, noise, message):
     with pytest.raises(ValueError, match=message):
-        ShapeShift.of(effects, shapes, noise, MODES)
+        ShapeShift.of([effects], shapes, noise, MODES)
+
+
+def test_effects_at_the_parameters_whose_shapes_are_measured(effects, fem):
+    other = ShapeEffects.of(effects.structure, THETA * [1, 1, 1, 2.0], DOFS)
+    for both in ([other, effects], [effects, other]):
+        shift = ShapeShift.of(both, (noisy(shapes_at(), 2), noisy(shapes_at(AT), 2)), 0.01, MODES)
+        np.testing.assert_array_equal(shift.effects.theta, THETA)
+
+
+@pytest.fixture(scope="module")
+def later():
+    return make_truss_campaign(damage={"vertical": 0.3}, samples_per_year=120, random_state=1)
+
+
+def test_shapes_find_what_frequencies_hardly_show(fem, later):
+    """The vertical members of the truss: their damage moves no frequency by as much as the noise."""
+    records, seed = (later.temperatures, later.frequencies), np.random.RandomState(2)
+    states = (TRUSS, TRUSS.damaged({"vertical": 0.3}))
+    shapes = tuple(noisy(model.modes(np.ones((1, 4)))[1][0][DOFS], 8, random=seed) for model in states)
+    with pytest.warns(UserWarning, match="vertical"):
+        without = identify_damage(fem, *records, random_state=0)
+    found = identify_damage(fem, *records, shapes=shapes, dofs=DOFS, shape_noise="fitted", random_state=0)
+    assert found.most_probable == ("vertical",)
+    assert found.table.loc["vertical", "probability"] > max(0.95, without.table.loc["vertical", "probability"])
+    bands = [table.loc["vertical", ["lowest", "highest"]] for table in (found.table, without.table)]
+    assert bands[0]["lowest"] < 0.3 < bands[0]["highest"]
+    assert np.diff(bands[0]) < 0.5 * np.diff(bands[1])
+    precision = found.precision
+    np.testing.assert_allclose(precision["together_without_shapes"], without.precision["together"], rtol=1e-9)
+    assert list(without.precision.columns) == ["alone", "together"]
+    for name in ("alone", "together"):
+        assert (precision[name] < precision[f"{name}_without_shapes"]).all()
+    assert precision.loc["vertical", "alone"] < 0.3 * precision.loc["vertical", "alone_without_shapes"]
+
+
+def test_least_errors_are_those_of_the_information():
+    slopes, causes = random.standard_normal((5, 3)), [Cause("a"), Cause("b", of=("b",)), Cause("c", scale=5.0)]
+    stiffer = Cause("b stiffer", "stiffening", -1.0, 0.0, of=("b",))
+    least = precision(slopes, 5, causes, 0.2)
+    np.testing.assert_allclose(least["alone"], 1 / np.linalg.norm(slopes, axis=0))
+    covariance = np.linalg.inv(slopes.T @ slopes + np.diag([25.0, 25.0, 1.0]))
+    np.testing.assert_allclose(least["together"], np.sqrt(np.diag(covariance)))
+    more = precision(slopes[:, [0, 1, 2, 1]], 3, [*causes, stiffer], 0.2)
+    assert more.loc["b stiffer", "together"] == pytest.approx(least.loc["b", "together"])
+    assert more.columns.tolist() == ["alone", "alone_without_shapes", "together", "together_without_shapes"]

@@ -60,7 +60,7 @@ def detectors():
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 100, 300)]
-    study = DetectabilityStudy(fem, detectors(), scenarios, n_repeats=8, random_state=0)
+    study = DetectabilityStudy(fem, detectors(), scenarios, n_repeats=8, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     return study
 
@@ -152,6 +152,7 @@ def test_equal_detectors_tie(study):
         [{}, {"top": 0.2}],
         n_repeats=3,
         random_state=0,
+        uncertainty="noise",
     )
     pair.run(WEATHER)
     table = pair.ranking()
@@ -234,7 +235,7 @@ def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
             return np.ones(len(X))
 
     some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0)
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     table = study.ranking()
     assert table.loc["deaf", ["clearly_behind", "pod"]].tolist() == [True, 0.0]
@@ -248,7 +249,7 @@ def test_records_that_are_not_judged_are_said(fem):
             return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
 
     some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0)
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     share = study.ranking().loc["half", "not_judged"]
     assert share == pytest.approx(0.5, abs=0.01)
@@ -258,7 +259,7 @@ def test_records_that_are_not_judged_are_said(fem):
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
 def test_without_other_noise_nothing_is_significant(fem, options):
     some = {"raw": MahalanobisDetector(), "lines": compensated()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], random_state=0, **options)
+    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], random_state=0, uncertainty="noise", **options)
     study.run(WEATHER)
     for by in ("pod", "pod_equal"):
         table = study.ranking(by=by)
@@ -270,7 +271,12 @@ def test_without_other_noise_nothing_is_significant(fem, options):
 def test_measured_records_rank_by_what_was_found(fem):
     some = {"raw": MahalanobisDetector(), "lines": compensated(), "forest": OutlierDetector(IsolationForest())}
     study = DetectabilityStudy(
-        fem, some, [Scenario("healthy"), Scenario("top", {"top": 0.2})], n_repeats=2, random_state=0
+        fem,
+        some,
+        [Scenario("healthy"), Scenario("top", {"top": 0.2})],
+        n_repeats=2,
+        random_state=0,
+        uncertainty="noise",
     )
     campaigns = {
         name: make_truss_campaign(damage=d, random_state=1) for name, d in (("healthy", None), ("top", {"top": 0.2}))
@@ -297,7 +303,9 @@ def test_what_cannot_be_ranked_is_an_error(fem, study):
         with pytest.raises(ValueError, match=message):
             study.ranking(**options)
     for scenario, message in (({}, "none of them damaged"), ({"top": 0.1}, "none of them healthy")):
-        single = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=1, random_state=0)
+        single = DetectabilityStudy(
+            fem, MahalanobisDetector(), [scenario], n_repeats=1, random_state=0, uncertainty="noise"
+        )
         with pytest.raises(ValueError, match="expected a call of run before"):
             single.ranking()
         single.run(WEATHER)

@@ -68,7 +68,7 @@ class Trouble(OutlierMixin, BaseEstimator):
 
 @pytest.fixture(scope="module")
 def study(fem):
-    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     return study
 
@@ -94,7 +94,7 @@ def test_one_row_for_each_detector_and_scenario(study):
 
 @pytest.mark.parametrize("name", list(detectors()))
 def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
-    alone = DetectabilityStudy(fem, detectors()[name], SCENARIOS, n_repeats=3, random_state=0)
+    alone = DetectabilityStudy(fem, detectors()[name], SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
     results = alone.run(WEATHER).drop(columns="detector")
     together = study.results_[study.results_["detector"] == name].drop(columns="detector").reset_index(drop=True)
     pd.testing.assert_frame_equal(results, together)
@@ -106,7 +106,7 @@ def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
 
 def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
     backwards = dict(reversed(detectors().items()))
-    other = DetectabilityStudy(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2, random_state=0)
+    other = DetectabilityStudy(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2, random_state=0, uncertainty="noise")
     results = other.run(WEATHER).set_index(["detector", "scenario"])
     pd.testing.assert_frame_equal(results, study.results_.set_index(["detector", "scenario"]).loc[results.index])
     for mine, others in ((study.decisions_, other.decisions_), (study.calibration_, other.calibration_)):
@@ -133,7 +133,7 @@ def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
     found = []
     for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):
         counts.clear()
-        DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0).run(WEATHER)
+        DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise").run(WEATHER)
         found.append(dict(counts))
     assert found[0] == found[1]
     assert found[0]["simulate"] == len(SCENARIOS)
@@ -146,7 +146,7 @@ def test_the_truth_is_asked_once_for_all_detectors(fem):
         asked[scenario.name, seed] += 1
         return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
 
-    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=2, random_state=0)
+    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise")
     results = study.run(WEATHER, reference=truth)
     assert set(asked.values()) == {1}
     assert Counter(name for name, _ in asked) == {"healthy": 4, "bottom 10 %": 2, "top 20 %": 2}  # two calibrate
@@ -167,7 +167,7 @@ def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
 
 def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
     given = [{}, {"bottom": 0.18, "top": 0.05}, pd.Series({"top": -0.1}), Scenario("other", {"top": 0.2})]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), given, n_repeats=1, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), given, n_repeats=1, random_state=0, uncertainty="noise")
     results = study.run(WEATHER)
     assert results["scenario"].tolist() == ["healthy", "bottom 18 %, top 5 %", "top -10 %", "other"]
     assert results["measure"].tolist() == ["PFA", "POD", "POD", "POD"]
@@ -178,7 +178,7 @@ def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
 @pytest.mark.parametrize("given", [{"deck": 0.1}, {"top": 20}, {"top": None}, {3: 0.1}])
 def test_impossible_mappings_are_errors(fem, given):
     with pytest.raises(ValueError, match=r"deck|severit|group"):
-        DetectabilityStudy(fem, MahalanobisDetector(), [{}, given], n_repeats=1).run(WEATHER)
+        DetectabilityStudy(fem, MahalanobisDetector(), [{}, given], n_repeats=1, uncertainty="noise").run(WEATHER)
 
 
 def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
@@ -189,7 +189,12 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
         "week": (compensated(WindowedAlarm(7)), list(SIDE_BY_SIDE)),
     }
     study = DetectabilityStudy(
-        fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1, random_state=0
+        fem,
+        {name: detector for name, (detector, _) in sees.items()},
+        SCENARIOS,
+        n_repeats=1,
+        random_state=0,
+        uncertainty="noise",
     )
     results = study.run(WEATHER, SIDE_BY_SIDE)
     pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
@@ -213,7 +218,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, message, n_jobs):
     some = {"bad": trouble} | detectors()
-    beside = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=3, n_jobs=n_jobs, random_state=0)
+    beside = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=3, n_jobs=n_jobs, random_state=0, uncertainty="noise")
     results = beside.run(WEATHER)
     bad, others = results.iloc[0], results.iloc[1:].reset_index(drop=True)
     assert bad["detector"] == "bad"
@@ -226,7 +231,7 @@ def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, mess
     assert beside.minimum_detectable_damage().index.unique("detector").tolist() == list(detectors())
     with pytest.raises(ValueError, match=r"detector is 'bad'; expected the name of one of \['raw'"):
         beside.pod_curve("top", detector="bad")
-    alone = DetectabilityStudy(fem, {"bad": trouble}, SCENARIOS, n_repeats=3, random_state=0)
+    alone = DetectabilityStudy(fem, {"bad": trouble}, SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
     with pytest.raises((ValueError, KeyError, RuntimeError), match=message.split(": ")[1]):
         alone.run(WEATHER)
 
@@ -248,13 +253,21 @@ def test_what_is_asked_of_one_of_several_detectors(study):
 def test_what_to_add_asks_for_a_detector_of_several(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
     several = DetectabilityStudy(
-        fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, n_repeats=2, noise=0.01, random_state=0
+        fem,
+        {"raw": MahalanobisDetector(), "lines": compensated()},
+        scenarios,
+        n_repeats=2,
+        noise=0.01,
+        random_state=0,
+        uncertainty="noise",
     )
     several.run(WEATHER)
     with pytest.raises(ValueError, match="detector is None"):
         what_to_add(several, WEATHER, modes=[6])
     found = what_to_add(several, WEATHER, modes=[6], detector="raw")
-    alone = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0)
+    alone = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
+    )
     alone.run(WEATHER)
     pd.testing.assert_frame_equal(found, what_to_add(alone, WEATHER, modes=[6]))
 
@@ -273,7 +286,7 @@ class Doubtful(MahalanobisDetector):
 
 def test_one_warning_for_one_cause_names_the_detectors(fem):
     some = {"raw": MahalanobisDetector(), "first": Doubtful(), "second": Doubtful(0.05)}
-    study = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0)
+    study = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise")
     with pytest.warns(UserWarning, match=r"odd|convergence") as caught:
         study.run(WEATHER)
     fit, judged = caught
@@ -303,4 +316,4 @@ def test_one_warning_for_one_cause_names_the_detectors(fem):
 )
 def test_what_is_no_detector_is_an_error(fem, given, message):
     with pytest.raises(ValueError, match=message):
-        DetectabilityStudy(fem, given, SCENARIOS, n_repeats=1).run(WEATHER)
+        DetectabilityStudy(fem, given, SCENARIOS, n_repeats=1, uncertainty="noise").run(WEATHER)

@@ -37,7 +37,9 @@ def first_seed(random_state):
 @pytest.mark.parametrize("noise", [0.01, "fitted"])
 def test_records_are_those_that_the_chain_simulates(fem, noise):
     scenarios = [Scenario("healthy"), Scenario("a fifth", {"bottom": 0.2})]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3, uncertainty="noise"
+    )
     results = study.run(WEATHER).set_index("scenario")
     detector = MahalanobisDetector().fit(YEAR.frequencies)
     assert study.thresholds_[ONLY] == pytest.approx(detector.threshold_, rel=1e-9)
@@ -53,7 +55,7 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
 
 def test_same_bits_whatever_the_jobs(fem):
     scenarios = [*sweep(fem, (0.1, 0.3), ["bottom", "top"]), ProgressiveDamage("crack", {"top": 0.3}, 50, 90)]
-    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
     weather = WEATHER[:150]
     expected = study.run(weather, SIDE_BY_SIDE)
     twin = clone(study).set_params(n_jobs=2)
@@ -65,13 +67,13 @@ def test_same_bits_whatever_the_jobs(fem):
 
 def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
     scenarios = [Scenario("one", {"top": 0.2}), Scenario("other", {"top": 0.2})]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
     one, other = study.run(WEATHER).drop(columns="scenario").itertuples(index=False)
     assert one == other
     alarms = [
-        DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=n, random_state=0).run(WEATHER)["n_alarms"][
-            0
-        ]
+        DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=n, random_state=0, uncertainty="noise").run(
+            WEATHER
+        )["n_alarms"][0]
         for n in (1, 2, 3)
     ]
     assert alarms[2] == one.n_alarms
@@ -81,13 +83,15 @@ def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
 def test_without_a_baseline_the_detector_learns_what_the_chain_has_learned(fem):
     scenarios = sweep(fem, (0.2,), ["top"])
     for detector, baseline in ((MahalanobisDetector(), YEAR.frequencies), (compensated(), SIDE_BY_SIDE)):
-        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0)
+        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise")
         pd.testing.assert_frame_equal(study.run(WEATHER), study.run(WEATHER, baseline))
 
 
 def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     scenarios = sweep(fem, (0.1,), ["top"])
-    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=1, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, compensated(), scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
+    )
     study.run(WEATHER, SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
@@ -96,7 +100,9 @@ def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
 
 
 def test_a_detector_may_see_some_of_the_modes(fem):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1, random_state=0, uncertainty="noise"
+    )
     few = study.run(WEATHER, YEAR.frequencies[["f3", "f1"]])
     assert few["rate"][1] < study.run(WEATHER)["rate"][1]
     assert list(study.detectors_[ONLY].feature_names_in_) == MODES
@@ -113,8 +119,10 @@ def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
             SIDE_BY_SIDE,
         ),
     ):
-        arrays = DetectabilityStudy(fem_of_arrays, detector, scenarios, n_repeats=2, random_state=0)
-        expected = DetectabilityStudy(fem, clone(detector), scenarios, n_repeats=2, random_state=0)
+        arrays = DetectabilityStudy(
+            fem_of_arrays, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise"
+        )
+        expected = DetectabilityStudy(fem, clone(detector), scenarios, n_repeats=2, random_state=0, uncertainty="noise")
         if isinstance(detector, MahalanobisDetector):
             frames = expected.run(WEATHER, baseline)
         else:
@@ -133,7 +141,9 @@ def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
             return None
         return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
 
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01, random_state=0, uncertainty="noise"
+    )
     results = study.run(WEATHER, reference=truth)
     assert results["source"].tolist() == ["data-informed", "data-informed", "reference"]
     simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
@@ -150,7 +160,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
     side_by_side = measured.temperatures.join(frequencies)
     scenarios = sweep(fem, (0.3,), ["top"])
     for detector, records in ((MahalanobisDetector(), frequencies), (compensated(), side_by_side)):
-        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0)
+        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise")
         results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
         row = results.loc[("top 30 %", "reference")]
         decision = study.detectors_[study.detector_name()].decision_function(records)
@@ -163,7 +173,9 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
 
 
 def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
-    study = DetectabilityStudy(fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1, random_state=0)
+    study = DetectabilityStudy(
+        fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1, random_state=0, uncertainty="noise"
+    )
     damaged = make_truss_campaign(damage={"top": 0.3}, random_state=1)
     alone = study.run(WEATHER, reference={"top 30 %": damaged.frequencies})
     pd.testing.assert_frame_equal(
@@ -178,7 +190,9 @@ def test_progressive_damage_counts_from_its_onset(fem):
         ProgressiveDamage("by time", {"top": 0.4}, onset, "2025-09-01"),
         ProgressiveDamage("by number", {"top": 0.4}, 59, 243),
     ]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
+    )
     results = study.run(WEATHER).drop(columns=["scenario", "band_lowest", "band_highest"])  # one repeat has no band
     by_time, by_number = results.itertuples(index=False)
     assert by_time == by_number
@@ -193,7 +207,9 @@ def test_progressive_damage_counts_from_its_onset(fem):
 def test_uncertain_damage_takes_another_draw_in_every_repeat(fem):
     draws = [0.05, 0.3]
     uncertain = UncertainDamage("top", pd.DataFrame({"top": draws}))
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], n_repeats=4, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), [uncertain], n_repeats=4, noise=0.01, random_state=0, uncertainty="noise"
+    )
     alarms = study.run(WEATHER)["n_alarms"][0]
     seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(4, 2))[:, 0]
     expected = [
@@ -210,7 +226,9 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
         Scenario("ballast", mass=np.full(23, 500.0), family="mass", severity=0.1),
         Scenario("stiffer", parameters={"top": 1.3}),
     ]
-    results = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0).run(WEATHER)
+    results = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0, uncertainty="noise"
+    ).run(WEATHER)
     assert (results["measure"] == "POD").all()
     assert (results["rate"] > 0.2).all()
 
@@ -225,12 +243,16 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
     ],
 )
 def test_any_outlier_detector_can_be_studied(fem, detector):
-    study = DetectabilityStudy(fem, detector, sweep(fem, (0.3,), ["bottom"]), n_repeats=2, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, detector, sweep(fem, (0.3,), ["bottom"]), n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
+    )
     results = study.run(WEATHER).set_index("scenario")
     assert results["rate"]["bottom 30 %"] > results["rate"]["healthy"] + 0.3
     repeated = clone(study).run(WEATHER).set_index("scenario")
     pd.testing.assert_frame_equal(repeated, results)  # random_state seeds the detector, too
-    single = DetectabilityStudy(fem, detector, study.scenarios, n_repeats=1, noise=0.01, random_state=0)
+    single = DetectabilityStudy(
+        fem, detector, study.scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
+    )
     rates = single.run(WEATHER)["rate"]
     for rate, index in zip(rates, single.indices_.values(), strict=True):
         assert rate == pytest.approx(
@@ -240,7 +262,7 @@ def test_any_outlier_detector_can_be_studied(fem, detector):
 
 def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"])
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0, uncertainty="noise")
     rates = study.run(WEATHER, confidence=0.9).set_index("scenario")["rate"]
     grid, curve = (study.minimum_detectable_damage(method=method) for method in ("grid", "curve"))
     for group in ("bottom", "top"):
@@ -257,7 +279,12 @@ def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
 
 def test_damage_between_two_severities_is_bracketed(fem):
     study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.1, 0.5), ["diagonal"]), n_repeats=2, random_state=0
+        fem,
+        MahalanobisDetector(),
+        sweep(fem, (0.1, 0.5), ["diagonal"]),
+        n_repeats=2,
+        random_state=0,
+        uncertainty="noise",
     )
     study.run(WEATHER)
     with pytest.warns(UserWarning, match="infinite or unknown"):
@@ -274,7 +301,7 @@ def test_records_that_cannot_be_judged_do_not_count():
     weather = WEATHER.copy()
     weather.iloc[5:15] = np.nan
     detector = OutlierDetector(IsolationForest())
-    study = DetectabilityStudy(gappy, detector, [Scenario("healthy")], n_repeats=2, random_state=0)
+    study = DetectabilityStudy(gappy, detector, [Scenario("healthy")], n_repeats=2, random_state=0, uncertainty="noise")
     with pytest.warns(UserWarning, match="10 of 365 rows cannot be predicted") as caught:
         results = study.run(weather)
     assert len(caught) == 1
@@ -286,7 +313,9 @@ def test_records_that_cannot_be_judged_do_not_count():
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
 def test_weather_outside_the_training_range_is_said_once(fem):
-    study = DetectabilityStudy(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2, random_state=0)
+    study = DetectabilityStudy(
+        fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2, random_state=0, uncertainty="noise"
+    )
     with pytest.warns(UserWarning, match="far outside") as caught:
         study.run(WEATHER + 60)
     texts = [str(warning.message) for warning in caught]
@@ -334,13 +363,15 @@ def test_impossible_studies_are_errors(fem, options, message):
 )
 @pytest.mark.filterwarnings("ignore:365 of 365 rows are not judged")  # before the error
 def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
-    study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0)
+    study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0, uncertainty="noise")
     with pytest.raises(ValueError, match=message):
         study.run(WEATHER, **arguments)
 
 
 def test_a_study_must_be_run_before_it_is_asked(fem):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1, uncertainty="noise"
+    )
     for ask in (study.minimum_detectable_damage, lambda: study.is_undetected("top")):
         with pytest.raises(ValueError, match="expected a call of run before"):
             ask()
@@ -354,7 +385,7 @@ def test_a_study_must_be_run_before_it_is_asked(fem):
 
 
 def test_a_clone_shares_the_fitted_chain(fem):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [Scenario("healthy")], n_repeats=3)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [Scenario("healthy")], n_repeats=3, uncertainty="noise")
     twin = clone(study)
     assert twin.fem is fem
     assert twin.detectors is not study.detectors
@@ -362,7 +393,9 @@ def test_a_clone_shares_the_fitted_chain(fem):
 
 
 def test_a_family_of_one_severity_has_no_curve_but_a_bracket(fem):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.4,), ["bottom"]), n_repeats=2, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), sweep(fem, (0.4,), ["bottom"]), n_repeats=2, random_state=0, uncertainty="noise"
+    )
     study.run(WEATHER)
     mdd, lowest, highest = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(mdd)
@@ -383,7 +416,9 @@ def in_service():
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled", "ignore:.*not judged")
 def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
     scenarios = [{}, {"bottom": 0.2}]
-    study = DetectabilityStudy(in_service, compensated(), scenarios, n_repeats=3, gaps="fitted", random_state=0)
+    study = DetectabilityStudy(
+        in_service, compensated(), scenarios, n_repeats=3, gaps="fitted", random_state=0, uncertainty="noise"
+    )
     results = study.run(WEATHER)
     healthy, damaged = (np.isnan(one) for one in study.decisions_.values())
     np.testing.assert_array_equal(healthy, damaged)

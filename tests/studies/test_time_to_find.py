@@ -44,7 +44,7 @@ def study(fem):
         "three of three": WindowedAlarm(3, rule="m-of-n", m=3),
     }
     scenarios = [{}, {"bottom": 0.08}, {"bottom": 0.6}, ProgressiveDamage("crack", {"bottom": 0.1}, onset=100)]
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=4, random_state=0)
+    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=4, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     return study
 
@@ -163,7 +163,9 @@ def test_windows_after_an_onset_are_those_of_records_that_change_there(study, fe
 
 def test_rows_without_stamps_are_counted():
     arrays = chain(mapper=mapper(1), random_state=0).fit(T.to_numpy(), F.to_numpy())
-    study = DetectabilityStudy(arrays, MahalanobisDetector(), [{"bottom": 0.3}], n_repeats=2, random_state=0)
+    study = DetectabilityStudy(
+        arrays, MahalanobisDetector(), [{"bottom": 0.3}], n_repeats=2, random_state=0, uncertainty="noise"
+    )
     study.run(WEATHER.to_numpy()[:100])
     row = study.time_to_find().iloc[0]
     assert row["7"] == 1

@@ -23,7 +23,9 @@ MODES = list(YEAR.frequencies)
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01, random_state=0, uncertainty="noise"
+    )
     study.run(WEATHER)
     return study
 
@@ -94,7 +96,9 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
     tables = []
     for chain, detector, weather in ((fem, by_name, WEATHER), (fem_of_arrays, by_position, WEATHER.to_numpy())):
         scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
-        study = DetectabilityStudy(chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0)
+        study = DetectabilityStudy(
+            chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
+        )
         study.run(weather)
         tables.append(what_to_add(study, weather, modes=[8], baseline_factors=()))  # only times tell two years from one
     pd.testing.assert_frame_equal(*tables)
@@ -106,7 +110,9 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
     inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01, refine=0)
     fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=2, random_state=0)
+    study = DetectabilityStudy(
+        fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=2, random_state=0, uncertainty="noise"
+    )
     study.run(known)
     unrelated = np.random.RandomState(0).standard_normal(365)
     sensors = pd.DataFrame({"unrelated": unrelated, "T3": YEAR.temperatures["T3"]})
@@ -121,7 +127,7 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
         Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)
     ]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     table = what_to_add(study, WEATHER, modes=[8], baseline_factors=())
     assert table["family"].tolist() == ["mass"]
@@ -171,7 +177,9 @@ def test_impossible_candidates_are_errors(study, arguments, message):
 
 def test_sensors_must_have_the_training_rows_and_new_names(fem):
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    study = DetectabilityStudy(fem, detector, sweep(fem, (0.1, 0.3), ["top"]), n_repeats=2, random_state=0)
+    study = DetectabilityStudy(
+        fem, detector, sweep(fem, (0.1, 0.3), ["top"]), n_repeats=2, random_state=0, uncertainty="noise"
+    )
     with pytest.raises(ValueError, match="expected a call of run before"):
         what_to_add(study, WEATHER)
     study.run(WEATHER)
@@ -186,7 +194,9 @@ def test_a_model_without_other_modes_has_only_longer_baselines(fem):
     model = CallableModel(truss.frequencies, truss.parameter_names, 6)
     chain = DataInformedFEM(model, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
     scenarios = [Scenario(f"soft {s}", parameters={"top": 1 - s}, family="top", severity=s) for s in (0.2, 0.3, 0.4)]
-    study = DetectabilityStudy(chain, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0)
+    study = DetectabilityStudy(
+        chain, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
+    )
     study.run(WEATHER)
     assert what_to_add(study, WEATHER)["kind"].tolist() == ["baseline"]
     with pytest.raises(ValueError, match="has no method 'with_modes'"):

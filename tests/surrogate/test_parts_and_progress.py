@@ -93,7 +93,7 @@ def test_verbose_tells_the_stages(capsys):
     expected += [("DataInformedFEM", f"({i} of 4) {name}") for i, name in enumerate(outer, 1)]
     assert lines_of(capsys.readouterr().out) == expected
     scenarios = sweep(fem, (0.2,), groups=["bottom"])
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, verbose=1)
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, verbose=1, uncertainty="noise")
     study.run(T)
     stages = ["detectors", "frequencies", "first repeat", "other 1 repeats"]
     found = lines_of(capsys.readouterr().out)

@@ -100,6 +100,11 @@ class ReducedModel(AffineBase):
         self._use(grow_basis(full._core, self._bounds, tol, random_state))
 
     @property
+    def full(self) -> AffineBase:
+        """The model that was reduced."""
+        return self._full
+
+    @property
     def basis_size_(self) -> int:
         """Number of basis vectors."""
         return self._core.stiffness.n_dof

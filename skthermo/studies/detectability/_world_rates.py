@@ -23,6 +23,8 @@ from skthermo.studies.worlds import Worlds
 
 N_DRAWS = 3  # draws of the noise in each world, which tell its share from that of what else varies
 MOST_FAILURES = 0.5  # share of worlds that may fail
+SMALL = 0.1  # share of a variance that is not worth a word
+NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class WorldRates:
         if len(errors) > MOST_FAILURES * len(outcomes):
             raise ValueError(
                 f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}; expected chains that can "
-                "be refitted, or uncertainty=('noise',)"
+                "be refitted, or uncertainty='noise'"
             )
         if errors:
             warn_user(
@@ -118,6 +120,16 @@ class WorldRates:
             return np.empty((0, len(keys)))
         return np.array([self.single(key).ravel() for key in keys]).T
 
+    def table(self) -> pd.DataFrame:
+        """Standard deviation of the rate due to each part, and its share of the variance, by detector and scenario."""
+        rows = {}
+        for key in self.rates:
+            deviations = self.by_part(key)
+            total = sum(deviation**2 for deviation in deviations.values())
+            shares = {f"{part} share": one**2 / total if total > 0 else np.nan for part, one in deviations.items()}
+            rows[key] = {**deviations, "together": np.sqrt(total), **shares}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["detector", "scenario"])
+
     def by_part(self, key: Key) -> dict[str, float]:
         """Standard deviation of the rate due to each part."""
         steps = self.rates[key]
@@ -168,7 +180,7 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
     for number, pair in enumerate(seeds):
         one = Judgement(errors=judgement.errors)
         for records in drawn.records(simulation.scenarios, number, pair):
-            drawn.judge(records, one)
+            drawn.judge(replace(records, healthy=None), one)
         for key, decisions in one.decisions.items():
             judgement.decisions.setdefault(key, []).extend(decisions)
     rows = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T))))
@@ -180,3 +192,27 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
             judged = (~np.isnan(counted)).sum(axis=1)
             found[key[:2]] = (counted < 0).sum(axis=1) / np.maximum(judged, 1), float(judged.mean())
     return found
+
+
+def bands_in_words(results: pd.DataFrame, parts: pd.DataFrame, detector: str, confidence: float) -> list[str]:
+    """What the bands of a detector hold, and which part of the widest one is the largest."""
+    names = [column for column in parts.columns if column in NAMES]
+    rows = results[(results["detector"] == detector) & (results["source"] == "data-informed")].set_index("scenario")
+    width = (rows["band_highest"] - rows["band_lowest"]).drop(rows.index[rows["measure"] == "PFA"])
+    line = f"Bands hold {_listed([NAMES[name] for name in names])}."
+    if not len(width.dropna()) or (detector, width.idxmax()) not in parts.index:
+        return [line]
+    widest = rows.loc[width.idxmax()]
+    shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
+    told = shares[shares >= SMALL].sort_values(ascending=False)
+    causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
+    return [
+        line,
+        f"A measured campaign of {widest.name!r} should show {widest['band_lowest']:.1%} to "
+        f"{widest['band_highest']:.1%} of its records in alarm ({confidence:.0%} band, the widest); of its variance "
+        f"come {causes}.",
+    ]
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"

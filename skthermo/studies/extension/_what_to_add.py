@@ -131,7 +131,8 @@ def what_to_add(
     >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
     >>> scenarios = sweep(fem, (0.1, 0.2, 0.3), groups=["top"])
-    >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0)
+    >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
+    >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
     >>> results = study.run(weather)
     >>> table = what_to_add(study, weather, modes=[6, 8])
     >>> table["candidate"][0]

@@ -2,55 +2,84 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._comparison import Effects
 from skthermo.studies.identification._evidence import Observed
 
-FARTHEST = 0.3  # amount up to which effects are tabulated; beyond, they are computed where they matter
+SHARES = np.array([0.0, 1 / 6, 1 / 3, 2 / 3, 1.0])  # of the bounds, at which effects are tabulated
+N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them
 
 
 @dataclass(frozen=True)
 class Curves:
-    """Effects of each cause at ``nodes`` (n_causes, n_nodes), in the coordinates of what was observed.
+    """Effects of each cause at shares of its bound, in the coordinates of what was observed.
 
-    ``values`` and ``slopes`` have the shape (n_causes, n_nodes, n_observed). ``first``, (n_observed, n_causes), are the
-    derivatives where nothing has changed, of what was observed itself.
+    ``values`` and ``slopes``, by that share, have the shape (n_causes, n_nodes, n_observed); beyond a third of the
+    bound they are extrapolated unless ``is_whole``. ``first``, (n_observed, n_causes), are the derivatives of what was
+    observed itself, where nothing has changed.
     """
 
-    nodes: Array
+    bounds: Array
     values: Array
     slopes: Array
     first: Array
+    is_whole: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, effects: Effects, causes: list[Cause], observed: Observed) -> Curves:
-        """Curves of exact effects."""
-        nodes = np.array([_nodes(cause.lowest, cause.highest) for cause in causes])
-        sets = (nodes[:, :, np.newaxis] * np.eye(len(causes))[:, np.newaxis]).reshape(-1, len(causes))
-        different, place = np.unique(sets + 0.0, axis=0, return_inverse=True)  # all begin with no change
-        values, slopes = (found[place.ravel()].reshape(*nodes.shape, *found.shape[1:]) for found in effects(different))
-        own = np.stack([slopes[column, :, :, column] for column in range(len(causes))])
-        none = slopes.reshape(-1, *slopes.shape[2:])[~sets.any(axis=1)][0]
-        return cls(nodes, values @ observed.rotation.T, own @ observed.rotation.T, none)
+    def of(cls, effects: Effects, causes: Sequence[Cause], observed: Observed) -> Curves:
+        """Curves of exact effects of small amounts."""
+        bounds = np.array([cause.highest if cause.highest > 0 else cause.lowest for cause in causes])
+        small = SHARES[1:N_SMALL]
+        solved, slopes = effects(np.vstack([np.zeros(len(causes)), *_single(bounds, range(len(causes)), small)]))
+        values = np.zeros((len(causes), len(SHARES), solved.shape[1]))
+        tangents = np.zeros_like(values)
+        tangents[:, 0] = slopes[0].T * bounds[:, np.newaxis]
+        for column in range(len(causes)):
+            rows = 1 + column * len(small) + np.arange(len(small))
+            values[column, 1:N_SMALL], tangents[column, 1:N_SMALL] = (
+                solved[rows],
+                slopes[rows, :, column] * bounds[column],
+            )
+        beyond = (SHARES[N_SMALL:] - SHARES[N_SMALL - 1])[:, np.newaxis]
+        last = tangents[:, N_SMALL - 1 : N_SMALL]
+        values[:, N_SMALL:] = values[:, N_SMALL - 1 : N_SMALL] + beyond * last
+        tangents[:, N_SMALL:] = last
+        turned = (array @ observed.rotation.T for array in (values, tangents))
+        return cls(bounds, *turned, slopes[0], np.zeros(len(causes), dtype=bool))
+
+    def whole(self, effects: Effects, columns: Sequence[int], observed: Observed) -> Curves:
+        """The same with exact effects of large amounts of some causes."""
+        values, tangents, is_whole = self.values.copy(), self.slopes.copy(), self.is_whole.copy()
+        large = SHARES[N_SMALL:]
+        solved, slopes = effects(np.vstack(_single(self.bounds, columns, large)))
+        for place, column in enumerate(columns):
+            rows = place * len(large) + np.arange(len(large))
+            values[column, N_SMALL:] = solved[rows] @ observed.rotation.T
+            tangents[column, N_SMALL:] = slopes[rows, :, column] @ observed.rotation.T * self.bounds[column]
+            is_whole[column] = True
+        return replace(self, values=values, slopes=tangents, is_whole=is_whole)
+
+    def are_small(self, causes: Sequence[int], amounts: Array) -> NDArray[np.bool_]:
+        """Whether amounts of causes, (n_causes,), are within those that all causes are tabulated for."""
+        return np.abs(amounts) <= SHARES[N_SMALL - 1] * np.abs(self.bounds[list(causes)])
 
     def at(self, sets: Array, amounts: Array) -> tuple[Array, Array]:
         """Changes by sets (n_sets, k) of amounts (n_sets, n_errors, k), and their derivatives."""
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, slopes = np.zeros(shape), []
         for i in range(sets.shape[-1]):
-            column, amount = sets[:, i, np.newaxis], amounts[..., i]
-            nodes = self.nodes[sets[:, i]]
-            left = (amount >= nodes[:, np.newaxis, 1]).astype(int)
-            start, end = self.nodes[column, left], self.nodes[column, left + 1]
-            width = (end - start)[..., np.newaxis]
-            share = ((amount - start) / (end - start))[..., np.newaxis]
-            t = np.clip(share, 0.0, 1.0)
-            beyond = share - t
+            column = sets[:, i, np.newaxis]
+            share = amounts[..., i] / self.bounds[column]
+            left = np.searchsorted(SHARES[1:-1], share, side="right")
+            width = (SHARES[left + 1] - SHARES[left])[..., np.newaxis]
+            t = (share - SHARES[left])[..., np.newaxis] / width
             values = self.values[column, left], self.values[column, left + 1]
             tangents = self.slopes[column, left] * width, self.slopes[column, left + 1] * width
             change += (
@@ -58,18 +87,16 @@ class Curves:
                 + (t**3 - 2 * t**2 + t) * tangents[0]
                 + (3 * t**2 - 2 * t**3) * values[1]
                 + (t**3 - t**2) * tangents[1]
-                + np.minimum(beyond, 0.0) * tangents[0]
-                + np.maximum(beyond, 0.0) * tangents[1]
             )
             slope = (
                 (6 * t**2 - 6 * t) * (values[0] - values[1])
                 + (3 * t**2 - 4 * t + 1) * tangents[0]
                 + (3 * t**2 - 2 * t) * tangents[1]
             )
-            slopes.append(slope / width)
+            slopes.append(slope / (width * self.bounds[column][..., np.newaxis]))
         return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0))
 
 
-def _nodes(lowest: float, highest: float) -> tuple[float, float, float]:
-    lowest, highest = max(lowest, -FARTHEST), min(highest, FARTHEST)
-    return lowest, 0.0 if lowest < 0 < highest else (lowest + highest) / 2, highest
+def _single(bounds: Array, columns: Sequence[int], shares: Array) -> list[Array]:
+    """Amounts with one cause alone, at shares of its bound."""
+    return [share * bounds[column] * np.eye(len(bounds))[column] for column in columns for share in shares]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from itertools import combinations
+from dataclasses import dataclass, field, replace
+from itertools import combinations, compress
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skthermo._arrays import Array
@@ -158,8 +159,20 @@ class Scale:
         """Whether tabulated effects are not those of its most probable amounts."""
         if len(weight.causes) > 1:
             return True
-        nodes, amount = self.curves.nodes[list(weight.causes)], weight.best[0]
-        return bool((amount < nodes[:, 0]).any() or (amount > nodes[:, -1]).any())
+        return not self.curves.are_small(weight.causes, weight.amounts(self.log_errors)).all()
+
+    def with_large(self, weights: Sequence[Weight]) -> Scale:
+        """The same with large amounts tabulated for those causes that have them in the best set of its size."""
+        best = best_of_each(weights, np.array([total(self, weight) for weight in weights]))
+        far = {
+            cause
+            for weight in compress(weights, best)
+            for cause, is_small in zip(
+                weight.causes, self.curves.are_small(weight.causes, weight.amounts(self.log_errors)), strict=True
+            )
+            if not is_small and not self.curves.is_whole[cause]
+        }
+        return replace(self, curves=self.curves.whole(self.effects, sorted(far), self.observed)) if far else self
 
 
 def weigh(scale: Scale, sets: Sequence[Set], log_priors: Sequence[float]) -> list[Weight]:
@@ -189,7 +202,7 @@ def refine(scale: Scale, found: list[Weight], log_priors: Sequence[float]) -> li
     found, settled = list(found), np.zeros(len(found), dtype=bool)
     for _ in range(EXACT_STEPS):
         logs = np.array([log_prior + total(scale, weight) for weight, log_prior in zip(found, log_priors, strict=True)])
-        matter = np.flatnonzero((logs - logsumexp(logs) > np.log(MATTERS)) & ~settled)
+        matter = np.flatnonzero(((logs - logsumexp(logs) > np.log(MATTERS)) | best_of_each(found, logs)) & ~settled)
         unsettled = [place for place in matter if scale.needs_refinement(found[place])]
         if not unsettled:
             break
@@ -201,16 +214,29 @@ def refine(scale: Scale, found: list[Weight], log_priors: Sequence[float]) -> li
     return found
 
 
+def best_of_each(weights: Sequence[Weight], logs: Array) -> NDArray[np.bool_]:
+    """Whether a set is the most probable of its size, by the logarithms of their probabilities."""
+    sizes = np.array([len(weight.causes) for weight in weights])
+    best = [np.where(sizes == size, logs, -np.inf).argmax() for size in np.unique(sizes)]
+    return np.isin(np.arange(len(sizes)), best)
+
+
 def total(scale: Scale, weight: Weight) -> float:
     """Log evidence of a set of causes, with or without something else."""
     return float(logsumexp(weight.log_evidence + scale.log_errors[:, np.newaxis]))
 
 
 def explanations(scale: Scale) -> tuple[list[Weight], Array]:
-    """All sets of as many causes as the prior allows, and the logarithms of their prior probabilities.
+    """All sets of as many causes as the prior allows, and the logarithms of their prior probabilities."""
+    found, priors = all_sets(scale)
+    while (further := scale.with_large(found)) is not scale:
+        scale = further
+        found, priors = all_sets(scale)
+    return refine(scale, found, priors), np.array(priors)
 
-    Where there are too many, the best smaller ones are extended by every other cause.
-    """
+
+def all_sets(scale: Scale) -> tuple[list[Weight], list[float]]:
+    """All sets by tabulated effects. Where there are too many, the best smaller ones are extended by every cause."""
     numbers = np.array(scale.prior.numbers)[: len(scale.causes) + 1]
     numbers = numbers / numbers.sum()
     found: list[Weight] = []
@@ -229,7 +255,7 @@ def explanations(scale: Scale) -> tuple[list[Weight], Array]:
         sets = [one for one in sets if is_possible(one, scale.causes)]
         priors += [float(np.log(probability / every))] * len(sets)
         found += screen(scale, sets, priors[-len(sets) :])
-    return refine(scale, found, priors), np.array(priors)
+    return found, priors
 
 
 def is_possible(causes: Set, all_causes: Sequence[Cause]) -> bool:

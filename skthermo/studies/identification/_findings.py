@@ -16,7 +16,7 @@ from skthermo.studies.identification._identified import IdentifiedDamage
 from skthermo.studies.identification._posterior import Posterior
 from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._sentences import explanation_text
-from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone
+from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
 from skthermo.studies.identification._shift import Shift
 
 LISTED = 1e-3  # least probability of explanations that are listed
@@ -73,6 +73,7 @@ def findings(
         unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
         members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
         draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
+        precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), causes, prior.severity),
         p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
         misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
         records=records,

@@ -64,6 +64,10 @@ class IdentifiedDamage:
         The model's groups behind each cause; none for a cause that is no group.
     draws : DataFrame
         Severities of the model's groups, drawn from all explanations by their probability; one draw a row.
+    precision : DataFrame
+        One row a cause: the least standard error that any method can reach (Cramer-Rao), ``alone`` if nothing else
+        could have changed, and ``together`` if all other causes may have changed as much as is likely beforehand. With
+        mode shapes, ``alone_without_shapes`` and ``together_without_shapes`` are what frequencies alone would give.
     p_value : float
         Probability that a healthy structure shows as large a shift.
     misfit_p_value : float
@@ -104,6 +108,7 @@ class IdentifiedDamage:
     unseen: list[str]
     members: Mapping[str, list[str]]
     draws: pd.DataFrame = field(repr=False)
+    precision: pd.DataFrame
     p_value: float
     misfit_p_value: float
     records: ComparedRecords

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -155,7 +156,8 @@ def identify_damage(
             parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
         return Comparison(parts)
 
-    every, nominal = compared(effects), compared(effects.nominal())
+    every = compared(effects)
+    nominal = Comparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
     scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     whitened = every.observed().rotation @ scale.curves.first
     alone = errors_alone(whitened)
@@ -192,7 +194,8 @@ def _of_shapes(effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, n
     """Measured changes of mode shapes, and the effects of the groups on them."""
     if dofs is None:
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
-    structure = effects.structure
-    of_shapes = ShapeEffects.of(structure, effects.theta, dofs)
-    shift = ShapeShift.of(of_shapes, shapes, noise, structure.fem.mode_names_)
+    fem = effects.structure.fem
+    states = (effects.theta, np.ones((1, effects.theta.shape[1])))
+    candidates = [ShapeEffects.of(effects.structure, theta, dofs) for theta in states]
+    shift = ShapeShift.of(candidates, shapes, noise, fem.mode_names_)
     return Part(shift.effects, shift.change, np.diag(shift.variances))

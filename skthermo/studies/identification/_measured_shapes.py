@@ -30,16 +30,24 @@ class ShapeShift:
 
     @classmethod
     def of(
-        cls, effects: ShapeEffects, shapes: Any, noise: ArrayLike | Literal["fitted"], modes: Sequence[Any]
+        cls,
+        candidates: Sequence[ShapeEffects],
+        shapes: Any,
+        noise: ArrayLike | Literal["fitted"],
+        modes: Sequence[Any],
     ) -> "ShapeShift":
-        """From one or several records of each state, as `identify_damage` takes them."""
+        """From one or several records of each state, as `identify_damage` takes them.
+
+        Of effects at different theta, those count whose unchanged shapes are most like the measured healthy ones:
+        frequencies alone may have led theta astray where they hardly depend on it.
+        """
         stated = stated_variances(noise, len(modes))
-        records = read_records(shapes, effects.reference.shape)
+        records = read_records(shapes, candidates[0].reference.shape)
         known = np.logical_and(*(measured_sensors(state) for state in records))
-        effects = effects.at(known & (known.sum(axis=0) > 1))
-        complete = np.logical_and(*((~np.isnan(effects.components(state))).any(axis=0) for state in records))
-        effects = effects.at(effects.known & np.isin(np.arange(len(modes)), effects.modes[complete]))
-        foreign = foreign_modes(effects, records[0])
+        known &= known.sum(axis=0) > 1
+        complete = np.logical_and(*((~np.isnan(state) | ~known).all(axis=1).any(axis=0) for state in records))
+        effects = max((one.at(known & complete) for one in candidates), key=lambda one: mac_of(one, records[0]).sum())
+        foreign = (mac_of(effects, records[0]) < ALIKE) & effects.known.any(axis=0)
         if foreign.any():
             warn_user(
                 f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
@@ -88,11 +96,12 @@ def measured_sensors(records: NDArray) -> NDArray[np.bool_]:
     return present.sum(axis=0) >= np.maximum(MEASURED * n_with_mode, 1)
 
 
-def foreign_modes(effects: ShapeEffects, records: NDArray) -> NDArray[np.bool_]:
-    """Modes whose mean measured shape has a low MAC with the reference, (n_modes,)."""
+def mac_of(effects: ShapeEffects, records: NDArray) -> Array:
+    """MAC of the mean measured shape of each mode with the reference, (n_modes,); 0 without a measured shape."""
     squares = np.nanmean(effects.components(records), axis=0) ** 2
     across = np.bincount(effects.modes, squares, minlength=len(effects.across))
-    return across > (1 - ALIKE) * (effects.known * effects.reference**2).sum(axis=0)
+    lengths = (effects.known * effects.reference**2).sum(axis=0)
+    return np.where(lengths > 0, 1 - across / np.where(lengths > 0, lengths, 1.0), 0.0)
 
 
 def stated_variances(noise: ArrayLike | Literal["fitted"], n_modes: int) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from skthermo._arguments import seem_rad_per_s
 from skthermo._formatting import SPACE, chance_text, listed, percent
 from skthermo.studies.identification._causes import HIGHEST_SEVERITY, NO_DAMAGE
-from skthermo.studies.identification._told import Amount, either, told
+from skthermo.studies.identification._told import Amount, Told, either, told
 
 NAMED, MOST_NAMED = 0.01, 4
 """Probability from which on another explanation is named, and the largest number of those that are."""
@@ -36,9 +36,7 @@ def answer(found: Any) -> Iterator[str]:
         what = "No damage of these groups" if first.is_else else "Damage of these groups alone hardly"
         yield f"{what} explains the shifts; {_departure(found)}."
         yield f"Likely causes: {likely_causes(found)}."
-    named = [one for one in others if not one.is_healthy and one.probability >= NAMED][:MOST_NAMED]
-    if named:
-        yield f"It could also be: {'; '.join(f'{one.phrase()} ({chance_text(one.probability)})' for one in named)}."
+    yield from _others(first, others)
     if not first.is_healthy:
         unchanged = sum(one.probability for one in explanations if one.is_healthy)
         nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
@@ -47,6 +45,18 @@ def answer(found: Any) -> Iterator[str]:
         yield from _averages(found)
     if first.is_healthy:
         yield from _unnoticed(found)
+
+
+def _others(first: Told, others: Sequence[Told]) -> Iterator[str]:
+    """What else could be: the most probable explanation with one thing more, then others."""
+    probable = [one for one in others if not one.is_healthy and one.probability >= NAMED]
+    more = {more: one for one in probable if (more := one.beside(first))}
+    named = [f"{extra} ({chance_text(one.probability)})" for extra, one in more.items()][:MOST_NAMED]
+    texts = [f"about the same and {either(named)}"] if named else []
+    different = [one for one in probable if one not in more.values()][:MOST_NAMED]
+    texts += [f"{one.phrase()} ({chance_text(one.probability)})" for one in different]
+    if texts:
+        yield f"It could also be: {'; '.join(texts)}."
 
 
 def _averages(found: Any) -> Iterator[str]:
@@ -93,7 +103,6 @@ def limits(found: Any) -> Iterator[str]:
 def warnings(found: Any) -> Iterator[tuple[str, str]]:
     """What is doubtful, by kind and text."""
     best = told(found)[0]
-    yield from found.records.warnings()
     if found.confused:
         sets = "; ".join(" and ".join(causes) for causes in found.confused)
         yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
@@ -111,7 +120,8 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
         )
         yield (
             "unexplained shifts",
-            f"damage of these groups does not explain the shifts ({doubt}); likely causes: {likely_causes(found)}",
+            f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
+            f"{likely_causes(found)}",
         )
 
 

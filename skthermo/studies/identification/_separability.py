@@ -1,8 +1,12 @@
 """Which damage groups can be told apart by their effects."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import pandas as pd
 
 from skthermo._arrays import Array
+from skthermo.studies.identification._causes import Cause
 
 VISIBLE = 0.1  # largest standard error with which a severity counts as known
 IMITATING_SHARE = 0.25  # smallest share in the reproduced effect with which a group counts as imitating another
@@ -17,6 +21,30 @@ def cosines(slopes: Array) -> Array:
 def errors_alone(slopes: Array) -> Array:
     """Standard error of each severity if no other group could be damaged, (n_groups,)."""
     return 1 / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+
+
+def errors_together(slopes: Array, causes: Sequence[Cause], severity: float) -> Array:
+    """Standard error of each amount if all others may have changed as much as is likely beforehand, (n_causes,)."""
+    information = slopes.T @ slopes + np.diag([(severity * cause.scale) ** -2 for cause in causes])
+    errors = []
+    for column, cause in enumerate(causes):
+        beside = [other for other, one in enumerate(causes) if other == column or not cause.opposes(one)]
+        inverse = np.linalg.inv(information[np.ix_(beside, beside)])
+        errors.append(np.sqrt(inverse[beside.index(column), beside.index(column)]))
+    return np.array(errors)
+
+
+def precision(slopes: Array, n_frequencies: int, causes: Sequence[Cause], severity: float) -> pd.DataFrame:
+    """Cramer-Rao bounds of each cause alone and beside the others; if there are shapes, without them, too.
+
+    The first rows of the slopes, (n_observed, n_causes), in standard errors, are those of frequencies.
+    """
+    parts = {"": slopes}
+    if len(slopes) > n_frequencies:
+        parts["_without_shapes"] = slopes[:n_frequencies]
+    columns = {f"alone{name}": errors_alone(part) for name, part in parts.items()}
+    columns |= {f"together{name}": errors_together(part, causes, severity) for name, part in parts.items()}
+    return pd.DataFrame(columns, index=[cause.name for cause in causes])
 
 
 def confused_groups(slopes: Array) -> list[tuple[int, ...]]:

@@ -15,6 +15,7 @@ from skthermo._frequency_effects import healthy_frequencies
 from skthermo._times import has_stamps, row_times
 
 FEWEST_TO_JUDGE = 8  # records among which one may be called far from the others
+OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
 FAR = 6.0  # standard deviations beyond which a record is far from the others
 MAD_TO_DEVIATION = 1.4826
 WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
@@ -56,8 +57,9 @@ def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
         return np.zeros(len(shifts), dtype=bool)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of modes that were not measured
-        away = np.abs(shifts - np.nanmedian(shifts, axis=0))
-        scale = np.fmax(MAD_TO_DEVIATION * np.nanmedian(away, axis=0), deviations)
+        usual = np.nanmedian(shifts, axis=0)
+        away = np.abs(shifts - usual)
+        scale = np.fmax(MAD_TO_DEVIATION * np.nanmedian(away, axis=0), np.hypot(deviations, OF_WEATHER * usual))
     rows = (np.nan_to_num(away) > FAR * scale).any(axis=1)
     return rows if rows.sum() < len(rows) / 2 else np.zeros(len(rows), dtype=bool)
 

@@ -67,6 +67,10 @@ class Amount:
         """Whether another cause's amount is of the same kind and within the band of this one."""
         return self.saying == other.saying and self.lowest <= other.value <= self.highest
 
+    def resembles(self, other: Amount) -> bool:
+        """Whether another amount of the same cause differs by no more than the width of the band."""
+        return abs(self.value - other.value) <= abs(self.highest - self.lowest)
+
 
 @dataclass(frozen=True)
 class Told:
@@ -94,6 +98,16 @@ class Told:
         """Causes with their amounts, for a table or a drawing."""
         parts = [f"{either([one.cause for one in amounts])} {amounts[0].size}" for amounts in self.changes]
         return ", ".join(parts + [SOMETHING_ELSE] * self.has_else) or NO_DAMAGE
+
+    def beside(self, first: Told) -> str:
+        """The one thing that it holds beside another explanation, if the rest is about the same; else nothing."""
+        known = {amounts[0].cause: amounts[0] for amounts in first.changes}
+        own = [amounts for amounts in self.changes if amounts[0].cause not in known]
+        shared = [amounts[0] for amounts in self.changes if amounts[0].cause in known]
+        is_same = len(shared) == len(known) and all(known[one.cause].resembles(one) for one in shared)
+        if first.is_healthy or not is_same or len(own) + self.has_else - first.has_else != 1:
+            return ""
+        return _phrase(own[0], False, False).removeprefix("a loss of ").rstrip(",") if own else SOMETHING_ELSE
 
     def phrase(self, in_full: bool = False) -> str:
         """Causes with their amounts as part of a sentence; in full with what is lost, and the bands."""

@@ -16,17 +16,16 @@ HALF_WIDTH = 0.6  # of the box in which stiffnesses are looked for
 
 def drawn_models(fem: Any, number: int, seed: int) -> list[Any]:
     """Models calibrated to the mean of the training records, as far as these determine stiffnesses."""
-    model = fem.model
-    lacking = [name for name in ("jacobian", "with_damage_parameters") if not hasattr(model, name)]
-    if lacking:
-        raise ValueError(
-            f"uncertainty has 'model', but other models like {model!r} cannot be drawn: it has no {lacking}; expected "
-            "models=[...], or uncertainty without 'model'"
-        )
     mean = np.nanmean(as_floats(fem.training_records_[1]), axis=0)
     with without_warnings():
-        updater = ModelUpdater(model, bounds=HALF_WIDTH, prior=SPREAD).fit(mean, frequency_std=DEVIATION * mean)
-        return list(updater.sample_models(number, spread=SPREAD, random_state=seed))
+        try:
+            updater = ModelUpdater(fem.model, bounds=HALF_WIDTH, prior=SPREAD).fit(mean, frequency_std=DEVIATION * mean)
+            return list(updater.sample_models(number, spread=SPREAD, random_state=seed))
+        except (AttributeError, TypeError, ValueError) as error:
+            raise ValueError(
+                f"other models like {fem.model!r:.200} cannot be drawn from the training records ({error}); expected "
+                "models=[...], or uncertainty without 'model', such as ('noise', 'baseline', 'weather')"
+            ) from error
 
 
 def checked_models(fem: Any, models: Any) -> list[Any]:

@@ -1,18 +1,20 @@
 """Worlds: structures that could have given the training records of a chain, each in weather of its own."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from skthermo._arrays import positive_integer
+from skthermo._warnings import warn_user
 from skthermo.studies.worlds._models import checked_models, drawn_models
 from skthermo.studies.worlds._weather import other_years, resampled_days
 
 PARTS = ("noise", "weather", "baseline", "model")
 """What a world draws, in the order in which one is added to the others."""
 
+ALL = "all"
 LEAST_WORLDS = 2
 LARGEST_SEED = np.iinfo(np.int32).max
 
@@ -43,8 +45,8 @@ class Worlds:
         if models is not None:
             models = checked_models(fem, models)
         elif "model" in asked:
-            models = drawn_models(fem, number, int(seeds[-1]))
-        varied = [part for part in PARTS[1:] if part in asked]
+            models = _models_of(fem, number, int(seeds[-1]), is_needed=not _is_all(uncertainty))
+        varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
     def world(self, number: int) -> Iterator[tuple[str, Any, Any]]:
@@ -65,10 +67,27 @@ class Worlds:
             yield part, chain, T
 
 
+def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
+    """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""
+    try:
+        return drawn_models(fem, number, seed)
+    except ValueError as error:
+        if is_needed:
+            raise
+        warn_user(f"bands hold no error of the model: {error}", "bands without models")
+        return []
+
+
 def checked_parts(uncertainty: Any) -> list[str]:
     """What varies, or an error."""
-    asked = [uncertainty] if isinstance(uncertainty, str) else list(uncertainty)
-    unknown = [part for part in asked if part not in PARTS]
-    if unknown or not asked:
-        raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected some of {list(PARTS)}")
+    if _is_all(uncertainty):
+        return list(PARTS)
+    is_one = isinstance(uncertainty, str) or not isinstance(uncertainty, Iterable)
+    asked = [uncertainty] if is_one else list(uncertainty)
+    if not asked or any(part not in PARTS for part in asked):
+        raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'all', or some of {list(PARTS)}")
     return asked
+
+
+def _is_all(uncertainty: Any) -> bool:
+    return isinstance(uncertainty, str) and uncertainty == ALL

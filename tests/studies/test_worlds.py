@@ -1,0 +1,293 @@
+"""Bands of a study: other noise, weather, training records and models, and which of them is how large."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from joblib import parallel_config
+from scipy.special import logit
+from sklearn.base import clone
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
+from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
+from skthermo.studies.detectability._world_rates import Spread, WorldRates
+from skthermo.studies.worlds import PARTS, Worlds
+from skthermo.studies.worlds._weather import other_years, resampled_days
+
+YEAR = make_truss_campaign(random_state=0)
+WEATHER = make_truss_campaign(random_state=1).temperatures
+MODELS = [make_truss().damaged({"bottom": loss}) for loss in (-0.03, 0.04, 0.0)]
+
+
+def study_of(fem, uncertainty, **options):
+    scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
+    settings = {"n_repeats": 2, "n_worlds": 2, "random_state": 0} | options
+    return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, uncertainty=uncertainty, **settings)
+
+
+@pytest.fixture(scope="module")
+def study(fem):
+    study = study_of(fem, PARTS, models=MODELS)
+    study.run(WEATHER)
+    return study
+
+
+def stamped(stamps):
+    """Temperatures that tell of which day and hour they are."""
+    days = (stamps - stamps[0].normalize()) / pd.Timedelta(days=1)
+    return pd.DataFrame({"day": np.floor(days), "hour": stamps.hour.astype(float)}, stamps)
+
+
+@pytest.mark.parametrize("years", [1, 2])
+def test_other_days_are_of_the_same_season_and_the_same_hour(years):
+    T = stamped(pd.date_range("2024-01-01", periods=years * 365 * 6, freq="4h"))
+    other = resampled_days(T, np.random.RandomState(0))
+    assert other.index.equals(T.index)
+    assert (other["hour"] == T["hour"]).all()
+    apart = (other["day"] - T["day"]) % 365
+    assert np.minimum(apart, 365 - apart).max() <= 15
+    assert (other["day"] != T["day"]).mean() > 0.8
+    assert (np.diff(other["day"]) % 365 > 1).sum() <= len(T) / 6 / 7 + 2  # whole weeks in a row
+
+
+def test_rows_without_stamps_count_as_a_year():
+    T = np.arange(730.0)[:, np.newaxis]
+    other = resampled_days(T, np.random.RandomState(0))
+    assert other.shape == T.shape
+    apart = np.abs(other - T)
+    assert 0 < np.minimum(apart, len(T) - apart).max() <= 34  # fifteen days of two records, and the end of the year
+    assert len(resampled_days(T[:1], np.random.RandomState(0))) == 1
+
+
+def test_gaps_in_the_stamps_keep_their_own_weather():
+    T = stamped(pd.date_range("2024-01-01", periods=365, freq="D"))
+    gappy = T.drop(T.index[100:140])
+    other = resampled_days(gappy, np.random.RandomState(0))
+    assert other.index.equals(gappy.index)
+    assert set(other["day"]) <= set(gappy["day"])
+
+
+def test_years_are_matched_by_season():
+    first = stamped(pd.date_range("2024-01-01", periods=300, freq="D"))
+    second = stamped(pd.date_range("2025-01-01", periods=365, freq="D"))
+    same, matched = other_years([first, second])
+    assert same is first
+    assert matched.index.equals(first.index)
+    assert (matched["day"] - first["day"]).abs().max() <= 1
+    with pytest.raises(ValueError, match=r"year 1 of T has no record within a day of the season of 2\d\d of 300 rows"):
+        other_years([first, second[:60]])
+    with pytest.raises(ValueError, match="year 1 of T has the sensors"):
+        other_years([first, second.rename(columns={"day": "T9"})])
+    with pytest.raises(ValueError, match="year 1 of T has 2 rows, the first 3"):
+        other_years([np.zeros((3, 1)), np.zeros((2, 1))])
+
+
+def test_repeats_do_not_depend_on_the_worlds(fem, study):
+    alone = study_of(fem, "noise")
+    results = alone.run(WEATHER)
+    left = study.results_.drop(columns=["band_lowest", "band_highest"])
+    pd.testing.assert_frame_equal(results.drop(columns=["band_lowest", "band_highest"]), left)
+    for key, decisions in alone.decisions_.items():
+        np.testing.assert_array_equal(decisions, study.decisions_[key])
+    assert alone.worlds_ is None
+    assert alone.uncertainty_ is None
+    rates = (alone.decisions_["MahalanobisDetector", "bottom 10 %", "data-informed"] < 0).mean(axis=1)
+    row = results.set_index("scenario").loc["bottom 10 %"]
+    assert (row["band_lowest"], row["band_highest"]) == (rates.min(), rates.max())
+
+
+def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
+    study = study_of(fem, ("noise", "baseline", "weather"))
+    twin = clone(study).set_params(n_jobs=2)
+    results = study.run(WEATHER)
+    with parallel_config("threading"):
+        pd.testing.assert_frame_equal(twin.run(WEATHER), results)
+    pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(twin)).uncertainty_, study.uncertainty_)
+
+
+def test_a_world_is_drawn_from_its_seed_alone(fem):
+    few, many = (Worlds.of(fem, ("baseline", "weather"), WEATHER, None, number, [1, 2]) for number in (2, 4))
+    for number in (0, 1):
+        for (part, chain, T), (again, other, T_again) in zip(few.world(number), many.world(number), strict=True):
+            assert part == again
+            pd.testing.assert_frame_equal(T, T_again)
+            pd.testing.assert_frame_equal(chain.predict(T), other.predict(T))
+
+
+def test_parts_come_one_after_the_other(fem):
+    worlds = Worlds.of(fem, ("model", "noise", "baseline", "weather"), WEATHER, MODELS, 3, [1, 2])
+    (weather, chain, T), (baseline, other, _), (model, third, _) = worlds.world(1)
+    assert (weather, baseline, model) == ("weather", "baseline", "model")
+    assert worlds.with_noise
+    assert chain is fem
+    assert not T.equals(WEATHER)
+    assert other.model is fem.model
+    assert third.model is MODELS[1]
+    assert not other.predict(WEATHER).equals(fem.predict(WEATHER))
+
+
+def test_several_years_take_turns(fem):
+    years = [make_truss_campaign(random_state=seed).temperatures for seed in (1, 2, 3)]
+    worlds = Worlds.of(fem, "weather", years, None, 4, [1, 2])
+    for number, expected in enumerate([0, 1, 2, 0]):
+        ((_, _, T),) = worlds.world(number)
+        pd.testing.assert_frame_equal(T, years[expected])
+
+
+def rates_of(steps, with_noise=True, parts=("weather", "baseline")):
+    key = "detector", "scenario"
+    return WorldRates({key: steps}, {key: 1e9}, parts, with_noise, []), key
+
+
+def test_variances_of_the_parts_add_up():
+    random = np.random.RandomState(0)
+    deviations = {"noise": 0.02, "weather": 0.01, "baseline": 0.03}
+    n_worlds, n_draws = 4000, 3
+    weather, baseline = (deviations[part] * random.standard_normal((n_worlds, 1)) for part in ("weather", "baseline"))
+    noise = deviations["noise"] * random.standard_normal((2, n_worlds, n_draws))
+    steps = 0.5 + np.stack([weather + noise[0], weather + baseline + noise[1]], axis=1)
+    worlds, key = rates_of(steps)
+    found = worlds.by_part(key)
+    np.testing.assert_allclose([found[part] for part in deviations], list(deviations.values()), rtol=0.08)
+    table = worlds.table().loc[key]
+    assert table["together"] == pytest.approx(np.sqrt(14) / 100, rel=0.05)
+    assert table[[f"{part} share" for part in deviations]].sum() == pytest.approx(1)
+    lowest, highest = worlds.band(key, 0.9)
+    assert (highest - lowest) / 2 == pytest.approx(1.645 * np.sqrt(14) / 100, rel=0.05)
+
+
+def test_a_band_holds_the_rate_of_one_more_campaign():
+    random = np.random.RandomState(1)
+    held = []
+    for _ in range(1500):
+        centres = logit(0.8) + 0.3 * random.standard_normal((9, 1))
+        rates = 1 / (1 + np.exp(-centres[:8] - 0.2 * random.standard_normal((8, 3))))
+        worlds, key = rates_of(rates[:, np.newaxis], parts=("baseline",))
+        lowest, highest = worlds.band(key, 0.9)
+        truth = 1 / (1 + np.exp(-centres[8, 0] - 0.2 * random.standard_normal()))
+        held.append(lowest <= truth <= highest)
+    assert 0.87 < np.mean(held) < 0.94
+
+
+def test_more_parts_do_not_narrow_a_band():
+    random = np.random.RandomState(2)
+    noise, other = 0.02 * random.standard_normal((300, 3)), 0.03 * random.standard_normal((300, 1))
+    widths = []
+    for steps, with_noise in ((noise, False), (noise, True), (noise + other, True)):
+        worlds, key = rates_of(0.5 + steps[:, np.newaxis], with_noise, parts=("baseline",))
+        lowest, highest = worlds.band(key, 0.9)
+        widths.append(highest - lowest)
+    assert widths[0] < widths[1] < widths[2]
+
+
+def test_all_worlds_alike_have_no_spread():
+    found = Spread.of(np.full((5, 3), 0.25))
+    assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
+
+
+def test_bands_of_a_study(study):
+    table = study.uncertainty_
+    assert list(table.columns[:5]) == ["noise", "weather", "baseline", "model", "together"]
+    np.testing.assert_allclose((table[list(PARTS)] ** 2).sum(axis=1), table["together"] ** 2)
+    assert (table["together"] > 0).all()
+    smallest = study.minimum_detectable_damage(method="curve")
+    assert (smallest["band_lowest"] < smallest["band_highest"]).all()
+    curve = study.pod_curve("bottom")
+    low, high = curve.band([0.1, 0.2])
+    curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.worlds])
+    assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
+    assert curve.a90_band[0] < curve.a90_band[1]
+    told = study.summary()
+    assert "Bands hold noise, the weather, the training records and the model." in told
+    assert "A measured campaign of 'bottom 10 %' should show" in told
+
+
+def test_models_that_cannot_be_drawn(monkeypatch, fem):
+    def fails(*args, **options):
+        raise ValueError("no derivative")
+
+    monkeypatch.setattr("skthermo.studies.worlds._models.ModelUpdater.fit", fails)
+    with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
+        Worlds.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
+    with pytest.warns(UserWarning, match="bands hold no error of the model: other models like"):
+        worlds = Worlds.of(fem, "all", WEATHER, None, 3, [1, 2])
+    assert worlds.parts == ["weather", "baseline"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"uncertainty": "wind"}, "uncertainty is 'wind'; expected 'all', or some of"),
+        ({"uncertainty": ["noise", "wind"]}, "uncertainty is .*; expected 'all', or some of"),
+        ({"uncertainty": []}, "uncertainty is .*; expected 'all', or some of"),
+        ({"uncertainty": 3}, "uncertainty is 3; expected 'all', or some of"),
+        ({"n_worlds": 1}, "n_worlds is 1; expected at least 2"),
+        ({"models": []}, "models is .*; expected a list of FE models"),
+        ({"models": [make_truss(n_modes=4)]}, "model 0 of models is .* and 4 modes; expected the chain's"),
+    ],
+)
+def test_wrong_worlds_are_refused(fem, options, message):
+    with pytest.raises(ValueError, match=message):
+        study_of(fem, **({"uncertainty": "noise"} | options)).run(WEATHER)
+
+
+class Failing(Scenario):
+    """A scenario that fails in weather whose first record is warmer than a limit."""
+
+    limit = np.inf
+
+    def _changes(self, T, repeat):
+        if T.iloc[0, 0] > self.limit:
+            raise ValueError("too warm")
+        return super()._changes(T, repeat)
+
+
+def test_worlds_that_fail_are_counted(fem, monkeypatch):
+    years = [WEATHER] * 4
+    years = [WEATHER, WEATHER + 0.1, WEATHER + 0.2, WEATHER + 0.3]
+    study = DetectabilityStudy(
+        fem, MahalanobisDetector(), [Failing("damage", {"bottom": 0.2})], n_repeats=2, uncertainty="weather", n_worlds=4
+    )
+    monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.25)
+    with pytest.warns(UserWarning, match="1 of 4 worlds failed, the first with ValueError: too warm"):
+        study.run(years)
+    assert len(study.worlds_.rates["MahalanobisDetector", "damage"]) == 3
+    monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.05)
+    with pytest.raises(ValueError, match="3 of 4 worlds failed"):
+        study.run(years)
+
+
+def test_uncertain_damage_differs_from_world_to_world(fem):
+    uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
+    options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_worlds": 2, "random_state": 0}
+    study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], **options)
+    study.run(WEATHER)
+    rates = study.worlds_.rates["MahalanobisDetector", "some"][:, -1]
+    assert len(np.unique(rates.round(2))) > 3
+
+
+def test_other_training_records_change_a_chain_as_its_error(fem):
+    year, chains = YEAR.temperatures, [fem.resampled(seed) for seed in range(4)]
+    predicted = fem.predict(year)
+    changes = np.array([(chain.predict(year) / predicted - 1).to_numpy() for chain in chains])
+    again = fem.refitted(year, fem.simulate(year, noise="fitted", random_state=0))
+    refitted = (again.predict(year) / predicted - 1).to_numpy()
+    ratio = np.sqrt((changes**2).mean() / (refitted**2).mean())
+    assert 0.75 < ratio < 1.33
+    spread = [np.nanstd(chain.residuals_.values, axis=0).mean() for chain in (fem, *chains)]
+    np.testing.assert_allclose(spread[1:], spread[0], rtol=0.06)
+    pd.testing.assert_frame_equal(fem.resampled(3).predict(year), chains[3].predict(year))
+    pd.testing.assert_frame_equal(fem.predict(year), predicted)
+
+
+def test_a_refitted_chain_finds_the_same_parameters(fem):
+    np.testing.assert_allclose(fem.refitted().parameters_, fem.parameters_, rtol=1e-3)
+
+
+def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
+    refitted = fem.refitted(model=MODELS[0])
+    assert refitted.model is MODELS[0]
+    bottom = refitted.parameters_["bottom"] / fem.parameters_["bottom"]
+    np.testing.assert_allclose(bottom.median(), 1 / 1.03, rtol=3e-3)
