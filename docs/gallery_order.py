@@ -14,6 +14,7 @@ ORDER = [
     "plot_kw51_study.py",
     "plot_model_updating.py",
     "plot_owner_report.py",
+    "plot_located_damage.py",
     "plot_in_service.py",
     "plot_new_baseline.py",
     "plot_gauss_newton_step.py",

@@ -63,9 +63,9 @@ NEIGHBOURS, APART = 20, 24
 NOT_JUDGED = 0
 
 
-def footbridge(stiffness=None, stations=None):
-    """The bridge in the plane x-z, 168 degrees of freedom; groups may be stiffer, and the deck's nodes fewer."""
-    factors = dict.fromkeys(GROUPS, 1.0) | (stiffness or {})
+def footbridge(pylon=1.0, stations=None, stiffness=None):
+    """The bridge in the plane x-z, 168 degrees of freedom; other stations of the deck and stiffer groups if given."""
+    factors = dict.fromkeys(GROUPS, 1.0) | {"pylon": pylon} | (stiffness or {})
     nodes, members, groups = {}, {}, {group: [] for group in GROUPS}
 
     def add(group, name, member):
@@ -75,7 +75,7 @@ def footbridge(stiffness=None, stations=None):
     def scaled(group, section):
         return section | {"E": factors[group] * section["E"]}
 
-    stations = np.arange(0, SIDE + MAIN + STEP / 2, STEP).tolist() if stations is None else stations
+    stations = (np.arange(0, SIDE + MAIN + STEP / 2, STEP) if stations is None else np.asarray(stations)).tolist()
     nodes |= {("deck", x): (x, 0.0, 0.0) for x in stations}
     heights = np.linspace(FOOT, TOP, 12).tolist()
     nodes |= {("pylon", z): (SIDE, 0.0, z) for z in heights}
@@ -185,7 +185,7 @@ def lagged(regressor):
 
 def chain():
     """A data-informed FE model whose pylon is 10 % too stiff."""
-    model = footbridge({"pylon": 1.1}).assemble(GROUPS, n_modes=len(MODES), track=True).reduced(0.6, random_state=0)
+    model = footbridge(pylon=1.1).assemble(GROUPS, n_modes=len(MODES), track=True).reduced(0.6, random_state=0)
     return DataInformedFEM(
         model,
         inverse=InverseSurrogate(model, bounds=0.4, noise=NOISE),

@@ -117,7 +117,7 @@ class Footbridge:
     def models(self):
         random = np.random.default_rng(self.seed)
         off = 1 + random.uniform(0.03, 0.05, len(GROUPS)) * random.choice([-1, 1], len(GROUPS))
-        structure = footbridge(dict(zip(GROUPS, off, strict=True)), COARSE)
+        structure = footbridge(stations=COARSE, stiffness=dict(zip(GROUPS, off, strict=True)))
         return {"wrong": structure.assemble(GROUPS, n_modes=len(MODES), track=True).reduced(0.7, random_state=0)}
 
 

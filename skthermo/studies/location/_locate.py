@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import as_random_state
 from skthermo._frequency_effects import read_groups
-from skthermo._warnings import told_around, warn_user
+from skthermo._warnings import told_around, warn_user, without_warnings
 from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division
@@ -131,8 +130,7 @@ def locate_damage(
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
     with told_around(OF_WHOLE_GROUPS):
         found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # identify_damage has given them
+    with without_warnings():  # identify_damage has given them
         seen = observe(fem, T, F, noise)
     mean = seen.theta[~np.isnan(seen.frequencies).all(axis=1)].mean(axis=0, keepdims=True)
     question = MeasuredShift(

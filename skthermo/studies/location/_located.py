@@ -49,8 +49,8 @@ class LocatedDamage:
         Probability that a member is damaged.
     probability_of_else : float
         Probability that something else shifted the frequencies, beside damage or alone.
-    alike : mapping of str to str
-        Group -> two places in it that these modes cannot tell apart, in words.
+    alike : list of str
+        Two probable places, in words, that these modes cannot tell apart; empty if there are none.
     explained : sequence of explanations
         Those of the finest division, each with its ``probability``, and the damaged ``members`` and the ``severities``
         by group.
@@ -83,7 +83,7 @@ class LocatedDamage:
     structure: Structure = field(repr=False)
     probability_of_damage: float
     probability_of_else: float
-    alike: Mapping[str, str]
+    alike: list[str]
     explained: Sequence[Explained] = field(repr=False)
     places: Mapping[str, Places] = field(repr=False)
 
@@ -147,8 +147,12 @@ class LocatedDamage:
                 f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "
                 "name."
             )
+        if len(probable) > 1 and self._share_of_several(probable.index) < WORTH_TELLING:
+            yield f"Most probably only one of {listed(list(probable.index))} is damaged."
         for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
             yield from self._of_group(str(group), row)
+        if self.alike:
+            yield f"These modes cannot tell {' from '.join(self.alike)}."
         if self.probability_of_else >= WORTH_TELLING:
             yield f"Something else may have shifted the frequencies ({_share(self.probability_of_else)})."
         if self.found.unseen:
@@ -177,8 +181,10 @@ class LocatedDamage:
             yield f"It lies in {where} with {_share(in_wide)}; the rest of {group} is unlikely."
         else:
             yield f"The rest of {group} is unlikely."
-        if group in self.alike:
-            yield f"These modes cannot tell {self.alike[group]}."
+
+    def _share_of_several(self, groups: Collection[str]) -> float:
+        """Probability that more than one of some groups is damaged."""
+        return sum(one.probability for one in self.explained if len(one.members.keys() & set(groups)) > 1)
 
     def _share_of_whole(self, group: str) -> float:
         """Probability that all of a group is damaged alike, given that it is damaged."""
@@ -227,11 +233,7 @@ def located_damage(
             "likely": len(fewest(of_group, LIKELY)[0]),
         }
     groups = pd.DataFrame.from_dict(by_group, orient="index")
-    alike = {
-        group: " from ".join(places[group].text(members) for members in pair)
-        for group, pair in answer.alike.items()
-        if pieces.get(group, 1) > 1
-    }
+    alike = [f"{places[one.group].text(one.members)} of {one.group}" for one in answer.alike]
     return LocatedDamage(
         table=table,
         groups=groups,

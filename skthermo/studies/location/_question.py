@@ -21,13 +21,14 @@ PLAUSIBLE = 0.01  # probability of several groups together from which on each of
 
 @dataclass(frozen=True)
 class Stretch:
-    """A whole group, or some neighbouring pieces of it, as a cause."""
+    """A whole group, or a part of it, some neighbouring pieces, as a cause."""
 
     group: str
     columns: tuple[int, ...]
     members: frozenset[Hashable]
     prior: float
     scale: float
+    is_part: bool
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Question:
             if division is None:
                 names += [name for name in own if name not in names]
                 columns = tuple(names.index(name) for name in own)
-                stretches.append(Stretch(group, columns, frozenset(members_of(model, own)), 1.0, 1.0))
+                stretches.append(Stretch(group, columns, frozenset(members_of(model, own)), 1.0, 1.0, False))
                 continue
             labels = [f"{group}, piece {number}" for number in range(1, len(division.pieces) + 1)]
             names += labels
@@ -64,7 +65,8 @@ class Question:
             for positions, prior, scale in division.stretches():
                 members = frozenset(member for position in positions for member in division.pieces[position])
                 columns = tuple(first + position for position in positions)
-                stretches.append(Stretch(group, columns, members, prior, scale))
+                is_part = len(positions) < len(division.pieces)
+                stretches.append(Stretch(group, columns, members, prior, scale, is_part))
         return cls(stretches, names, parts)
 
     @property

@@ -17,20 +17,17 @@ from skthermo.fem import Structure
 from skthermo.studies.identification import (
     SOMETHING_ELSE,
     Cause,
-    Comparison,
     DamagePrior,
     Observed,
-    Part,
     Posterior,
     Scale,
-    ShapeEffects,
-    ShapeShift,
     Shift,
+    compared,
     screen,
 )
 from skthermo.studies.location._curves import Curves
 from skthermo.studies.location._division import Division
-from skthermo.studies.location._question import Question, on_pieces
+from skthermo.studies.location._question import Question, Stretch, on_pieces
 
 ALIKE = 0.98  # cosine between the effects of two stretches from which on modes cannot tell one from the other
 AS_PROBABLE = 0.2  # and the ratio of their probabilities from which on that is said
@@ -48,10 +45,10 @@ class Explained:
 
 @dataclass(frozen=True)
 class Answer:
-    """Explanations by stretches, and pairs of stretches that are probable and look alike."""
+    """Explanations by stretches, and two probable stretches that look alike, if there are such."""
 
     explained: Sequence[Explained]
-    alike: Mapping[str, tuple[frozenset[Hashable], frozenset[Hashable]]]
+    alike: tuple[Stretch, ...]
 
 
 @dataclass(frozen=True)
@@ -103,36 +100,21 @@ class MeasuredShift:
         changes = Changes.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
-        parts = [Part(effects, self.shift.mean, self.shift.covariance, self.shift.freedom)]
-        if self.shapes is not None:
-            with told_around(["foreign mode shapes"]):
-                of_shapes = ShapeEffects.of(effects.structure, effects.theta, self.dofs)
-                shift = ShapeShift.of(of_shapes, self.shapes, self.shape_noise, self.shift.modes)
-            parts.append(Part(shift.effects, shift.change, np.diag(shift.variances)))
-        comparison = Comparison(parts)
+        with told_around(["foreign mode shapes"]):
+            comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)
         return observed, Curves.of(comparison.effects, question.incidence, observed.rotation)
 
 
-def alike(question: Question, curves: Curves, probable: NDArray) -> dict[str, tuple[frozenset, frozenset]]:
-    """By group, its most probable stretch and the most probable other place whose damage looks like it."""
+def alike(question: Question, curves: Curves, probable: NDArray) -> tuple[Stretch, ...]:
+    """The most probable part of a group and, if damage elsewhere looks the same, the most probable such place."""
     slopes = curves.slopes[:, 0] @ curves.rotation.T
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), np.finfo(float).tiny)
-    found = {}
-    for group in dict.fromkeys(stretch.group for stretch in question.stretches):
-        own = np.array(question.of_group(group))[1:]
-        if not len(own):
-            continue
-        best = own[probable[own].argmax()]
-        members = question.stretches[best].members
-        others = [
-            place
-            for place in own
-            if not question.stretches[place].members & members
-            and slopes[place] @ slopes[best] > ALIKE
-            and probable[place] > AS_PROBABLE * probable[best]
-        ]
-        if others:
-            other = max(others, key=lambda place: probable[place])
-            found[group] = (members, question.stretches[other].members)
-    return found
+    is_part = np.array([stretch.is_part for stretch in question.stretches])
+    best = int(np.where(is_part, probable, -1.0).argmax())
+    first = question.stretches[best]
+    is_elsewhere = np.array([not stretch.members & first.members for stretch in question.stretches])
+    is_alike = is_part & is_elsewhere & (slopes @ slopes[best] > ALIKE) & (probable > AS_PROBABLE * probable[best])
+    if not first.is_part or not is_alike.any():
+        return ()
+    return first, question.stretches[int(np.where(is_alike, probable, -1.0).argmax())]
