@@ -11,7 +11,8 @@ one half are counted and left out.
 Prints, for each structure and model: the share of cases whose damaged members are all in the set of 90 %, the size of
 this set, in members and relative to all, and the share with the true group first. Beside it stands the answer for whole
 groups: the share with the true group first, how often "something else" has a probability of 45 % or more, and the
-members of the group; and the highest probability of damage in healthy records. The exit code is 1 if a target is missed.
+members of the group; and the highest probability of damage in healthy records. The exit code is 1 if a target is
+missed.
 """
 
 import argparse
