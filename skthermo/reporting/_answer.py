@@ -12,6 +12,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding
 from skthermo.reporting._html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
+from skthermo.reporting._waits import how_soon
 
 MOST_LISTED = 12  # largest number of scenarios that are listed or drawn
 
@@ -35,12 +36,13 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     parts = [words]
     if identified:
         parts += [element("h3", "The structure as it is now"), bullets(identified)]
+    parts += [element("h3", "How soon damage is found"), how_soon(study)]
     parts += [element("h3", "False alarms"), _false_alarms(rows)]
     if findings:
         columns = ["Where", "Smallest damage found reliably", "Bounds", "From the curve; with 95 % confidence"]
         cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]
         parts += [
-            element("h3", "Smallest damage that is found reliably"),
+            element("h3", "Smallest damage that is found reliably, by shares of records"),
             bullets(
                 element("span", element("strong", f"{found.family}:"), f" {found.sentence()}") for found in findings
             ),

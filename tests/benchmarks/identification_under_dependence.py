@@ -24,8 +24,8 @@ from skthermo._arrays import as_floats
 from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies.identification._comparison import Comparison, Part, remembered
-from skthermo.studies.identification._shift import measured_shift
+from skthermo.studies.identification.measured._shift import measured_shift
+from skthermo.studies.identification.weighing._comparison import Comparison, Part, remembered
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 GROUPS, DAMAGE, NOISE = ["bottom", "top", "diagonal"], 0.12, 0.01

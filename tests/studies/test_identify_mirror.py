@@ -21,8 +21,7 @@ def bridge():
     return Structure(nodes, members, supports, groups).assemble(["deck", "pier_1", "pier_2"], n_modes=4)
 
 
-@pytest.mark.filterwarnings("ignore:damage of these groups does not explain")
-def test_mirror_images_are_named_and_neither_is_blamed():
+def test_mirror_images_are_named_and_share_the_probability():
     model = bridge()
     T = 10 + 10 * np.random.default_rng(0).uniform(-1, 1, (300, 1))
     theta = np.exp((T - 10) * [-0.004, -0.003, -0.003])
@@ -33,8 +32,10 @@ def test_mirror_images_are_named_and_neither_is_blamed():
         found = identify_damage(fem, T, records, random_state=0)
     assert found.confused == [("pier_1", "pier_2")]
     assert found.p_value < 0.01
-    assert not found.table.loc[["pier_1", "pier_2"], "significant"].any()
-    assert (found.standard_errors[["pier_1", "pier_2"]] > 0.05).all()
-    merged = identify_damage(fem, T, records, merge=True, random_state=0).table.loc["pier_1 + pier_2"]
-    assert merged["significant"]
-    assert merged["severity"] == pytest.approx(0.1, abs=0.02)  # half of the damage in each
+    assert found.probability_of_damage > 0.99
+    alone = found.explanations["probability"]
+    assert 0.3 < alone["pier_2"] / alone["pier_1"] < 3
+    assert (found.table.loc[["pier_1", "pier_2"], "standard_error"] > 0.05).all()
+    assert found.estimates.loc[("pier_2", "pier_2"), "severity"] == pytest.approx(0.2, abs=0.02)
+    assert (found.table["lowest"] == 0).all()
+    assert found.table.loc["pier_2", "highest"] > 0.18

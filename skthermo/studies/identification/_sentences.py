@@ -9,8 +9,8 @@ import numpy as np
 
 from skthermo._arguments import seem_rad_per_s
 from skthermo._formatting import SPACE, chance_text, listed, percent
-from skthermo.studies.identification._causes import HIGHEST_SEVERITY, NO_DAMAGE
 from skthermo.studies.identification._told import Amount, Told, either, told
+from skthermo.studies.identification.weighing import HIGHEST_SEVERITY, NO_DAMAGE
 
 NAMED, MOST_NAMED = 0.01, 4
 """Probability from which on another explanation is named, and the largest number of those that are."""
