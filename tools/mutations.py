@@ -332,6 +332,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/drift/_explanations.py", "monitoring/drift"): [
         ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
     ],
+    ("studies/location/_curves.py", "studies/test_locate_parts.py"): [
+        ("slopes of curves of stretches", "x * 3 * cube", "x * 2 * cube"),
+    ],
+    ("studies/location/_located.py", "studies/test_locate_parts.py"): [
+        ("sets that hold a part of the damage only", "held[max(rank[member]", "held[min(rank[member]"),
+    ],
+    ("fem/affine/_core.py", "fem/test_divide.py"): [
+        ("parts of calibrated terms", "scaled(self.stiffness.factors[origin])", "scaled(np.ones(len(origin)))"),
+    ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
