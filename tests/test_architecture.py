@@ -64,7 +64,14 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "studies.worlds": set(),
     "studies.detectability": {"studies.scenarios", "studies.worlds"},
     "studies.extension": {"studies.detectability", "studies.scenarios", "studies.worlds"},
-    "studies.identification": {"studies.scenarios", "studies.worlds"},
+    "studies.identification": {
+        "studies.identification.measured",
+        "studies.identification.weighing",
+        "studies.scenarios",
+        "studies.worlds",
+    },
+    "studies.identification.measured": set(),
+    "studies.identification.weighing": set(),
     "studies.location": {"studies.identification", "studies.scenarios"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}

@@ -6,7 +6,7 @@ import pytest
 from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects, typical_rows
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies.identification._causes import read_causes
+from skthermo.studies.identification.weighing._causes import read_causes
 
 YEAR = make_truss_campaign(random_state=1).temperatures
 WEATHER = YEAR[::150]  # so few records that they are solved one by one

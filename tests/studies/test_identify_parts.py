@@ -6,9 +6,9 @@ import pytest
 from skthermo._changes import Changes
 from skthermo._frequency_effects import FrequencyEffects, read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.studies.identification._comparison import Comparison, Part
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
-from skthermo.studies.identification._shift import measured_shift, outlying, record_shifts
+from skthermo.studies.identification.measured._shift import measured_shift, outlying, record_shifts
+from skthermo.studies.identification.weighing._comparison import Comparison, Part
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::12]

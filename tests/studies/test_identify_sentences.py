@@ -9,7 +9,7 @@ from skthermo._formatting import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_damage
-from skthermo.studies.identification._compared import ComparedRecords
+from skthermo.studies.identification.measured._compared import ComparedRecords
 from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")

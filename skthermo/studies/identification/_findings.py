@@ -8,16 +8,11 @@ from scipy import stats
 
 from skthermo._arrays import Array
 from skthermo._changes import Changes
-from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._compared import ComparedRecords
-from skthermo.studies.identification._comparison import Comparison
-from skthermo.studies.identification._evidence import Observed
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._sentences import explanation_text
 from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
-from skthermo.studies.identification._shift import Shift
+from skthermo.studies.identification.measured import ComparedRecords, Shift
+from skthermo.studies.identification.weighing import Cause, Comparison, DamagePrior, Observed, Posterior
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500

@@ -9,10 +9,10 @@ import pandas as pd
 
 from skthermo._arrays import Array
 from skthermo._formatting import SPACE
-from skthermo.studies.identification._compared import ComparedRecords
-from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._sentences import answer, limits, warnings
 from skthermo.studies.identification._told import told
+from skthermo.studies.identification.measured import ComparedRecords
+from skthermo.studies.identification.weighing import DamagePrior
 from skthermo.studies.scenarios import UncertainDamage
 
 UNLIKELY = 0.05  # probability of a misfit by chance below which it is said

@@ -14,18 +14,19 @@ from skthermo._arguments import check_jobs
 from skthermo._arrays import MatrixLike, as_floats, as_random_state
 from skthermo._frequency_effects import FrequencyEffects
 from skthermo._warnings import warn_each, without_warnings
-from skthermo.studies.identification._causes import read_causes
-from skthermo.studies.identification._comparison import Comparison, Part
-from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._measured_shapes import ShapeShift
-from skthermo.studies.identification._observe import observe
-from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._prior import DamagePrior
 from skthermo.studies.identification._separability import VISIBLE, errors_alone
-from skthermo.studies.identification._shape_effects import ShapeEffects
-from skthermo.studies.identification._shift import Shift
+from skthermo.studies.identification.measured import ShapeEffects, ShapeShift, Shift, observe
+from skthermo.studies.identification.weighing import (
+    Comparison,
+    DamagePrior,
+    Part,
+    Posterior,
+    Scale,
+    explanations,
+    read_causes,
+)
 from skthermo.studies.scenarios import check_chain
 from skthermo.studies.worlds import checked_models
 
@@ -43,12 +44,12 @@ def identify_damage(
     added_mass: Mapping[str, MatrixLike] | None = None,
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: ArrayLike | None = None,
-    shape_noise: ArrayLike = 0.01,
+    shape_noise: ArrayLike | Literal["fitted"] = 0.01,
     models: Sequence[Any] | None = None,
     n_jobs: int | None = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> IdentifiedDamage:
-    """Severities of damage groups that explain how measured frequencies have shifted.
+    """Which causes explain how measured frequencies have shifted, how probably, and by how much.
 
     Parameters
     ----------
@@ -67,18 +68,23 @@ def identify_damage(
     prior : DamagePrior, optional
         What is thought of damage before; by default `DamagePrior()`.
     stiffening : bool or sequence of str, optional
-        Groups that may have become stiffer, as by a repair or a locked bearing; True for all.
+        Groups that may also have become stiffer, by up to 100 %, such as after a repair or where a bearing is locked;
+        True for all. Each is a cause of its own, named "GROUP stiffer", with a severity below 0.
     parameters : sequence of str, optional
-        Parameters of the model that may have changed, whatever the weather.
-    added_mass : mapping of str to array-like, optional
-        Patterns of mass that may have been added, in kg at the degrees of freedom, such as ballast.
+        Parameters of the model whose change may explain the shifts, such as the mass of the ballast. Each gives two
+        causes, "NAME lower" and "NAME higher", with relative changes from -95 % to 100 %.
+    added_mass : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+        Patterns of mass that may have been added, in kg; a vector holds lumped masses. The amount of each is how many
+        times it was added, from 0 to 3; give what would be likely if there were any. Negative masses were taken away.
     shapes : (array-like, array-like), optional
-        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), of any scale;
-        complex ones are rotated to be real; NaN where a component was not measured.
+        Measured mode shapes of the healthy and of the changed structure in similar weather, each of shape (n_dofs,
+        n_modes) or, of several records, (n_records, n_dofs, n_modes). Scale, sign and phase do not matter, and complex
+        shapes are turned to be real; NaN where a component was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
-    shape_noise : float or array-like of shape (n_modes,), default=0.01
-        Standard deviation of a component of a measured shape, relative to the shape's largest component.
+    shape_noise : "fitted", float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of a component of one record's shape, relative to the shape's largest component. Where
+        several records scatter more, their scatter counts; "fitted" takes the scatter alone.
     models : sequence of FE model, optional
         Models that may be the structure's, all as probable, as `~skthermo.updating.ModelUpdater.sample_models` gives
         them. The chain learns its training records anew with each of them; probabilities and amounts are averages over
@@ -86,28 +92,29 @@ def identify_damage(
     n_jobs : int, optional
         Parallel jobs (joblib) over the models. Results do not depend on it.
     random_state : int, RandomState or None, default=None
-        Seed of the draws behind standard errors and p-values.
+        Seed of the draws behind severities and their bands; probabilities of explanations do not depend on it.
 
     Returns
     -------
     IdentifiedDamage
-        Severities and errors, explained shifts, groups that cannot be told apart, and the draws that
-        ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
+        Explanations with their probabilities, probability and severity of each cause, explained shifts, causes that
+        cannot be told apart, and the draws that ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
 
     Raises
     ------
     ValueError
-        If fem is not a fitted chain, T and F differ in rows, a group is unknown, no record can be compared (each lacks
-        all frequencies, a temperature, or similar weather in the training records), no group can be seen, or the
-        model cannot be damaged.
+        If fem is not a fitted chain, T and F differ in rows, a group or parameter is unknown, a mass pattern does not
+        fit the model, causes have the same name, ``prior`` is no `DamagePrior`, shapes or dofs do not fit the model, no
+        record can be compared (each lacks all frequencies, a temperature, or similar weather in the training records),
+        no cause can be seen, or the model cannot be changed so.
 
     Warns
     -----
     UserWarning
-        Once for each kind: if records cannot be compared, with their number and the reasons; if the records, or the
-        training records, are worth few independent ones; if temperatures have other names than in fit,
-        groups cannot be told apart or cannot be seen, a severity is at its bound, or the damage does not explain the
-        shifts.
+        Once for each kind: if records cannot be compared or are far from the others, with their number and the reasons,
+        and if these are the last ones, because the structure may have just changed; if the records, or the training
+        records, are worth few independent ones; if temperatures have other names than in fit, causes cannot be told
+        apart or cannot be seen, a severity is at its bound, or the causes do not explain the shifts.
 
     Notes
     -----
@@ -118,16 +125,28 @@ def identify_damage(
     training records, as those of an independent part and of one that fades exponentially with time; 30 new records
     would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between records counts, else
     their number. Modes that scatter clearly more than in training count as scattering so. The covariance is known
-    from few independent records, so that the laws are Student's, Hotelling's and Fisher's instead of the normal law.
-    Severities follow from non-negative least squares in standard errors of the shifts,
-    repeated with exact derivatives on the damaged model until they no longer change. Their standard errors are
-    those of the bounded estimate, from fits to redrawn shifts, and not below half of what a severity can grow by
-    until the fit is worse by two standard errors, however the other groups adapt. Where damage does not explain the
-    shifts, they are widened by Birge's ratio, the root of the misfit over its degrees of freedom. A group is
-    significant if the best fit without it is worse by more than errors would make it (one-sided, Bonferroni over
-    the groups) and if all groups together explain more than chance would. What groups have in common is judged at
-    the model's nominal state, too, because a chain may have drifted out of the symmetry of its structure; the
-    standard error of a group in such a set covers what the others could take from it.
+    from few independent records, so that errors follow Student's law of several dimensions. Records that are more than
+    six standard deviations from the median of the others in a mode are left out and counted.
+
+    An explanation is a set of at most three causes, each with one unknown amount. Its probability is proportional to
+    its prior probability (`DamagePrior`) and to its evidence, which is the likelihood of the shift averaged over the
+    prior law of the amounts. An amount that hardly improves the fit thereby lowers the probability: few causes
+    are preferred without a test. Effects are those of the FE model in the weather of the records, as a mean over a
+    few typical states. The law of amounts is taken as normal about the most probable ones, found by Gauss-Newton steps
+    with exact derivatives, and ends at the bounds, which is integrated exactly in one to three dimensions; Student's
+    law is a mixture of normal laws. All sets are first weighed by tabulated effects of single causes, which are added,
+    and those that hold the probability again by the exact effects of all their causes together. Of more than 5,000
+    sets of as many causes, only those are weighed that extend one of the 50 best smaller sets.
+
+    No FE model is exact: the error of its effect on each mode is a share of what was measured, and as this share is not
+    known well, a third, one and three times ``prior.model_error`` count as equally probable; the modes' misfit
+    decides between them. An error by the same factor in all modes cannot be seen and widens the bands. "Something
+    else" shifts every mode independently, by an unknown size between .05 and 13 %.
+
+    Averages over explanations count causes outside an explanation as 0, so that a band which begins at 0 says that the
+    cause may not be there at all. Causes that these modes do not show keep about their prior probability. What causes
+    have in common is judged at the model's nominal state, too, because a chain may have drifted out of the symmetry of
+    its structure.
 
     Examples
     --------
@@ -186,7 +205,11 @@ def identify_damage(
 
 
 def compared(
-    effects: FrequencyEffects, shift: Shift, shapes: Any, dofs: ArrayLike | None, shape_noise: ArrayLike
+    effects: FrequencyEffects,
+    shift: Shift,
+    shapes: Any,
+    dofs: ArrayLike | None,
+    shape_noise: ArrayLike | Literal["fitted"],
 ) -> Comparison:
     """Measured shifts of frequencies, and of shapes if there are any, beside the effects of causes."""
     parts = [Part(effects, shift.mean, shift.covariance, shift.freedom)]
@@ -195,7 +218,9 @@ def compared(
     return Comparison(parts)
 
 
-def _of_shapes(effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, noise: ArrayLike) -> Part:
+def _of_shapes(
+    effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, noise: ArrayLike | Literal["fitted"]
+) -> Part:
     """Measured changes of mode shapes, and the effects of the groups on them."""
     if dofs is None:
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from skthermo._formatting import SPACE, listed
-from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
+from skthermo.studies.identification.weighing import NO_DAMAGE, SOMETHING_ELSE
 
 ALIKE = 0.95  # cosine between effects from which on causes that are confused are said together
 TOLD = {

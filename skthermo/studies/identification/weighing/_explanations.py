@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._comparison import Effects
-from skthermo.studies.identification._curves import Curves
-from skthermo.studies.identification._evidence import (
+from skthermo.studies.identification.weighing._causes import Cause
+from skthermo.studies.identification.weighing._comparison import Effects
+from skthermo.studies.identification.weighing._curves import Curves
+from skthermo.studies.identification.weighing._evidence import (
     ELSE_SIZES,
     ERROR_FACTORS,
     Amounts,
@@ -23,7 +23,7 @@ from skthermo.studies.identification._evidence import (
     most_probable,
     weighed,
 )
-from skthermo.studies.identification._prior import DamagePrior
+from skthermo.studies.identification.weighing._prior import DamagePrior
 
 MOST_SETS = 5000  # sets of as many causes that are all weighed; beyond it, only those that extend the best smaller ones
 AT_ONCE = 400  # sets in memory

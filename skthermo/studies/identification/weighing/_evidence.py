@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._boxes import log_marginal, log_probability
+from skthermo.studies.identification.weighing._boxes import log_marginal, log_probability
 
 ELSE_SIZES = 0.0005 * 4.0 ** np.arange(5)  # relative shifts by which something else may move the modes
 ERROR_FACTORS = np.array([1 / 3, 1.0, 3.0])  # of the model's error, which is not well known either

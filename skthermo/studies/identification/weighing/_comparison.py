@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._evidence import Observed
+from skthermo.studies.identification.weighing._evidence import Observed
 
 Effects = Callable[[Array], tuple[Array, Array]]
 

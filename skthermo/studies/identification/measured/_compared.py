@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array, as_floats
 from skthermo._formatting import counted, listed, significant
 from skthermo._weather import FAR_OUTSIDE
-from skthermo.studies.identification._shift import Shift
+from skthermo.studies.identification.measured._shift import Shift
 
 IN_A_ROW = 3  # number of last records, all far from those before, that is no chance
 FEW, FEW_TRAINED = 3.0, 20.0

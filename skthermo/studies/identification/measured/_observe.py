@@ -14,8 +14,8 @@ from skthermo._frames import check_same_rows
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import check_array
 from skthermo._warnings import warn_user, warnings_once
-from skthermo.studies.identification._compared import ComparedRecords, left_out_rows
-from skthermo.studies.identification._shift import Shift, measured_shift, outlying, record_shifts, scatter_of
+from skthermo.studies.identification.measured._compared import ComparedRecords, left_out_rows
+from skthermo.studies.identification.measured._shift import Shift, measured_shift, outlying, record_shifts, scatter_of
 
 FAR_FROM_OTHERS = "far from the other records"
 

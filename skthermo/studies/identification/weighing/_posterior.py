@@ -10,10 +10,10 @@ import pandas as pd
 from scipy.special import logsumexp
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._boxes import draws, log_probability
-from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
-from skthermo.studies.identification._evidence import ERROR_FACTORS, Amounts
-from skthermo.studies.identification._explanations import Scale, Weight
+from skthermo.studies.identification.weighing._boxes import draws, log_probability
+from skthermo.studies.identification.weighing._causes import NO_DAMAGE, SOMETHING_ELSE
+from skthermo.studies.identification.weighing._evidence import ERROR_FACTORS, Amounts
+from skthermo.studies.identification.weighing._explanations import Scale, Weight
 
 KEPT = 1e-5  # probability of explanations that are kept
 N_DRAWS, FEWEST = 4000, 200  # draws of all explanations together, and of each

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
-from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._comparison import Effects
-from skthermo.studies.identification._evidence import Observed
+from skthermo.studies.identification.weighing._causes import Cause
+from skthermo.studies.identification.weighing._comparison import Effects
+from skthermo.studies.identification.weighing._evidence import Observed
 
 SHARES = np.array([0.0, 1 / 6, 1 / 3, 2 / 3, 1.0])  # of the bounds, at which effects are tabulated
 N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array, as_floats
 from skthermo._warnings import warn_user
-from skthermo.studies.identification._shape_effects import ShapeEffects
+from skthermo.studies.identification.measured._shape_effects import ShapeEffects
 
 STATES = ("healthy", "damaged")
 ALIKE = 0.5  # MAC of a measured healthy shape with the model's below which it counts as another mode
