@@ -151,8 +151,8 @@ class DetectabilityStudy(BaseEstimator):
     A world is a structure that could have given the training records. The detectors have learned measured records, and
     stay: what a chain does not know of the structure moves records away from what they have learned. Bands are those of
     Student's law on the scale of the logit, with the variances between and within worlds (three draws of the noise in
-    each), about the study's own rate, moved by the mean effect of other weather and models. ``tests/benchmarks/study_bands.py``
-    measures how often they hold what a measured campaign shows.
+    each), about the study's own rate, moved by the mean effect of other weather and models.
+    ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
 
     References
     ----------
