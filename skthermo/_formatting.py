@@ -90,7 +90,9 @@ def duration_text(wait: Any) -> str:
     hours = wait.total_seconds() / 3600
     if hours == 0:
         return "first record"
-    size, unit = (hours / 24, "day") if hours >= 48 else (hours, "hour") if hours >= 1 else (60 * hours, "minute")
+    size, unit = (
+        (hours / 24, "day") if hours >= 48 or hours == 24 else (hours, "hour") if hours >= 1 else (60 * hours, "minute")
+    )
     text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
     return f"{text} {unit}{'' if text == '1' else 's'}"
 

@@ -335,6 +335,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
+    ("studies/detectability/_world_rates.py", "studies/test_worlds.py"): [
+        ("noise in the variance between worlds", " - within / values.shape[1]", ""),
+        ("a band of the mean of all worlds", "variance * (1 + 1 / number)", "variance / number"),
+    ],
+    ("studies/worlds/_weather.py", "studies/test_worlds.py"): [
+        ("weather of any season", "SEASON = 15", "SEASON = 90"),
+    ],
     ("studies/detectability/_judged.py", "studies/test_several_detectors.py"): [
         ("a detector that failed stays failed", "if name not in self.errors], {}", "], {}"),
     ],

@@ -63,15 +63,15 @@ NEIGHBOURS, APART = 20, 24
 NOT_JUDGED = 0
 
 
-def footbridge(pylon=1.0):
-    """The bridge in the plane x-z, 168 degrees of freedom."""
+def footbridge(pylon=1.0, stations=None):
+    """The bridge in the plane x-z, 168 degrees of freedom; other stations of the deck if given."""
     nodes, members, groups = {}, {}, {group: [] for group in GROUPS}
 
     def add(group, name, member):
         members[name] = member
         groups[group].append(name)
 
-    stations = np.arange(0, SIDE + MAIN + STEP / 2, STEP)
+    stations = np.arange(0, SIDE + MAIN + STEP / 2, STEP) if stations is None else np.asarray(stations, dtype=float)
     nodes |= {("deck", x): (x, 0.0, 0.0) for x in stations.tolist()}
     heights = np.linspace(FOOT, TOP, 12).tolist()
     nodes |= {("pylon", z): (SIDE, 0.0, z) for z in heights}

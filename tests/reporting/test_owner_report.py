@@ -9,7 +9,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._formatting import chance_text, share_text
+from skthermo._formatting import bounds_text, chance_text, share_text
 from skthermo.datasets import kw51_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report
@@ -291,3 +291,13 @@ def test_what_is_no_study_and_no_identified_damage_is_named(study, chain, tmp_pa
         owner_report(chain[0], tmp_path / "a.html")
     with pytest.raises(ValueError, match=r"identified is \{'top': 0.1\}; expected what identify_damage gives"):
         owner_report(study, tmp_path / "a.html", identified={"top": 0.1})
+
+
+def test_it_leads_with_how_soon_damage_is_found(study, page):
+    waits, told = study.time_to_find(), study.time_to_find(smallest=True)
+    assert page.text.index("How soon damage is found") < page.text.index("False alarms")
+    for text in told["text"]:
+        assert text in page.text
+    for _, row in waits.iterrows():
+        assert f"{share_text(row['7D'])} ({bounds_text(row['7D lowest'], row['7D highest'])})" in page.cells
+    assert "Alarm within a week" in page.heads

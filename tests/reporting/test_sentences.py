@@ -31,12 +31,13 @@ def test_times_are_said_in_fitting_units():
         pd.Timedelta("20min"),
         pd.Timedelta("5h"),
         pd.Timedelta("1h"),
+        pd.Timedelta("24h"),
         pd.Timedelta("93.5D"),
         pd.NaT,
         12.0,
         np.nan,
     ]
-    said = ["first record", "20 minutes", "5 hours", "1 hour", "94 days", "no alarm", "12 records", "no alarm"]
+    said = ["first record", "20 minutes", "5 hours", "1 hour", "1 day", "94 days", "no alarm", "12 records", "no alarm"]
     assert [duration_text(wait) for wait in waits] == said
 
 
@@ -72,7 +73,7 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
     }
     study = DetectabilityStudy(None, None, [])
     study.results_ = pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True)
-    study.confidence_ = 0.95
+    study.confidence_, study.worlds_ = 0.95, None
     return findings_of(study)
 
 

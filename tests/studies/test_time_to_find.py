@@ -1,5 +1,7 @@
 """How soon damage is found, in the laws of alarms of which the chances are known."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -174,6 +176,36 @@ def test_rows_without_stamps_are_counted():
     assert np.isnan(study.time_to_find([101]).iloc[0]["101"])
     with pytest.raises(ValueError, match="within has '7D'; expected numbers of records"):
         study.time_to_find(["7D"])
+
+
+def test_the_smallest_damage_that_is_soon_found_is_told_in_words(study):
+    every = study.time_to_find(detector="single").set_index("scenario")
+    healthy, certain = every.loc["healthy"], every.loc["bottom 60 %"]
+    assert f"within 7 days in {round(100 * healthy['7D'])}" in healthy["text"]
+    in_text = (
+        f"is found within 1 day in 95 of 100 cases; a healthy structure alarms by then in {100 * healthy['1D']:.0f}"
+    )
+    assert certain["text"] == f"{in_text} of 100"
+    soon = study.time_to_find(detector="single", smallest=True).set_index("scenario")
+    assert list(soon.index) == ["healthy", "crack"]
+    assert every.loc["bottom 8 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
+    told = study.time_to_find(detector=study.ranking().index[0], smallest=True)
+    sentences = [f"{row['scenario']!r} {row['text']}." for _, row in told.iterrows()]
+    assert "\n".join(sentences) in study.summary()
+
+
+def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
+    scenarios = [{}, {"bottom": 0.001}]
+    often, never = ({"d": MahalanobisDetector(0.2)}, {"d": WindowedAlarm(60, contamination=0.001)})
+    words = []
+    for detectors in (often, never):
+        study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=3, uncertainty="noise", random_state=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of thresholds learned from too few windows
+            study.run(WEATHER)
+        words.append(study.time_to_find().set_index("scenario").loc["bottom 0.1 %", "text"])
+    assert words[0].endswith("so that such an alarm tells little")
+    assert words[1] == "is not found in 95 of 100 cases within the 365 days of the records"
 
 
 @pytest.mark.parametrize(

@@ -150,6 +150,18 @@ def test_what_cleaning_took_comes_back(spoiled):
         assert abs(shares.mean() - expected) <= 3 * shares.std() / np.sqrt(len(shares))
 
 
+def test_resampled_chains_have_the_gaps_and_outliers_of_the_records(in_service):
+    other = in_service.resampled(3)
+    for name in ("missing", "outliers"):
+        np.testing.assert_array_equal(
+            getattr(other.service_records(), name), getattr(in_service.service_records(), name)
+        )
+    service = in_service.service_records()
+    expected = in_service.simulate(T, outliers="fitted", gaps="fitted", noise="fitted", random_state=0)
+    found = in_service.simulate(T, outliers=service, gaps="fitted", noise="fitted", random_state=0)
+    pd.testing.assert_frame_equal(found, expected)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -144,7 +144,7 @@ class Standing:
     @property
     def step_text(self) -> str:
         """Usual time between records, as in "every day"."""
-        return {"24 hours": "day"}.get(text := duration_text(self.step), text.removeprefix("1 "))
+        return duration_text(self.step).removeprefix("1 ")
 
     @property
     def unjudged_since(self) -> pd.Timestamp:

@@ -1,6 +1,6 @@
 """How soon damage is found: the chance to find it within a time, and the time within which it is found."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +9,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, is_real
+from skthermo._formatting import counted, duration_text
 from skthermo._times import has_stamps, row_times, time_of
-from skthermo.studies.detectability._intervals import rate_of
+from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
 from skthermo.studies.detectability._judged import JudgedRecords
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
+TIMES = ["median", "reliable", "reliable highest"]
+FEW = 10  # number of cases found, or not found, below which their dependence is not estimated
+TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time tells little
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,10 @@ class Clock:
             return float(steps) if np.isfinite(steps) else float("nan")
         return self.length * int(steps) if np.isfinite(steps) else pd.NaT
 
+    def text(self, steps: float) -> str:
+        """A number of steps in words."""
+        return counted(int(steps), "record") if self.length is None else duration_text(self.length * int(steps))
+
     def any_in_step(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Whether any record of each step is marked, (n_repeats, n_steps)."""
         order = np.argsort(self.steps, kind="stable")
@@ -70,14 +78,12 @@ class Waits:
     whole_repeats: bool
 
     @classmethod
-    def of(
-        cls, records: JudgedRecords, onset: Any = None, transitions: Array | None = None, memory: int = 1
-    ) -> "Waits":
+    def of(cls, records: JudgedRecords, onset: Any = None, transitions: Array | None = None) -> "Waits":
         """Waits from onsets in every step, or from the onset of the scenario or another one alone.
 
         After the last record comes the first one again, so that each season has as many onsets as it has steps.
-        Decisions that depend on so many records before them follow from ``transitions``, decisions on records that are
-        damaged for as many records after each onset.
+        Detectors with windows have ``transitions``, (n_repeats, n_onsets, n_window), decisions after some onsets while
+        a window still holds healthy records.
         """
         clock = Clock.of(records.damage_index)
         alarms = clock.any_in_step(records.decisions < 0)
@@ -101,9 +107,12 @@ class Waits:
         """
         if not 1 <= number <= self.clock.n_steps:
             return float("nan"), float("nan"), float("nan")
-        late = np.minimum(self.steps, 2.0 * self.clock.n_steps) - number - 0.5
+        late = np.minimum(self.steps, 2.0 * number) - number - 0.5
         rate = rate_of(late, confidence, whole_repeats=self.whole_repeats)
-        return rate.rate, rate.lowest, rate.highest
+        if FEW <= rate.n_alarms <= rate.n_records - FEW:
+            return rate.rate, rate.lowest, rate.highest
+        n_apart = min(rate.n_effective, len(self.steps) * self.clock.n_steps / number)  # times without a common record
+        return rate.rate, *clopper_pearson(rate.rate * n_apart, n_apart, confidence)
 
     def within(self, probability: float) -> float:
         """Smallest number of steps within which this share of the onsets is found; infinite if none is."""
@@ -166,7 +175,7 @@ def waits_table(
 ) -> pd.DataFrame:
     """A row for each of the records by detector, scenario and source, beside the waits of the healthy structure."""
     healthy = {key[0]: one for key, one in reversed(records.items()) if one.scenario.is_healthy}
-    rows = []
+    rows, is_stamped = [], True
     for key, one in records.items():
         scenario, twin = one.scenario, healthy.get(one.detector)
         waits = Waits.of(one, transitions=transitions.get(key))
@@ -178,8 +187,10 @@ def waits_table(
             "severity": scenario.severity,
             "source": one.source,
         }
-        for name, time in read_within(within, waits.clock.length is not None).items():
-            number = waits.clock.count(time)
+        is_stamped &= waits.clock.length is not None
+        times = read_within(within, waits.clock.length is not None)
+        numbers = [waits.clock.count(time) for time in times.values()]
+        for name, number in zip(times, numbers, strict=True):
             found = waits.found(number, confidence)
             row |= dict(zip([name, f"{name} lowest", f"{name} highest"], found, strict=True))
             row[f"{name} healthy"] = np.nan if false is None else false.found(number, confidence)[0]
@@ -187,8 +198,51 @@ def waits_table(
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
         row["not_judged"] = waits.share_not_judged
-        rows.append(row)
-    return pd.DataFrame(rows)
+        text = _false_alarms(waits, numbers) if scenario.is_healthy else _in_words(waits, false, level)
+        rows.append(row | {"text": text})
+    table = pd.DataFrame(rows)
+    if is_stamped:
+        table[TIMES] = table[TIMES].astype(object).apply(pd.to_timedelta)  # also where none is known
+    return table
+
+
+def _false_alarms(waits: Waits, numbers: Sequence[int]) -> str:
+    """In how many of a hundred cases the healthy structure raises an alarm within some times."""
+    chances = [(number, waits.found(number, 0.5)[0]) for number in numbers]
+    told = [f"within {waits.clock.text(number)} in {_cases(chance)}" for number, chance in chances if chance == chance]
+    return f"raises a false alarm {', '.join(told)} of 100 cases" if told else "has too few records for these times"
+
+
+def _cases(chance: float) -> str:
+    return f"{round(100 * chance)}" if chance >= 0.005 else "fewer than 1"
+
+
+def _in_words(waits: Waits, false: Waits | None, level: float) -> str:
+    """How soon alarms come, beside those of the healthy structure in the same time."""
+    clock, number = waits.clock, waits.within(level)
+    cases = f"{100 * level:g} of 100 cases"
+    if not np.isfinite(number):
+        return f"is not found in {cases} within the {clock.text(clock.n_steps)} of the records"
+    text = f"is found within {clock.text(number)} in {cases}"
+    if false is None:
+        return f"{text}; how often a healthy structure alarms by then is not known"
+    by_chance = false.found(min(int(number), clock.n_steps), level)[0]
+    text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
+    return f"{text}, so that such an alarm tells little" if by_chance > TELLS_LITTLE else text
+
+
+def soonest(table: pd.DataFrame, within: Any) -> pd.DataFrame:
+    """Of each detector and family, the row of the smallest severity that is found reliably, or of the largest.
+
+    It is found within the longest of some times.
+    """
+    soon = table["reliable"] <= max(read_within(within, table["reliable"].dtype.kind == "m").values())
+    chosen = []
+    for _, rows in table.groupby(["detector", table["family"].fillna(table["scenario"])], sort=False):
+        rows = rows.iloc[np.argsort(rows["severity"].abs().to_numpy(), kind="stable")]
+        found = rows[soon[rows.index]]
+        chosen.append((found if len(found) else rows.iloc[::-1]).iloc[0])
+    return pd.DataFrame(chosen).reset_index(drop=True)
 
 
 def _until_next(alarms: NDArray[np.bool_]) -> Array:

@@ -360,7 +360,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         targets = frame_like(filled, records.targets, self.parameter_names_)
         chain.mapper_ = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
         learned = possible(chain.mapper_.predict(filled))[0]
-        chain.records_, chain.parameters_ = replace(records, learned=learned), targets
+        service = self.service_records()
+        chain.records_, chain.parameters_ = replace(records, learned=learned, service=service), targets
         return chain
 
     @overload
@@ -723,15 +724,35 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         of_sensors, of_modes = missing[:, :n_sensors], missing[:, n_sensors:]
         return frame_like(X, of_sensors, column_names(X, "T")), frame_like(X, of_modes, self.mode_names_)
 
+    def service_records(self, F: ArrayLike | None = None) -> ServiceRecords:
+        """Gaps and outliers of the training records, which `simulate` draws from.
+
+        Parameters
+        ----------
+        F : array-like or DataFrame of shape (n_training_records, n_modes), optional
+            Frequencies of the training records before they were cleaned: what cleaning has changed or removed is an
+            outlier. By default a value is one if its residual is far from those of its neighbours in time.
+
+        Returns
+        -------
+        ServiceRecords
+            With the tables ``missing`` and ``outliers``; ``outliers`` of `simulate` may be this object, too.
+
+        Raises
+        ------
+        ValueError
+            If the frequencies are not of the training records.
+        """
+        residuals = self.residuals_
+        if F is not None:
+            return ServiceRecords.of_raw(self.records_, residuals, F, self._frequencies(self.records_.learned))
+        if self.records_.service is None:
+            self.records_.service = ServiceRecords.of(self.records_, residuals)
+        return self.records_.service
+
     def _service_of(self, X: Any, faults: Faults, stream: np.random.RandomState) -> tuple[ServiceRecords, Any]:
         """Gaps and outliers of the training records, and those of which records the rows have."""
-        if faults.raw is not None:
-            predicted = self._frequencies(self.records_.learned)
-            service = ServiceRecords.of_raw(self.records_, self.residuals_, faults.raw, predicted)
-        else:
-            if self.records_.service is None:
-                self.records_.service = ServiceRecords.of(self.records_, self.residuals_)
-            service = self.records_.service
+        service = faults.service if faults.service is not None else self.service_records(faults.raw)
         order = np.argsort(row_times(X), kind="stable")
         taken = service.draw(places_of(self.residuals_, self._weather(X)[order]), stream)
         return service, taken[np.argsort(order)]

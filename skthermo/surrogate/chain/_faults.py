@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, is_real
+from skthermo.surrogate.chain._service import ServiceRecords
 
 TIMES_WIDER = 10.0  # noise of an outlier over that of other values, where the share of outliers is given
 LARGEST_SEED = np.iinfo(np.int32).max
@@ -18,16 +19,19 @@ LARGEST_SEED = np.iinfo(np.int32).max
 
 @dataclass(frozen=True, eq=False)
 class Faults:
-    """Gaps and outliers: "fitted", the share of the values, or None; ``raw`` are frequencies that outliers are of."""
+    """Gaps and outliers: "fitted", the share of the values, or None; outliers may be of ``raw`` frequencies."""
 
     gaps: Any
     outliers: Any
     raw: Any = None
+    service: ServiceRecords | None = None
 
     @classmethod
     def asked(cls, gaps: Any, outliers: Any) -> Faults:
         """Checked; what is neither a text nor a number is a table of raw frequencies."""
         _check(gaps, "gaps", "'fitted', the share of the values that are missing, such as 0.1, or None")
+        if isinstance(outliers, ServiceRecords):
+            return cls(gaps, "fitted", service=outliers)
         if np.ndim(outliers):
             return cls(gaps, "fitted", outliers)
         _check(

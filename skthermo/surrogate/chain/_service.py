@@ -20,10 +20,16 @@ TAKEN_FROM = 25  # number of records with the most similar weather, and the same
 
 @dataclass(frozen=True, eq=False)
 class ServiceRecords:
-    """Gaps and outliers of training records in order of time, and the weather of each.
+    """Gaps and outliers of training records in order of time, as `DataInformedFEM.service_records` gives them.
 
-    ``missing``, (n_records, n_sensors + n_modes), tells which values are not there; ``outliers``, (n_records, n_modes),
-    are relative residuals, NaN where a value is none; ``places`` are coordinates of the weather.
+    Parameters
+    ----------
+    missing : ndarray of bool of shape (n_records, n_sensors + n_modes)
+        Which temperatures and frequencies are not there.
+    outliers : ndarray of shape (n_records, n_modes)
+        Relative residuals of outliers, NaN where a value is none.
+    places : ndarray of shape (n_records, n_coordinates)
+        Weather of the records, in coordinates in which similar weather is near.
     """
 
     missing: NDArray[np.bool_]
