@@ -112,7 +112,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("slope of the loss", "weights * E / (secant * (1 + secant))", "weights * E / (1 + secant)"),
         ("prior", "(theta - 1) / prior", "theta / prior"),
         ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
-        ("information of shapes", "np.sqrt(2 * max(len(slopes) - 1, 1))", "np.sqrt(max(len(slopes) - 1, 1))"),
+        ("information of shapes", "np.sqrt(2 * max(n_dofs - 1, 1))", "np.sqrt(max(n_dofs - 1, 1))"),
+    ],
+    ("updating/_ensemble.py", "updating/test_ensemble.py"): [
+        ("models that are all the most probable one", "weights * point.values - self.noise", "weights * point.values"),
+        ("stiffness that a parameter scales drawn twice", "if terms <= own)) == own", "if terms < own)) == own"),
+    ],
+    ("surrogate/chain/_fit_report.py", "surrogate/test_report.py"): [
+        ("a common factor counts as a hidden offset", " + COMMON**2 + ", " + "),
     ],
     ("updating/_measured.py", "updating/test_updater_errors.py"): [
         ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
@@ -378,6 +385,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
+    ],
+    ("studies/detectability/_waits.py", "studies/test_time_to_find.py"): [
+        ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
+        ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
+    ],
+    ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
+        ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
