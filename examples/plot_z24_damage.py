@@ -188,31 +188,31 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 #                                       measured simulated lowest highest     measured simulated lowest highest
 #    detector
 #    raw, Mahalanobis                        0.0       0.0    0.0     0.0          0.0       0.0    0.0     0.0
-#    raw, isolation forest                   0.4       0.5    0.0     1.1         89.2      95.0   57.9   100.0
-#    raw, 20 neighbours                      1.2       1.6    0.7     2.5         91.5      97.8   73.5   100.0
-#    raw, local outlier factor              16.6      16.4   12.3    21.2         96.2      99.8   91.7   100.0
-#    raw, one-class SVM                      0.0       0.0    0.0     0.0         61.5      62.0    4.6   100.0
-#    raw, less 1 component                   0.4       0.7    0.0     1.2          4.6       2.1    0.0    13.8
-#    raw, less 2 components                  0.4       0.5    0.2     1.1          4.6       2.4    0.0    22.0
-#    raw, less 3 components                  1.1       1.0    0.5     1.6          7.7       2.8    0.0    12.1
-#    raw, factor analysis                    0.2       0.5    0.0     1.1          5.4       2.6    0.0    19.0
-#    raw, Gaussian mixture                   3.0       3.5    2.5     5.0         83.8      85.3   33.1   100.0
-#    raw, cointegration                      0.9       1.1    0.4     2.0          4.6       2.2    0.0     6.1
-#    broken lines                            0.0       0.1    0.0     0.4         89.2      80.5    2.0   100.0
-#    broken lines, whitened                  0.9       1.3    0.4     2.0         90.8      93.6   25.1   100.0
-#    boosted trees                           0.2       0.3    0.0     0.9         20.8      31.5    3.8    89.0
-#    boosted trees, whitened                 1.1       1.3    0.5     2.3         82.3      84.3   33.2   100.0
-#    linear regression                      12.1      12.9   11.3    14.1         93.1      97.8   88.5   100.0
-#    linear regression, whitened            22.9      23.2   20.4    25.2         98.5      99.8   95.5   100.0
-#    chain                                   0.0       0.1    0.0     0.4         90.0      83.7    3.0   100.0
-#    chain, whitened                         0.7       1.3    0.4     2.0         90.8      94.7   26.0   100.0
-#    broken lines, isolation forest          0.0       0.0    0.0     0.2         12.3       6.8    0.0    34.5
-#    broken lines, 20 neighbours             0.0       0.0    0.0     0.2         88.5      79.0    0.3   100.0
-#    conditional covariance                  1.2       1.2    0.4     2.3         87.7      90.4   43.2   100.0
+#    raw, isolation forest                   0.4       0.5    0.0     1.1         89.2      83.7   18.7   100.0
+#    raw, 20 neighbours                      1.2       1.6    0.7     2.5         91.5      92.8   37.2   100.0
+#    raw, local outlier factor              16.6      16.4   12.3    21.2         96.2      99.0   83.9   100.0
+#    raw, one-class SVM                      0.0       0.0    0.0     0.0         61.5      40.4    0.0    89.2
+#    raw, less 1 component                   0.4       0.7    0.0     1.2          4.6       2.6    0.0    29.9
+#    raw, less 2 components                  0.4       0.5    0.2     1.1          4.6       1.1    0.0     3.8
+#    raw, less 3 components                  1.1       1.0    0.5     1.6          7.7       1.6    0.0     5.3
+#    raw, factor analysis                    0.2       0.5    0.0     1.1          5.4       2.1    0.0    22.3
+#    raw, Gaussian mixture                   3.0       3.5    2.5     5.0         83.8      78.1   15.6   100.0
+#    raw, cointegration                      0.9       1.1    0.4     2.0          4.6       1.6    0.0     5.3
+#    broken lines                            0.0       0.1    0.0     0.4         89.2      75.3    0.0   100.0
+#    broken lines, whitened                  0.9       1.3    0.4     2.0         90.8      86.9    0.2   100.0
+#    boosted trees                           0.2       0.3    0.0     0.9         20.8      17.7    0.8    75.8
+#    boosted trees, whitened                 1.1       1.3    0.5     2.3         82.3      72.4   14.7    99.2
+#    linear regression                      12.1      12.9   11.3    14.1         93.1      97.2   84.6   100.0
+#    linear regression, whitened            22.9      23.2   20.4    25.2         98.5      99.1   88.5   100.0
+#    chain                                   0.0       0.1    0.0     0.4         90.0      79.0    0.0   100.0
+#    chain, whitened                         0.7       1.3    0.4     2.0         90.8      87.9    0.2   100.0
+#    broken lines, isolation forest          0.0       0.0    0.0     0.2         12.3       2.9    0.0    12.2
+#    broken lines, 20 neighbours             0.0       0.0    0.0     0.2         88.5      74.6    0.0   100.0
+#    conditional covariance                  1.2       1.2    0.4     2.3         87.7      84.3   18.8   100.0
 #
 #                  rank correlation  in the band  detectors
-#    false alarms             0.953          1.0       22.0
-#    damage found             0.954          1.0       22.0
+#    false alarms             0.953        1.000       22.0
+#    damage found             0.971        0.864       22.0
 
 groups = {name: "raw frequencies" if name.startswith("raw") else "with temperatures" for name in candidates}
 AgreementDisplay.from_predictions(results, groups=groups)
@@ -220,9 +220,11 @@ AgreementDisplay.from_predictions(results, groups=groups)
 # %%
 # .. image:: /images/z24_bench.png
 #    :alt: Rates of alarms of 22 detectors, measured as dots on simulated bands: false alarms from 0 to 23 %, damage
-#          found from 0 to 98 %; every dot lies in its band
+#          found from 0 to 98 %; nearly every dot lies in its band
 #
-# All measured rates lie in their bands, and the detectors stand in nearly the same order. Failures are foretold, too:
+# All measured false alarms lie in their bands, 19 of 22 rates of damage found do, and the detectors stand in nearly the
+# same order. The three others are of detectors that find little, and measured rates are up to 2.4 points above their
+# bands: the something else that the identification sees beside the damage is not simulated. Failures are foretold, too:
 # the 17 % false alarms of the local outlier factor, and the 12 and 23 % of linear regression. But the bands of found
 # damage are wide, since the severities are uncertain, and the damage was identified from the very records that it is
 # compared with.

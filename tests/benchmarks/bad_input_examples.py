@@ -1197,11 +1197,17 @@ CHANGES = {
     "stiffness": (np.eye(23), matrix(np.eye(23))),
     "mass": (np.eye(23), matrix(np.eye(23))),
 }
+SHARE_OF_VALUES = number(-0.1, 1.0, 90, but=("None", "several", "empty"))
+FAULTS = {
+    "gaps": (0.1, SHARE_OF_VALUES | {"unknown": "often"}),
+    "outliers": (0.01, SHARE_OF_VALUES | {"unknown": "often", "rows too few": np.full((3, 6), 5.0)}),
+}
 method(
     "surrogate.DataInformedFEM.simulate",
     CHAIN,
     X=(T, PREDICTING),
     **CHANGES,
+    **FAULTS,
     noise=(0.01, NOISE),
     random_state=(0, seed()),
 )
@@ -1211,8 +1217,10 @@ method(
     CHAIN,
     X=(T, PREDICTING),
     noise=(0.01, NOISE),
+    **FAULTS,
     random_state=(0, seed()),
 )
+method("surrogate.DataInformedFEM.draw_gaps", CHAIN, X=(T, PREDICTING), **FAULTS, random_state=(0, seed()))
 use(
     "surrogate.FrequencyCoordinates",
     lambda **a: (
@@ -1678,6 +1686,15 @@ method(
     confidence=(0.9, number(0, 1, 90)),
     by=("pod", choice()),
 )
+method(
+    "studies.DetectabilityStudy.time_to_find",
+    STUDY,
+    within=(["7D"], {"a number": [7], "texts": ["soon"], "negative": ["-1D"], "a time": STAMP, "true": [True]}),
+    level=(0.9, number(0, 1, 90)),
+    source=("data-informed", texts() | {"unknown": "no"}),
+    confidence=(0.9, number(0, 1, 90, but=("None",))),
+    smallest=(False, flag()),
+)
 method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | {
     "too long": [1, 2, 3, 4],
@@ -1708,7 +1725,10 @@ use(
     F=(LATER.frequencies, table(LATER.frequencies, rows=True, positive=True)),
     groups=(["top"], names(["top"]) | {"unknown inside": {"a": ["no"]}, "empty inside": {"a": []}}),
     noise=(0.01, NOISE),
-    merge=(False, flag()),
+    prior=(None, instead({"severity": 0.2}, (0.5, 0.5), studies.DamagePrior)),
+    stiffening=(["top"], names(["top"]) | {"a number": 1}),
+    parameters=(["top"], names(["top"])),
+    added_mass=({"ballast": np.ones(23)}, {"text": "x", "a number": 5.0, "other length": {"ballast": np.ones(4)}}),
     shapes=(
         (SHAPES, SHAPES * 1.01),
         {
@@ -1724,8 +1744,20 @@ use(
     ),
     dofs=(DOFS, integers(23)),
     shape_noise=(0.01, by_name(0.01, MODES, wrong=(5,))),
-    significance=(0.05, number(0, 1, 5, -0.1)),
+    models=(None, instead([], [1.0], TRUSS)),
     random_state=(0, seed()),
+)
+use(
+    "studies.DamagePrior",
+    lambda **a: studies.DamagePrior(**a),
+    numbers=(
+        (0.5, 0.5),
+        {"text": "x", "too many": (0.2,) * 5, "negative": (1.5, -0.5), "one": (1.0,), "sum": (0.5, 0.4)},
+    ),
+    severity=(0.2, number(0, 2, -0.1)),
+    law=("uniform", choice()),
+    something_else=(0.1, number(1.5, -0.1)),
+    model_error=(0.03, number(1.5, -0.1)),
 )
 use("studies.IdentifiedDamage.scenario", lambda **a: FOUND.scenario(**a).name, name=("found", texts()))
 use(
