@@ -345,7 +345,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
     ("studies/identification/_told.py", "studies/test_identify_sentences.py"): [
-        ("alike groups are told together", "if similarity.loc[one, other] >= ALIKE:", "if similarity.loc[one, other] > 1:"),
+        ("alike groups told together", "similarity.loc[one, other] >= ALIKE", "similarity.loc[one, other] > 1"),
         ("groups that are not seen", "seen if seen in known else causes", "causes"),
     ],
     ("studies/detectability/_simulation.py", "studies/test_study.py"): [
