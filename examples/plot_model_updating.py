@@ -8,6 +8,7 @@ mode shapes at eight accelerometers, are simulated with noise, so that the truth
 
 - :func:`~skthermo.updating.identifiability` says *before* anything is measured how accurate each parameter can become;
 - the updater's error bars, from one set of measurements, give the same accuracy at the optimum;
+- :meth:`~skthermo.updating.ModelUpdater.sample_models` gives the models that the measurements leave possible;
 - frequencies alone have many optima, and many parameters fit them: where modes swap places, a frequency is compared
   with another mode's. Mode shapes show which mode is which and where the structure is soft.
 
@@ -143,6 +144,27 @@ ax.set_xticks(places, list(TRUTH))
 ax.set_ylabel("multiplier of stiffness")
 ax.grid(axis="y", alpha=0.3)
 fig.legend(frameon=False, fontsize=9, ncols=2, loc="outside upper center")
+
+# %%
+# What calibration leaves open
+# ----------------------------
+# The measurements allow other models, too. :meth:`~skthermo.updating.ModelUpdater.sample_models` draws some that are as
+# likely as the optimum. What they say of damage, such as a loss of 20 % of the soil, differs as
+# much as that is not known: here the change of each frequency in percent, and the range of nine tenths of the models.
+
+
+def effect(frame_model):
+    """Change of the frequencies by damage, in percent."""
+    one = np.ones((1, len(TRUTH)))
+    healthy, damaged = (m.frequencies(one)[0] for m in (frame_model, frame_model.damaged({"soil": 0.2})))
+    return 100 * (damaged / healthy - 1)
+
+
+effects = np.array([effect(m) for m in both.sample_models(20, spread=0.3, random_state=0)])
+true_model = model.rescaled([*TRUTH.values()])
+columns = {"before updating": effect(model), "optimum": effect(both.model_), "truth": effect(true_model)}
+columns |= {"lowest": np.quantile(effects, 0.05, axis=0), "highest": np.quantile(effects, 0.95, axis=0)}
+print(pd.DataFrame(columns, [f"f{i}" for i in range(1, N_MODES + 1)]).round(2).to_string())
 
 # %%
 # :class:`~skthermo.updating.ModelUpdater` gives the updated model as ``model_``, whose multipliers are one at the

@@ -112,7 +112,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("slope of the loss", "weights * E / (secant * (1 + secant))", "weights * E / (1 + secant)"),
         ("prior", "(theta - 1) / prior", "theta / prior"),
         ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
-        ("information of shapes", "np.sqrt(2 * max(len(slopes) - 1, 1))", "np.sqrt(max(len(slopes) - 1, 1))"),
+        ("information of shapes", "np.sqrt(2 * max(n_dofs - 1, 1))", "np.sqrt(max(n_dofs - 1, 1))"),
+    ],
+    ("updating/_ensemble.py", "updating/test_ensemble.py"): [
+        ("models that are all the most probable one", "weights * point.values - self.noise", "weights * point.values"),
+        ("stiffness that a parameter scales drawn twice", "if terms <= own)) == own", "if terms < own)) == own"),
+    ],
+    ("surrogate/chain/_fit_report.py", "surrogate/test_report.py"): [
+        ("a common factor counts as a hidden offset", " + COMMON**2 + ", " + "),
     ],
     ("updating/_measured.py", "updating/test_updater_errors.py"): [
         ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
@@ -325,6 +332,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/drift/_explanations.py", "monitoring/drift"): [
         ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
     ],
+    ("studies/location/_curves.py", "studies/test_locate_parts.py"): [
+        ("slopes of curves of stretches", "x * 3 * cube", "x * 2 * cube"),
+    ],
+    ("studies/location/_located.py", "studies/test_locate_parts.py"): [
+        ("sets that hold a part of the damage only", "held[max(rank[member]", "held[min(rank[member]"),
+    ],
+    ("fem/affine/_core.py", "fem/test_divide.py"): [
+        ("parts of calibrated terms", "scaled(self.stiffness.factors[origin])", "scaled(np.ones(len(origin)))"),
+    ],
     ("studies/identification/_findings.py", "studies/test_identify.py"): [
         ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
     ],
@@ -334,6 +350,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[1]))",
             "self.reference(scenario, int(seeds[0]))",
         ),
+    ],
+    ("studies/detectability/_world_rates.py", "studies/test_worlds.py"): [
+        ("noise in the variance between worlds", " - within / values.shape[1]", ""),
+        ("a band of the mean of all worlds", "variance * (1 + 1 / number)", "variance / number"),
+    ],
+    ("studies/worlds/_weather.py", "studies/test_worlds.py"): [
+        ("weather of any season", "SEASON = 15", "SEASON = 90"),
     ],
     ("studies/detectability/_judged.py", "studies/test_several_detectors.py"): [
         ("a detector that failed stays failed", "if name not in self.errors], {}", "], {}"),
@@ -362,6 +385,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
+    ],
+    ("studies/detectability/_waits.py", "studies/test_time_to_find.py"): [
+        ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
+        ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
+    ],
+    ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
+        ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),

@@ -149,7 +149,7 @@ class IdentifiedDamageDisplay:
         ax.set_yticks([])
         ax.set(title="what explains the shifts", xlabel="probability (%)", xlim=(0, 118))
         ax.set_xticks(range(0, 101, 20))
-        ax.set_ylim(max(len(shown), 3) - 0.5, -0.9)
+        ax.set_ylim(max(len(shown), 3) - 0.5, -1.0)
         ax.spines[["top", "right"]].set_visible(False)
         return bars
 

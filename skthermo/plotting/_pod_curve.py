@@ -40,6 +40,9 @@ class PODCurveDisplay:
         The curve.
     band_ : PolyCollection
         Its bounds.
+    worlds_ : PolyCollection or None
+        The band in which the curve of a measured campaign should lie, ``curve.band(severity)``, where the study has
+        worlds: paler, with dashed edges.
     errorbar_ : ErrorbarContainer
         Observed shares with Wilson's intervals of 95 %, which hold for independent records.
     marks_ : dict of str to artist
@@ -172,10 +175,19 @@ class PODCurveDisplay:
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
         self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
+        self.worlds_ = self._draw_worlds(drawn, colour)
         self.marks_ = self._draw_marks(colour) if marks else {}
         self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
         self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
         return self
+
+    def _draw_worlds(self, drawn: Array, colour: str) -> Any:
+        """The band of a measured campaign; None for a curve without one."""
+        if not getattr(self.curve, "worlds", ()):
+            return None
+        low, high = (100 * np.asarray(values) for values in self.curve.band(drawn))
+        style = {"facecolor": colour, "edgecolor": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8}
+        return self.ax_.fill_between(100 * drawn, low, high, label="measured campaign", zorder=0, **style)
 
     def _draw_shares(self, severities: Array, colour: str, marker: str) -> None:
         n_detected, n_records, severities = np.broadcast_arrays(

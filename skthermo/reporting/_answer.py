@@ -31,7 +31,7 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
         "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as found reliably if at "
         f"least {share_text(LEVEL)} of the records of the damaged structure raise an alarm. Bounds of rates hold with "
         f"{confidence} confidence; they cover the scatter of the measurements, but neither weather of another kind nor "
-        "errors of the model."
+        f"errors of the model. {_expected(study)}"
     )
     parts = [words]
     if identified:
@@ -59,6 +59,16 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     return section("answer", "The answer", *parts)
 
 
+def _expected(study: Any) -> str:
+    """What a measured campaign should show, where more than the scatter of the measurements was simulated."""
+    if study.uncertainty_ is None:
+        return ""
+    return (
+        f"What the alarms of one measured campaign should show, with {percent(study.confidence_)} probability, stands "
+        f"beside the bounds. {study.uncertainty_summary()}"
+    )
+
+
 def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[str]:
     """Families with several scenarios that do not say which severity is the smallest that is found."""
     tested = rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
@@ -83,14 +93,17 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
     scenarios = {scenario.name: scenario for scenario in study.scenarios_}
-    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds", "Records judged"]
-    columns.append("Mean time to the first alarm")
+    has_bands = study.uncertainty_ is not None
+    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds"]
+    columns += ["In one measured campaign"] if has_bands else []
+    columns += ["Records judged", "Mean time to the first alarm"]
     cells = [
         [
             row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
             element("span", described(scenarios.get(row["scenario"])), class_="text"),
             bar(row["rate"], share_text(row["rate"])),
             bounds_text(row["lowest"], row["highest"]),
+            *([bounds_text(row["band_lowest"], row["band_highest"])] if has_bands else []),
             f"{row['n_records']:,}{_share_not_judged(study, row)}",
             duration_text(row["time_to_detection"]),
         ]

@@ -329,6 +329,9 @@ class ModelUpdater(Estimator):
         models are independent draws from the posterior distribution; else approximately so. The search takes the
         bounded Gauss-Newton steps of `fit`, with exact derivatives, from the optimum.
 
+        *Shapes* count here by their noise, as in ``covariance_``; the objective of `fit` counts large differences of
+        shapes more. With shapes, the models may lie about a standard deviation beside ``theta_``.
+
         *Prior.* Multipliers of parameters and of groups are normally distributed about 1, the nominal model of
         ``model``, and independent. Draws end at the bounds if they would pass them: ``bounds`` for the parameters, and
         four standard deviations, or a tenth of the nominal stiffness, for the groups.

@@ -1197,11 +1197,17 @@ CHANGES = {
     "stiffness": (np.eye(23), matrix(np.eye(23))),
     "mass": (np.eye(23), matrix(np.eye(23))),
 }
+SHARE_OF_VALUES = number(-0.1, 1.0, 90, but=("None", "several", "empty"))
+FAULTS = {
+    "gaps": (0.1, SHARE_OF_VALUES | {"unknown": "often"}),
+    "outliers": (0.01, SHARE_OF_VALUES | {"unknown": "often", "rows too few": np.full((3, 6), 5.0)}),
+}
 method(
     "surrogate.DataInformedFEM.simulate",
     CHAIN,
     X=(T, PREDICTING),
     **CHANGES,
+    **FAULTS,
     noise=(0.01, NOISE),
     random_state=(0, seed()),
 )
@@ -1211,8 +1217,10 @@ method(
     CHAIN,
     X=(T, PREDICTING),
     noise=(0.01, NOISE),
+    **FAULTS,
     random_state=(0, seed()),
 )
+method("surrogate.DataInformedFEM.draw_gaps", CHAIN, X=(T, PREDICTING), **FAULTS, random_state=(0, seed()))
 use(
     "surrogate.FrequencyCoordinates",
     lambda **a: (
@@ -1677,6 +1685,15 @@ method(
     source=("data-informed", texts() | {"unknown": "no"}),
     confidence=(0.9, number(0, 1, 90)),
     by=("pod", choice()),
+)
+method(
+    "studies.DetectabilityStudy.time_to_find",
+    STUDY,
+    within=(["7D"], {"a number": [7], "texts": ["soon"], "negative": ["-1D"], "a time": STAMP, "true": [True]}),
+    level=(0.9, number(0, 1, 90)),
+    source=("data-informed", texts() | {"unknown": "no"}),
+    confidence=(0.9, number(0, 1, 90, but=("None",))),
+    smallest=(False, flag()),
 )
 method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | {

@@ -63,29 +63,33 @@ NEIGHBOURS, APART = 20, 24
 NOT_JUDGED = 0
 
 
-def footbridge(pylon=1.0, stations=None):
-    """The bridge in the plane x-z, 168 degrees of freedom; other stations of the deck if given."""
+def footbridge(pylon=1.0, stations=None, stiffness=None):
+    """The bridge in the plane x-z, 168 degrees of freedom; other stations of the deck and stiffer groups if given."""
+    factors = dict.fromkeys(GROUPS, 1.0) | {"pylon": pylon} | (stiffness or {})
     nodes, members, groups = {}, {}, {group: [] for group in GROUPS}
 
     def add(group, name, member):
         members[name] = member
         groups[group].append(name)
 
-    stations = np.arange(0, SIDE + MAIN + STEP / 2, STEP) if stations is None else np.asarray(stations, dtype=float)
-    nodes |= {("deck", x): (x, 0.0, 0.0) for x in stations.tolist()}
+    def scaled(group, section):
+        return section | {"E": factors[group] * section["E"]}
+
+    stations = (np.arange(0, SIDE + MAIN + STEP / 2, STEP) if stations is None else np.asarray(stations)).tolist()
+    nodes |= {("deck", x): (x, 0.0, 0.0) for x in stations}
     heights = np.linspace(FOOT, TOP, 12).tolist()
     nodes |= {("pylon", z): (SIDE, 0.0, z) for z in heights}
-    for i, k in pairwise(stations.tolist()):
-        add("side span" if k <= SIDE else "main span", ("deck", i), Beam(("deck", i), ("deck", k), **DECK))
+    for i, k in pairwise(stations):
+        group = "side span" if k <= SIDE else "main span"
+        add(group, ("deck", i), Beam(("deck", i), ("deck", k), **scaled(group, DECK)))
     for i, k in pairwise(heights):
-        section = PYLON | {"E": pylon * PYLON["E"]}
-        add("pylon", ("pylon", i), Beam(("pylon", i), ("pylon", k), **section))
+        add("pylon", ("pylon", i), Beam(("pylon", i), ("pylon", k), **scaled("pylon", PYLON)))
     for group, ends in (("backstays", (0.0, 7.5, 15.0)), ("main stays", (33.0, 42.0, 51.0, 58.5))):
         for x, height in zip(ends, (-1, -2, -3) if group == "backstays" else (-4, -3, -2, -1), strict=True):
-            add(group, ("stay", x), Bar(("deck", x), ("pylon", heights[height]), **STAY))
+            add(group, ("stay", x), Bar(("deck", x), ("pylon", heights[height]), **scaled(group, STAY)))
     for x in (0.0, SIDE, SIDE + MAIN):
-        add("bearings", ("bearing", x), Spring(("deck", x), "z", 8e7))
-    add("bearings", "longitudinal", Spring(("deck", 0.0), "x", 3e8))
+        add("bearings", ("bearing", x), Spring(("deck", x), "z", 8e7 * factors["bearings"]))
+    add("bearings", "longitudinal", Spring(("deck", 0.0), "x", 3e8 * factors["bearings"]))
     supports = dict.fromkeys(nodes, "y rx rz") | {("pylon", FOOT): "xyz rx ry rz"}
     return Structure(nodes, members, supports, groups)
 

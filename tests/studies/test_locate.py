@@ -152,9 +152,14 @@ def of_damaged_deck(bridge, records):
     return T[200:], add_noise(damaged.frequencies(theta[200:]), 0.002, random_state=2), tuple(shapes), dofs
 
 
-def test_mirrored_places_are_not_told_apart_by_frequencies(calibrated, bridge, of_damaged_deck):
+@pytest.fixture(scope="module")
+def by_frequencies(calibrated, bridge, of_damaged_deck):
     T, F, _, _ = of_damaged_deck
-    located = locate_damage(calibrated, bridge, T, F, random_state=0)
+    return locate_damage(calibrated, bridge, T, F, random_state=0)
+
+
+def test_mirrored_places_are_not_told_apart_by_frequencies(by_frequencies):
+    located = by_frequencies
     deck = located.table[located.table["group"] == "deck"]
     assert deck["probability"].to_numpy() == pytest.approx(deck["probability"].to_numpy()[::-1], abs=0.02)
     assert {2, 3, N - 3, N - 4} <= set(located.likely_members(0.9, "deck"))
@@ -173,9 +178,8 @@ def test_shapes_tell_mirrored_places_apart(calibrated, bridge, of_damaged_deck):
     assert not located.alike
 
 
-def test_members_in_the_colours_of_their_probability(calibrated, bridge, of_damaged_deck):
-    T, F, _, _ = of_damaged_deck
-    located = locate_damage(calibrated, bridge, T, F, random_state=0)
+def test_members_in_the_colours_of_their_probability(by_frequencies):
+    located = by_frequencies
     display = StructureDisplay.from_located(located)
     assert display.colorbar_.ax.get_ylabel() == "probability of damage"
     shown = sorted(display.members_["lines"].get_array())

@@ -200,7 +200,7 @@ def test_bands_of_a_study(study):
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
     assert curve.a90_band[0] < curve.a90_band[1]
     told = study.summary()
-    assert "Bands hold noise, the weather, the training records and the model." in told
+    assert "Bands of 95% hold noise, the weather, the training records and the model." in told
     assert "A measured campaign of 'bottom 10 %' should show" in told
 
 

@@ -136,9 +136,10 @@ class PODCurve:
 
         Returns
         -------
-        lowest, highest : float or ndarray
-            Quantiles of ``worlds`` at each severity, which hold such a curve with the curve's confidence; NaN without
-            worlds.
+        lowest : float or ndarray
+            Quantile of ``worlds`` at each severity; NaN without worlds.
+        highest : float or ndarray
+            Likewise; the two hold such a curve with the curve's confidence.
         """
         places = real_array(severity, "severity")
         if not self.worlds:

@@ -194,25 +194,37 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
     return found
 
 
-def bands_in_words(results: pd.DataFrame, parts: pd.DataFrame, detector: str, confidence: float) -> list[str]:
-    """What the bands of a detector hold, and which part of the widest one is the largest."""
+def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:
+    """What the bands of a detector hold, the widest one and its parts, and which rates are outside."""
+    if parts is None:
+        return "Bands hold the noise alone: neither other weather or training records nor an error of the model."
     names = [column for column in parts.columns if column in NAMES]
-    rows = results[(results["detector"] == detector) & (results["source"] == "data-informed")].set_index("scenario")
-    width = (rows["band_highest"] - rows["band_lowest"]).drop(rows.index[rows["measure"] == "PFA"])
-    line = f"Bands hold {_listed([NAMES[name] for name in names])}."
-    if not len(width.dropna()) or (detector, width.idxmax()) not in parts.index:
-        return [line]
-    widest = rows.loc[width.idxmax()]
-    shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
-    told = shares[shares >= SMALL].sort_values(ascending=False)
-    causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
-    return [
-        line,
-        f"A measured campaign of {widest.name!r} should show {widest['band_lowest']:.1%} to "
-        f"{widest['band_highest']:.1%} of its records in alarm ({confidence:.0%} band, the widest); of its variance "
-        f"come {causes}.",
-    ]
+    lines = [f"Bands of {confidence:.0%} hold {_listed([NAMES[name] for name in names])}."]
+    rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
+    width = (rows["band_highest"] - rows["band_lowest"])[rows["measure"] == "POD"].dropna()
+    if len(width) and (detector, width.idxmax()) in parts.index:
+        widest = rows.loc[width.idxmax()]
+        shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
+        told = shares[shares >= SMALL].sort_values(ascending=False)
+        causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
+        band = f"{widest['band_lowest']:.1%} to {widest['band_highest']:.1%}"
+        lines.append(
+            f"A measured campaign of {widest.name!r} should show {band} of its records in alarm, the widest band."
+        )
+        if causes:
+            lines.append(f"Of its variance come {causes}.")
+    outside = rows[(rows["rate"] < rows["band_lowest"]) | (rows["rate"] > rows["band_highest"])]
+    if len(outside):
+        shares = [
+            f"{name!r} ({row['rate']:.1%}, band {row['band_lowest']:.1%} to {row['band_highest']:.1%})"
+            for name, row in outside.iterrows()
+        ]
+        cause = "the training records contradict the chain's model: calibrate it (ModelUpdater)"
+        if "model" not in names:
+            cause = "a chain of other training records is another one: give it more records"
+        lines.append(f"Rates of this chain are outside their bands in {_listed(shares)}: {cause}.")
+    return "\n".join(lines)
 
 
 def _listed(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
+    return f"{', '.join(texts[:-1])} and {texts[-1]}" if len(texts) > 1 else "".join(texts)

@@ -68,20 +68,23 @@ def identify_damage(
     prior : DamagePrior, optional
         What is thought of damage before; by default `DamagePrior()`.
     stiffening : bool or sequence of str, optional
-        Groups that may have become stiffer, as by a repair or a locked bearing; True for all.
+        Groups that may also have become stiffer, by up to 100 %, such as after a repair or where a bearing is locked;
+        True for all. Each is a cause of its own, named "GROUP stiffer", with a severity below 0.
     parameters : sequence of str, optional
-        Parameters of the model that may have changed, whatever the weather.
-    added_mass : mapping of str to array-like, optional
-        Patterns of mass that may have been added, in kg at the degrees of freedom, such as ballast.
+        Parameters of the model whose change may explain the shifts, such as the mass of the ballast. Each gives two
+        causes, "NAME lower" and "NAME higher", with relative changes from -95 % to 100 %.
+    added_mass : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+        Patterns of mass that may have been added, in kg; a vector holds lumped masses. The amount of each is how many
+        times it was added, from 0 to 3; give what would be likely if there were any. Negative masses were taken away.
     shapes : (array-like, array-like), optional
-        Measured mode shapes of the healthy and of the damaged structure, each of shape (n_dofs, n_modes), or
-        (n_records, n_dofs, n_modes) for several records, of any scale; complex ones are rotated to be real; NaN where
-        a component was not measured.
+        Measured mode shapes of the healthy and of the changed structure in similar weather, each of shape (n_dofs,
+        n_modes) or, of several records, (n_records, n_dofs, n_modes). Scale, sign and phase do not matter, and complex
+        shapes are turned to be real; NaN where a component was not measured.
     dofs : array-like of shape (n_dofs,), optional
         Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
-    shape_noise : float, array-like of shape (n_modes,) or "fitted", default=0.01
-        Standard deviation of a component of one measured shape, relative to the shape's largest component; "fitted"
-        takes the scatter of several records, which also counts where it is larger than what is stated.
+    shape_noise : "fitted", float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of a component of one record's shape, relative to the shape's largest component. Where
+        several records scatter more, their scatter counts; "fitted" takes the scatter alone.
     models : sequence of FE model, optional
         Models that may be the structure's, all as probable, as `~skthermo.updating.ModelUpdater.sample_models` gives
         them. The chain learns its training records anew with each of them; probabilities and amounts are averages over

@@ -42,7 +42,7 @@ def answer(found: Any) -> Iterator[str]:
         nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
         yield f"The probability {nothing} is {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
-        yield from _averages(found)
+        yield from _averages(found, first)
     if first.is_healthy:
         yield from _unnoticed(found)
 
@@ -59,9 +59,12 @@ def _others(first: Told, others: Sequence[Told]) -> Iterator[str]:
         yield f"It could also be: {'; '.join(texts)}."
 
 
-def _averages(found: Any) -> Iterator[str]:
-    """Causes that are likely over all explanations together."""
+def _averages(found: Any, first: Told) -> Iterator[str]:
+    """Causes that are likely over all explanations together, unless they are those of the first and sure."""
     table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unseen)]
+    told_first = {amounts[0].cause for amounts in first.changes}
+    if told_first.issuperset(table.index) and (table["probability"] >= SURE).all():
+        return
     named = []
     for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
         amount = Amount(str(cause), row["kind"], row["severity"], row["lowest"], row["highest"])

@@ -716,6 +716,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         streams = faults.streams(as_random_state(random_state))
         n_rows, n_sensors, n_modes = len(self._temperatures(X)[0]), self.n_features_in_, len(self.mode_names_)
         missing = np.zeros((n_rows, n_sensors + n_modes), dtype=bool)
+        if faults.raw is not None:
+            self.service_records(faults.raw)  # which refuses what is not of the training records
         if faults.gaps == "fitted":
             service, taken = self._service_of(X, faults, streams[0])
             missing = service.missing[taken]

@@ -1,0 +1,255 @@
+"""How often a study's bands hold what a measured campaign then shows, with the right FE model and with a wrong one.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/study_bands.py
+
+In each realisation a structure of known truth is monitored for a year. A user fits a chain and detectors to it, and
+`DetectabilityStudy` promises by state what share of records will be in alarm, with a band of 90 %. Then another year is
+measured in each state, and the user's own detectors judge it. Structures:
+
+- the truss of the thermo-mechanical law (four zones of temperature that no multiplier of a group follows exactly),
+  with the right FE model, and with one of which two groups are 5 % too stiff or too soft;
+- the footbridge of ``blind_bridge.py``, whose FE model has 16 beams for 44 and every stiffness 3 to 5 % off.
+
+Bands: of the noise alone, as a study without ``uncertainty`` gives them; with other weather and other training
+records; with an ensemble of models, too, ``models=updater.sample_models(20)``. The model is calibrated to the mean of
+the records by `ModelUpdater`, or only its offset is removed ("aligned"). States of which the measured share is between
+5 and 95 % are counted apart: of the others, nearly every band holds. The exit code is 1 if the ensemble's bands hold
+less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the share.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from blind_bridge import GROUPS, MODES, NOISE, PER_DAY, SENSORS, Bridge, footbridge
+from joblib import Parallel, delayed
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.preprocessing import BiasAligner
+from skthermo.studies import DetectabilityStudy, Scenario
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.updating import ModelUpdater
+
+CONFIDENCE, WANTED = 0.9, (85, 95)
+PARTLY = (0.05, 0.95)
+PARTS = ("noise", "weather", "baseline", "model")
+OFF = 0.05
+DEVIATION = 0.005
+"""Relative deviation of a mean measured frequency from that of a perfect model, as a user may state it."""
+
+COARSE = [0.0, 3.75, 7.5, 11.25, 15.0, 19.5, 24.0, 28.5, 33.0, 37.5, 42.0, 46.5, 51.0, 54.75, 58.5, 62.25, 66.0]
+"""Nodes of the deck in the user's model, m: those of the stays and of the supports, and one between."""
+
+EVERY = PER_DAY  # records of the footbridge: one a day
+TRUSS_STATES = {
+    "bottom": (0.06, 0.1, 0.14, 0.2),
+    "top": (0.08, 0.14, 0.2, 0.26),
+    "diagonal": (0.03, 0.05, 0.08, 0.11),
+    "bottom and top": (0.04, 0.07, 0.1, 0.14),
+}
+FOOTBRIDGE_STATES = {
+    "side span": (0.03, 0.05, 0.08, 0.12),
+    "main stays": (0.01, 0.02, 0.03, 0.05),
+    "bearings": (0.03, 0.05, 0.08, 0.12),
+    "side span and backstays": (0.02, 0.04, 0.06, 0.1),
+}
+
+
+def states(families):
+    """Damage by name."""
+    return {
+        f"{family} {severity:.0%}": dict.fromkeys(family.split(" and "), severity)
+        for family, severities in families.items()
+        for severity in severities
+    }
+
+
+@dataclass
+class Truss:
+    """One realisation of the truss: a year to learn, and later years."""
+
+    seed: int
+    states = states(TRUSS_STATES)
+    detectors = ("raw", "compensated")
+    noise = 0.01
+
+    def year(self):
+        campaign = make_truss_campaign(random_state=self.seed)
+        return campaign.temperatures, campaign.frequencies
+
+    def later(self, number, damage):
+        campaign = make_truss_campaign(damage=damage or None, random_state=10_000 + 100 * self.seed + number)
+        return campaign.temperatures, campaign.frequencies
+
+    def models(self):
+        right, random = make_truss(), np.random.default_rng(self.seed)
+        theta = np.ones(4)
+        theta[random.choice(3, 2, replace=False)] += OFF * random.choice([-1, 1], 2)
+        return {"right": right, "wrong": right.rescaled(theta)}
+
+
+@dataclass
+class Footbridge:
+    """One realisation of the footbridge, and a coarse model of wrong stiffnesses."""
+
+    seed: int
+    states = states(FOOTBRIDGE_STATES)
+    detectors = ("compensated",)
+    noise = NOISE
+
+    def __post_init__(self):
+        self.bridge = Bridge(self.seed)
+
+    def year(self):
+        records = self.bridge.training(False)[::EVERY]
+        return records[SENSORS], records[MODES]
+
+    def later(self, number, damage):
+        records = self.bridge.judged(damage, "as in training")[::EVERY]
+        return records[SENSORS], records[MODES]
+
+    def models(self):
+        random = np.random.default_rng(self.seed)
+        off = 1 + random.uniform(0.03, 0.05, len(GROUPS)) * random.choice([-1, 1], len(GROUPS))
+        structure = footbridge(stations=COARSE, stiffness=dict(zip(GROUPS, off, strict=True)))
+        return {"wrong": structure.assemble(GROUPS, n_modes=len(MODES), track=True).reduced(0.7, random_state=0)}
+
+
+def chain(model, noise, T, F):
+    """Defaults, with the frequencies' offset removed."""
+    inverse = InverseSurrogate(model, noise=noise, bounds=0.3)
+    aligner = BiasAligner(model, method="scale")
+    return DataInformedFEM(model, inverse=inverse, aligner=aligner, random_state=0).fit(T, F)
+
+
+def detector(name, columns):
+    """Of raw frequencies, or of what temperature leaves unexplained of them."""
+    if name == "raw":
+        return MahalanobisDetector()
+    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=columns), MahalanobisDetector())
+
+
+def promised(fem, T, F, real, models, options):
+    """A study, and its bands by kind: (detector, state) -> (lowest, highest)."""
+    scenarios = [Scenario("healthy"), *(Scenario(name, damage) for name, damage in real.states.items())]
+    study = DetectabilityStudy(
+        fem,
+        {name: detector(name, list(F.columns)) for name in real.detectors},
+        scenarios,
+        uncertainty=PARTS if models else PARTS[:-1],
+        models=models,
+        n_worlds=options.worlds,
+        random_state=real.seed,
+    )
+    study.run(T, T.join(F), confidence=CONFIDENCE)
+    keys = list(study.worlds_.rates)
+    bands = {"noise": {}, "weather, baseline": {}}
+    without = replace(study.worlds_, rates={key: rates[:, :2] for key, rates in study.worlds_.rates.items()})
+    for key in keys:
+        rates = np.nanmean(study.decisions_[*key, "data-informed"] < 0, axis=1)
+        bands["noise"][key] = np.quantile(rates, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+        bands["weather, baseline"][key] = without.band(key, CONFIDENCE)
+    if models:
+        bands["all"] = {key: study.worlds_.band(key, CONFIDENCE) for key in keys}
+    return study, bands
+
+
+def realisation(kind, seed, options):
+    """One row for each model, calibration, band, detector and state."""
+    warnings.simplefilter("ignore")
+    real, rows, began = kind(seed), [], time.process_time()
+    if options.quick:
+        real.states = dict(list(real.states.items())[1::2])
+        real.detectors = real.detectors[:1]
+    T, F = real.year()
+    truth = {}
+    for name, model in real.models().items():
+        updater = ModelUpdater(model, bounds=0.6, prior=0.15).fit(F, frequency_std=DEVIATION * F.mean())
+        ensemble = updater.sample_models(options.worlds, random_state=seed)
+        for calibrated, own, models in ((False, model, None), (True, updater.model_, ensemble)):
+            if name == "right" and not calibrated:
+                continue
+            study, kinds = promised(chain(own, real.noise, T, F), T, F, real, models, options)
+            if not truth:  # the detectors learn the same records whatever the model
+                for number, (state, damage) in enumerate({"healthy": {}, **real.states}.items()):
+                    new_T, new_F = real.later(number, damage)
+                    for detector, fitted in study.detectors_.items():
+                        seen = new_F if detector == "raw" else new_T.join(new_F)
+                        truth[detector, state] = (fitted.predict(seen) == -1).mean()
+            rates = study.results_.set_index(["detector", "scenario"])["rate"]
+            for band, found in kinds.items():
+                for key, (lowest, highest) in found.items():
+                    row = {"model": name, "calibrated": calibrated, "band": band, "detector": key[0], "state": key[1]}
+                    rows.append(row | {"rate": rates[key], "low": lowest, "high": highest, "truth": truth[key]})
+    print(f"  {kind.__name__}, seed {seed}: {time.process_time() - began:.0f} s of one core", flush=True)
+    return pd.DataFrame(rows).assign(seed=seed)
+
+
+def table(found):
+    """Shares that bands hold, in percent, by model, calibration and kind of band."""
+    rows = {}
+    for key, part in found.groupby(["model", "calibrated", "band"], sort=False):
+        damaged = part[part["state"] != "healthy"]
+        partly = damaged[damaged["truth"].between(*PARTLY)]
+        by_seed = held(partly).groupby(partly["seed"]).mean()
+        rows[(key[0], "calibrated" if key[1] else "aligned", key[2])] = {
+            "partly detected": len(partly),
+            "held": 100 * held(partly).mean(),
+            "+-": 100 * by_seed.std() / np.sqrt(len(by_seed)),
+            "too high": 100 * (partly["truth"] < partly["low"] - 1e-9).mean(),
+            "too low": 100 * (partly["truth"] > partly["high"] + 1e-9).mean(),
+            "width": 100 * (partly["high"] - partly["low"]).mean(),
+            "error of the rate": 100 * np.sqrt(((partly["rate"] - partly["truth"]) ** 2).mean()),
+            "all states": 100 * held(damaged).mean(),
+            "false alarms": 100 * held(part[part["state"] == "healthy"]).mean(),
+        }
+    return pd.DataFrame(rows).T
+
+
+def held(rows):
+    """Whether each band holds the truth."""
+    return (rows["low"] - 1e-9 <= rows["truth"]) & (rows["truth"] <= rows["high"] + 1e-9)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--structures", nargs="*", default=["truss", "footbridge"], choices=["truss", "footbridge"])
+    parser.add_argument("--realisations", type=int, default=20, help="of each structure (default 20)")
+    parser.add_argument(
+        "--worlds", type=int, default=20, help="of each study, and models of each ensemble (default 20)"
+    )
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--quick", action="store_true", help="half of the states, and one detector")
+    parser.add_argument("--save", help="a file for the table of all bands")
+    options = parser.parse_args()
+    numbers = range(options.first_seed, options.first_seed + options.realisations)
+    missed = 0
+    for name in options.structures:
+        began, kind = time.perf_counter(), {"truss": Truss, "footbridge": Footbridge}[name]
+        jobs = (delayed(realisation)(kind, seed, options) for seed in numbers)
+        found = pd.concat(Parallel(n_jobs=options.jobs)(jobs), ignore_index=True)
+        print(
+            f"\n{name}: {len(numbers)} realisations, {found['state'].nunique() - 1} states, bands of 90 %; in percent"
+        )
+        if options.save:
+            found.to_csv(f"{options.save}_{name}.csv")
+        shares = table(found)
+        print(shares.round(1).to_string())
+        print(f"  {time.perf_counter() - began:.0f} s in all")
+        for key, row in shares[shares.index.get_level_values(2) == "all"].iterrows():
+            margin = 2 * row["+-"]
+            met = WANTED[0] - margin <= row["held"] <= WANTED[1] + margin
+            missed += not met
+            print(f"{'met' if met else 'MISSED':7} {', '.join(key)}: {row['held']:.0f} % held, target {WANTED}")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
