@@ -245,7 +245,8 @@ def main():
         print(shares.round(1).to_string())
         print(f"  {time.perf_counter() - began:.0f} s in all")
         for key, row in shares[shares.index.get_level_values(2) == "all"].iterrows():
-            margin = 2 * row["+-"]
+            of_independent = 100 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / row["partly detected"])
+            margin = 2 * np.nanmax([row["+-"], of_independent])
             met = WANTED[0] - margin <= row["held"] <= WANTED[1] + margin
             missed += not met
             print(f"{'met' if met else 'MISSED':7} {', '.join(key)}: {row['held']:.0f} % held, target {WANTED}")
