@@ -341,8 +341,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/affine/_core.py", "fem/test_divide.py"): [
         ("parts of calibrated terms", "scaled(self.stiffness.factors[origin])", "scaled(np.ones(len(origin)))"),
     ],
-    ("studies/identification/_findings.py", "studies/test_identify.py"): [
-        ("Bonferroni in the findings", "< significance / len(names)", "< significance"),
+    ("studies/identification/weighing/_evidence.py", "studies/test_identify_evidence.py"): [
+        ("bounds in the evidence", "logs[where] + inside", "logs[where]"),
+        ("width of the prior in the evidence", "np.log(law.precisions).sum(axis=-1) / 2", "0.0"),
+    ],
+    ("studies/identification/measured/_shift.py", "studies/test_identify_parts.py"): [
+        ("known scatter of outliers", "np.hypot(deviations, OF_WEATHER * usual)", "0.0"),
+    ],
+    ("studies/identification/_told.py", "studies/test_identify_sentences.py"): [
+        ("alike groups told together", "similarity.loc[one, other] >= ALIKE", "similarity.loc[one, other] > 1"),
+        ("groups that are not seen", "seen if seen in known else causes", "causes"),
     ],
     ("studies/detectability/_simulation.py", "studies/test_study.py"): [
         (
