@@ -1316,7 +1316,6 @@ FLAGS = {  # a flag, and a call that takes it
     "return_std": lambda bad: CHAIN.predict(T, return_std=bad),
     "return_number": lambda bad: CHAIN.expected_residuals(T, return_number=bad),
     "log": lambda bad: pod_curve([0.1, 0.2], [1, 9], [10, 10], log=bad),
-    "merge": lambda bad: identify_damage(CHAIN, T, F, merge=bad),
     "gaps": lambda bad: make_kw51_campaign(n_hours=24, gaps=bad),
     "updated": lambda bad: make_kw51(updated=bad),
     "narrow_bounds": lambda bad: InverseSurrogate(TRUSS, narrow_bounds=bad).fit(),

@@ -1725,7 +1725,10 @@ use(
     F=(LATER.frequencies, table(LATER.frequencies, rows=True, positive=True)),
     groups=(["top"], names(["top"]) | {"unknown inside": {"a": ["no"]}, "empty inside": {"a": []}}),
     noise=(0.01, NOISE),
-    merge=(False, flag()),
+    prior=(None, instead({"severity": 0.2}, (0.5, 0.5), studies.DamagePrior)),
+    stiffening=(["top"], names(["top"]) | {"a number": 1}),
+    parameters=(["top"], names(["top"])),
+    added_mass=({"ballast": np.ones(23)}, {"text": "x", "a number": 5.0, "other length": {"ballast": np.ones(4)}}),
     shapes=(
         (SHAPES, SHAPES * 1.01),
         {
@@ -1741,8 +1744,20 @@ use(
     ),
     dofs=(DOFS, integers(23)),
     shape_noise=(0.01, by_name(0.01, MODES, wrong=(5,))),
-    significance=(0.05, number(0, 1, 5, -0.1)),
+    models=(None, instead([], [1.0], TRUSS)),
     random_state=(0, seed()),
+)
+use(
+    "studies.DamagePrior",
+    lambda **a: studies.DamagePrior(**a),
+    numbers=(
+        (0.5, 0.5),
+        {"text": "x", "too many": (0.2,) * 5, "negative": (1.5, -0.5), "one": (1.0,), "sum": (0.5, 0.4)},
+    ),
+    severity=(0.2, number(0, 2, -0.1)),
+    law=("uniform", choice()),
+    something_else=(0.1, number(1.5, -0.1)),
+    model_error=(0.03, number(1.5, -0.1)),
 )
 use("studies.IdentifiedDamage.scenario", lambda **a: FOUND.scenario(**a).name, name=("found", texts()))
 use(

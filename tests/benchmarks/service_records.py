@@ -141,7 +141,7 @@ def one_seed(structure, seed, is_flawless):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", choices=list(STRUCTURES), default=list(STRUCTURES))
+    parser.add_argument("--structures", nargs="+", choices=list(STRUCTURES), default=["truss"])
     parser.add_argument("--seeds", type=int, default=4, help="number of bridges and campaigns")
     parser.add_argument("--flawless", action="store_true", help="no further gaps and outliers")
     args = parser.parse_args()

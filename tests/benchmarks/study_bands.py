@@ -150,13 +150,14 @@ def promised(fem, T, F, real, models, options):
     study.run(T, T.join(F), confidence=CONFIDENCE)
     keys = list(study.worlds_.rates)
     bands = {"noise": {}, "weather, baseline": {}}
-    without = replace(study.worlds_, rates={key: rates[:, :2] for key, rates in study.worlds_.rates.items()})
+    found = study.worlds_
+    without = replace(found, parts=found.parts[:2], rates={key: rates[:, :2] for key, rates in found.rates.items()})
     for key in keys:
         rates = np.nanmean(study.decisions_[*key, "data-informed"] < 0, axis=1)
         bands["noise"][key] = np.quantile(rates, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
         bands["weather, baseline"][key] = without.band(key, CONFIDENCE)
     if models:
-        bands["all"] = {key: study.worlds_.band(key, CONFIDENCE) for key in keys}
+        bands["all"] = {key: found.band(key, CONFIDENCE) for key in keys}
     return study, bands
 
 
@@ -244,7 +245,8 @@ def main():
         print(shares.round(1).to_string())
         print(f"  {time.perf_counter() - began:.0f} s in all")
         for key, row in shares[shares.index.get_level_values(2) == "all"].iterrows():
-            margin = 2 * row["+-"]
+            of_independent = 100 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / row["partly detected"])
+            margin = 2 * np.nanmax([row["+-"], of_independent])
             met = WANTED[0] - margin <= row["held"] <= WANTED[1] + margin
             missed += not met
             print(f"{'met' if met else 'MISSED':7} {', '.join(key)}: {row['held']:.0f} % held, target {WANTED}")

@@ -136,9 +136,9 @@ def test_several_years_take_turns(fem):
         pd.testing.assert_frame_equal(T, years[expected])
 
 
-def rates_of(steps, with_noise=True, parts=("weather", "baseline")):
+def rates_of(steps, with_noise=True, parts=("weather", "baseline"), own=0.5):
     key = "detector", "scenario"
-    return WorldRates({key: steps}, {key: 1e9}, parts, with_noise, []), key
+    return WorldRates({key: steps}, {key: np.array([own, own])}, {key: 1e9}, parts, with_noise, []), key
 
 
 def test_variances_of_the_parts_add_up():
@@ -164,7 +164,7 @@ def test_a_band_holds_the_rate_of_one_more_campaign():
     for _ in range(1500):
         centres = logit(0.8) + 0.3 * random.standard_normal((9, 1))
         rates = 1 / (1 + np.exp(-centres[:8] - 0.2 * random.standard_normal((8, 3))))
-        worlds, key = rates_of(rates[:, np.newaxis], parts=("baseline",))
+        worlds, key = rates_of(rates[:, np.newaxis], parts=("model",))
         lowest, highest = worlds.band(key, 0.9)
         truth = 1 / (1 + np.exp(-centres[8, 0] - 0.2 * random.standard_normal()))
         held.append(lowest <= truth <= highest)
@@ -180,6 +180,15 @@ def test_more_parts_do_not_narrow_a_band():
         lowest, highest = worlds.band(key, 0.9)
         widths.append(highest - lowest)
     assert widths[0] < widths[1] < widths[2]
+
+
+@pytest.mark.parametrize(("parts", "centre"), [(("baseline",), 0.3), (("weather",), 0.5), (("weather", "model"), 0.6)])
+def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(parts, centre):
+    scatter = 0.01 * np.random.RandomState(3).standard_normal((50, 1, 3))
+    steps = np.concatenate([0.5 + scatter, 0.6 + scatter], axis=1)[:, : len(parts)]
+    worlds, key = rates_of(steps, parts=parts, own=0.3)
+    assert np.mean(worlds.band(key, 0.9)) == pytest.approx(centre, abs=0.005)
+    assert np.mean(worlds.single(key)) == pytest.approx(centre, abs=0.005)
 
 
 def test_all_worlds_alike_have_no_spread():

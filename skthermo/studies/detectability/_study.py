@@ -151,9 +151,8 @@ class DetectabilityStudy(BaseEstimator):
     A world is a structure that could have given the training records. The detectors have learned measured records, and
     stay: what a chain does not know of the structure moves records away from what they have learned. Bands are those of
     Student's law on the scale of the logit, with the variances between and within worlds (three draws of the noise in
-    each). On the truss, 90 % bands of noise alone hold 82 % of measured campaigns in another year, or 75 % where the
-    detector compensates for temperature, and bands of noise, baseline and weather 92 and 90 % (8 realisations, 17
-    states). If all chains and detectors learn the same resampled records, bands become nearly twice as wide.
+    each), about the study's own rate, moved by the mean effect of other weather and models.
+    ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
 
     References
     ----------
@@ -314,7 +313,7 @@ class DetectabilityStudy(BaseEstimator):
                 left = replace(
                     simulation, candidates={k: v for k, v in candidates.items() if k not in judgement.errors}
                 )
-                self.worlds_ = WorldRates.of(left, worlds, self.n_jobs, verbose=max(self.verbose - 1, 0))
+                self.worlds_ = WorldRates.of(left, judgement, worlds, self.n_jobs, max(self.verbose - 1, 0))
         rows = judgement.ask(
             candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
         )

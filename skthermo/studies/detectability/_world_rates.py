@@ -30,17 +30,24 @@ NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 @dataclass(frozen=True, eq=False)
 class WorldRates:
     """Rates of alarms in worlds, (n_worlds, n_parts, n_draws), by detector and scenario, as parts are added one after
-    the other; ``n_records`` are judged in each draw, and ``with_noise`` tells whether bands hold the noise, too."""
+    the other, and ``own`` rates of the study's repeats; ``n_records`` are judged in each draw, and ``with_noise`` tells
+    whether bands hold the noise, too."""
 
     rates: Mapping[Key, Array]
+    own: Mapping[Key, Array]
     n_records: Mapping[Key, float]
     parts: Sequence[str]
     with_noise: bool
     errors: Sequence[str]
 
     @classmethod
-    def of(cls, simulation: Simulation, worlds: Worlds, n_jobs: int | None, verbose: int = 0) -> "WorldRates":
-        """Judge the records of every world; those that fail are counted in a warning, unless most fail."""
+    def of(
+        cls, simulation: Simulation, judgement: Judgement, worlds: Worlds, n_jobs: int | None, verbose: int = 0
+    ) -> "WorldRates":
+        """Judge the records of every world; those that fail are counted in a warning, unless most fail.
+
+        Given are the simulation of the study and how its detectors have judged the records of the repeats.
+        """
         simulation = replace(simulation, clean={}, reference=None)
         jobs = (delayed(_rates_of_world)(simulation, worlds, number) for number in range(len(worlds.seeds)))
         with without_warnings():
@@ -57,28 +64,48 @@ class WorldRates:
                 f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}: bands are of the others",
                 "failed worlds",
             )
-        keys = [key for key in found[0] if all(key in one for one in found)]
+        own = _counted(judgement, simulation.scenarios, simulation.T)
+        keys = [key for key in found[0] if all(key in one for one in (own, *found))]
         rates = {key: np.array([one[key][0] for one in found]) for key in keys}
         n_records = {key: float(np.mean([one[key][1] for one in found])) for key in keys}
-        return cls(rates, n_records, worlds.parts, worlds.with_noise, errors)
+        return cls(rates, {key: own[key][0] for key in keys}, n_records, worlds.parts, worlds.with_noise, errors)
+
+    def logits(self, key: Key) -> Array:
+        """Logits of the rates of single campaigns with all that varies, (n_worlds, n_draws).
+
+        Chains of other training records differ from what detectors have learned to either side, and each of them adds
+        its own error out of fold to the noise, so that alarms rise in the mean. The rates of the study hold one such
+        error already: this mean rise is taken out.
+        """
+        steps = self._logits(self.rates[key], key)
+        means = steps.mean(axis=(0, 2))
+        rises = np.diff(means, prepend=self._logits(self.own[key], key).mean())
+        return steps[:, -1] - sum(rise for part, rise in zip(self.parts, rises, strict=True) if part == "baseline")
 
     def single(self, key: Key) -> Array:
         """Rates of single campaigns with all that varies, (n_worlds, n_draws), or without noise their mean."""
-        last = self.rates[key][:, -1]
-        return last if self.with_noise else last.mean(axis=1, keepdims=True)
+        rates = self._rates(self.logits(key), key)
+        return rates if self.with_noise else rates.mean(axis=1, keepdims=True)
 
     def band(self, key: Key, confidence: float) -> tuple[float, float]:
         """Rates between which that of a measured campaign should lie with this probability.
 
         Student's law on the scale of the logit: of few worlds, quantiles are hardly known.
         """
-        rates, n = self.rates[key][:, -1], self.n_records[key]
-        spread = Spread.of(logit((rates * n + 0.5) / (n + 1)))
+        spread, number = Spread.of(self.logits(key)), len(self.rates[key])
         variance = spread.between + self.with_noise * spread.within
-        number = len(rates)
         margin = t.ppf((1 + confidence) / 2, number - 1) * np.sqrt(variance * (1 + 1 / number))
-        lowest, highest = expit(spread.mean + np.array([-margin, margin]))
-        return tuple(np.clip(((n + 1) * np.array([lowest, highest]) - 0.5) / n, 0, 1))
+        lowest, highest = self._rates(spread.mean + np.array([-margin, margin]), key)
+        return float(lowest), float(highest)
+
+    def _logits(self, rates: Array, key: Key) -> Array:
+        """Logits, finite also where all records or none are in alarm."""
+        n = self.n_records[key]
+        return np.asarray(logit((rates * n + 0.5) / (n + 1)))
+
+    def _rates(self, logits: Array, key: Key) -> Array:
+        n = self.n_records[key]
+        return np.clip(((n + 1) * expit(logits) - 0.5) / n, 0, 1)
 
     def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
         """The table of a study, whose simulated rows have the bands of the worlds."""
@@ -183,14 +210,20 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
             drawn.judge(replace(records, healthy=None), one)
         for key, decisions in one.decisions.items():
             judgement.decisions.setdefault(key, []).extend(decisions)
-    rows = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T))))
-    scenarios = {scenario.name: scenario for scenario in simulation.scenarios}
+    found = _counted(judgement, simulation.scenarios, T)
+    return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
+
+
+def _counted(judgement: Judgement, scenarios: Any, T: Any) -> dict[Key, tuple[Array, float]]:
+    """Rates of alarms among simulated records, (n_repeats,), and how many are judged, by detector and scenario."""
+    rows, by_name = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T)))), {one.name: one for one in scenarios}
     found = {}
-    for key, decisions in judgement.decisions.items():
-        if len(decisions) == len(seeds):
-            counted = JudgedRecords(key[0], scenarios[key[1]], SIMULATED, rows, np.array(decisions)).from_onset()[0]
+    for (name, scenario, source), decisions in judgement.decisions.items():
+        if source == SIMULATED:
+            records = JudgedRecords(name, by_name[scenario], source, rows, np.array(decisions))
+            counted = records.from_onset()[0]
             judged = (~np.isnan(counted)).sum(axis=1)
-            found[key[:2]] = (counted < 0).sum(axis=1) / np.maximum(judged, 1), float(judged.mean())
+            found[name, scenario] = (counted < 0).sum(axis=1) / np.maximum(judged, 1), float(judged.mean())
     return found
 
 

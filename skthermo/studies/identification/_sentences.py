@@ -105,6 +105,7 @@ def limits(found: Any) -> Iterator[str]:
 
 def warnings(found: Any) -> Iterator[tuple[str, str]]:
     """What is doubtful, by kind and text."""
+    yield from found.records.warnings()
     best = told(found)[0]
     if found.confused:
         sets = "; ".join(" and ".join(causes) for causes in found.confused)
