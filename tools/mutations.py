@@ -359,6 +359,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
+    ("_changes.py", "studies/test_identify_causes.py"): [
+        ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
+    ],
+    ("_frequency_effects.py", "studies/test_identify_causes.py"): [
+        ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
+    ],
+    ("studies/identification/measured/_shape_effects.py", "studies/test_identify_shapes.py"): [
+        ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
+    ],
     ("studies/detectability/_world_rates.py", "studies/test_worlds.py"): [
         ("noise in the variance between worlds", " - within / values.shape[1]", ""),
         ("a band of the mean of all worlds", "variance * (1 + 1 / number)", "variance / number"),
