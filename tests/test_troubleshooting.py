@@ -18,7 +18,17 @@ ERRORS = "The most common errors"
 HELPER = "_warnings.py"
 """The file that gives the warnings of others."""
 
-REPORTS = ["_sentences", "_doubts", "summary", "likely_causes", "answer", "limits", "sentences"]
+REPORTS = [
+    "_sentences",
+    "_doubts",
+    "summary",
+    "likely_causes",
+    "answer",
+    "limits",
+    "sentences",
+    "waits_told",
+    "false_alarms_told",
+]
 """Functions whose sentences tell what is doubtful."""
 
 

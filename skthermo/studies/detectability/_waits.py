@@ -198,7 +198,7 @@ def waits_table(
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
         row["not_judged"] = waits.share_not_judged
-        text = _false_alarms(waits, numbers) if scenario.is_healthy else _in_words(waits, false, level)
+        text = false_alarms_told(waits, numbers) if scenario.is_healthy else waits_told(waits, false, level)
         rows.append(row | {"text": text})
     table = pd.DataFrame(rows)
     if is_stamped:
@@ -206,7 +206,7 @@ def waits_table(
     return table
 
 
-def _false_alarms(waits: Waits, numbers: Sequence[int]) -> str:
+def false_alarms_told(waits: Waits, numbers: Sequence[int]) -> str:
     """In how many of a hundred cases the healthy structure raises an alarm within some times."""
     chances = [(number, waits.found(number, 0.5)[0]) for number in numbers]
     told = [f"within {waits.clock.text(number)} in {_cases(chance)}" for number, chance in chances if chance == chance]
@@ -217,7 +217,7 @@ def _cases(chance: float) -> str:
     return f"{round(100 * chance)}" if chance >= 0.005 else "fewer than 1"
 
 
-def _in_words(waits: Waits, false: Waits | None, level: float) -> str:
+def waits_told(waits: Waits, false: Waits | None, level: float) -> str:
     """How soon alarms come, beside those of the healthy structure in the same time."""
     clock, number = waits.clock, waits.within(level)
     cases = f"{100 * level:g} of 100 cases"
