@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from skthermo._arguments import check_names
 from skthermo._arrays import Array
 from skthermo._frequency_effects import read_groups
 from skthermo.fem import CallableModel, FEModel
@@ -170,9 +171,10 @@ def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:
     """Damage groups whose stiffness no parameters scale already; by default those that are not made up of others."""
     if groups is None and not (hasattr(model, "groups") and hasattr(model, "with_damage_parameters")):
         return []
-    if groups is not None and not isinstance(groups, str) and not len(groups):
+    names = None if groups is None else check_names([groups] if isinstance(groups, str) else groups, "groups")
+    if names == []:
         return []
-    chosen = list(read_groups(model, groups))
+    chosen = list(read_groups(model, names))
     known = getattr(model, "parameter_terms", None)
     if known is None:
         return [name for name in chosen if name not in model.parameter_names]

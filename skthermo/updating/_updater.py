@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
 from skthermo._arguments import check_bounds, check_model, check_prior, check_size
-from skthermo._arrays import Array, Bounds, real_array
+from skthermo._arrays import Array, Bounds, as_random_state, real_array
 from skthermo._frames import column_names
 from skthermo._validation import (
     Estimator,
@@ -367,7 +367,7 @@ class ModelUpdater(Estimator):
             self.model, self._measured, self._read_bounds(), prior, groups_beside(self.model, groups), spread
         )
         parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
-        outcomes = ensemble.multipliers(n, self.theta_, check_random_state(random_state), self.max_iter, parallel)
+        outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, parallel)
         warn_each(ensemble.doubts(outcomes))
         ensemble.warn_of([outcome.theta for outcome in outcomes])
         return parallel(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)

@@ -28,7 +28,7 @@ EXPECTED_WARNINGS = (
     r"\d+ of \d+ rows have temperatures far outside",
     "groups that these modes cannot tell apart",
     r"\d+ of 130 records could not be compared",
-    "damage of these groups does not explain the shifts",
+    "damage of these groups alone does not explain the shifts",
     r"\d+ of \d+ rows cannot be predicted and are NaN",
     r"\d+ independent baseline records are too few",  # of windows, in ten days
     r"the \d+ baseline records depend on each other",  # raw frequencies of one winter

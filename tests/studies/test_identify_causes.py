@@ -167,6 +167,12 @@ def test_factors_and_their_slopes():
         ({"added_mass": {"snow": 0 * ASPHALT}}, "'snow' is 0 everywhere"),
         ({"added_mass": {"top": ASPHALT}}, r"the causes \['top'\] have the same names"),
         (
+            {"added_mass": {"something else": ASPHALT}},
+            r"the names \['something else'\]; expected other names",
+        ),
+        ({"added_mass": {"no damage": ASPHALT}}, r"causes have the names \['no damage'\]"),
+        ({"added_mass": {"": ASPHALT}}, r"causes have the names \[''\]"),
+        (
             {"added_mass": {"nothing left": np.full(23, -1e6)}},
             "'nothing left': the mass, with what is added, has a negative eigenvalue",
         ),

@@ -154,6 +154,8 @@ def test_a_mode_of_which_all_training_records_are_of_one_period():
         ({"groups": {"chords": []}}, r"expected one or more of"),
         ({"noise": "gaussian"}, "noise is 'gaussian'; expected \"fitted\" or relative standard deviations"),
         ({"noise": 0.0}, "noise is 0.0; expected standard deviations above 0"),
+        ({"groups": {"something else": ["top"]}}, r"causes have the names \['something else'\]; expected other names"),
+        ({"n_jobs": 0}, "n_jobs is 0; expected an integer"),
         ({"prior": 0.5}, "prior is 0.5; expected a DamagePrior"),
         ({"shapes": (np.ones((2, 6)), np.ones((2, 6)))}, "shapes came without dofs"),
         ({"dofs": [0, 1]}, "dofs came without shapes"),
@@ -186,6 +188,19 @@ def test_bad_records(fem):
         identify_damage(fem, WEATHER, F * np.nan, GROUPS)
 
 
+@pytest.mark.parametrize(
+    ("factors", "message"),
+    [
+        (2 * np.pi, r"6 of 6 modes are .*, f1 6\.\d* times \(rad/s instead of Hz\?\); expected Hz"),
+        (0.001, r"6 of 6 modes are .*, f1 0\.001 times; expected Hz"),
+        ([1, 1, 1, 1, 1, 5], r"1 of 6 modes are .*, f6 .* times; expected Hz, and modes in the order of fit"),
+    ],
+)
+def test_frequencies_that_no_change_of_a_structure_explains(fem, factors, message):
+    with pytest.raises(ValueError, match=message):
+        identify_damage(fem, WEATHER, simulated(fem, WEATHER) * factors, GROUPS)
+
+
 def test_a_model_that_cannot_be_damaged(fem):
     truss = make_truss()
     other = copy.copy(fem).set_params(model=CallableModel(truss.frequencies, list(truss.parameter_names), 6))
@@ -199,6 +214,9 @@ def test_a_model_that_cannot_be_damaged(fem):
         ({"numbers": (0.5, 0.6)}, "expected probabilities of none, one, two and at most three causes"),
         ({"numbers": (1.0,)}, "numbers is"),
         ({"numbers": (0.2,) * 5}, "numbers is"),
+        ({"numbers": "none"}, "numbers is 'none'; expected numbers"),
+        ({"numbers": {0: 0.5, 1: 0.5}}, "numbers is {0: 0.5, 1: 0.5}; expected numbers"),
+        ({"law": np.array(["uniform", "uniform"])}, "expected 'half-normal' or 'uniform'"),
         ({"severity": 0}, "severity is 0; expected a number between 0 and 1"),
         ({"severity": float("nan")}, "severity is nan"),
         ({"law": "normal"}, "law is 'normal'; expected 'half-normal' or 'uniform'"),

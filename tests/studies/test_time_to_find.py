@@ -214,6 +214,8 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
         ({"within": [7]}, "within has 7; expected times such as '7D'"),
         ({"within": "soon"}, "within has 'soon'; expected times"),
         ({"within": ["-1D"]}, "within has '-1D'"),
+        ({"within": []}, r"within is \[\]; expected one or more times, each once"),
+        ({"within": ["7D", "7D"]}, r"within is \['7D', '7D'\]; expected one or more times, each once"),
         ({"level": 95}, "level"),
         ({"source": "measured"}, r"source is 'measured'; expected one of \['data-informed'\]"),
         ({"detector": "none"}, "detector is 'none'"),

@@ -80,6 +80,9 @@ def test_years_are_matched_by_season():
         other_years([first, second[:60]])
     with pytest.raises(ValueError, match="year 1 of T has the sensors"):
         other_years([first, second.rename(columns={"day": "T9"})])
+    for other in (3, "next year", first[:0], first * np.nan):
+        with pytest.raises(ValueError, match=r"(?s)year 1 of T is .*; expected a table of temperatures"):
+            other_years([first, other])
     with pytest.raises(ValueError, match="year 1 of T has 2 rows, the first 3"):
         other_years([np.zeros((3, 1)), np.zeros((2, 1))])
 
@@ -231,6 +234,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
         ({"uncertainty": "wind"}, "uncertainty is 'wind'; expected 'all', or some of"),
         ({"uncertainty": ["noise", "wind"]}, "uncertainty is .*; expected 'all', or some of"),
         ({"uncertainty": []}, "uncertainty is .*; expected 'all', or some of"),
+        ({"uncertainty": {"noise": False}}, "uncertainty is {'noise': False}; expected 'all', or some of"),
         ({"uncertainty": 3}, "uncertainty is 3; expected 'all', or some of"),
         ({"n_worlds": 1}, "n_worlds is 1; expected at least 2"),
         ({"models": []}, "models is .*; expected a list of FE models"),

@@ -182,3 +182,8 @@ def test_errors_say_what_is_expected():
         updater.sample_models(2, spread=15)
     with pytest.raises(ValueError, match="unknown damage groups"):
         updater.sample_models(2, groups=["deck"])
+    for groups in (3, True, {"deck": 1}.keys):
+        with pytest.raises(ValueError, match=r"groups is .*; expected a list of names"):
+            updater.sample_models(2, groups=groups)
+    with pytest.raises(ValueError, match="random_state is 'seed'; expected None, an integer"):
+        updater.sample_models(2, random_state="seed")

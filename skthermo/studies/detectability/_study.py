@@ -738,7 +738,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there are several detectors and none is named, or the one that is named has no results.
         """
-        return sentences(self.results_, self.uncertainty_, self.detector_name(detector), self.confidence_)
+        return sentences(self._results(), self.uncertainty_, self.detector_name(detector), self.confidence_)
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.

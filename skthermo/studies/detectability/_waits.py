@@ -151,7 +151,10 @@ def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:
     if within is None:
         within = ("1D", "7D", "30D") if is_stamped else (1, 7, 30)
     many = [within] if isinstance(within, str) or np.ndim(within) == 0 else list(within)
-    return {str(one): _time(one, is_stamped) for one in many}
+    times = {str(one): _time(one, is_stamped) for one in many}
+    if not times or len(times) < len(many):
+        raise ValueError(f"within is {within!r:.100}; expected one or more times, each once")
+    return times
 
 
 def _time(one: Any, is_stamped: bool) -> Any:

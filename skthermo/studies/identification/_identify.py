@@ -104,9 +104,10 @@ def identify_damage(
     ------
     ValueError
         If fem is not a fitted chain, T and F differ in rows, a group or parameter is unknown, a mass pattern does not
-        fit the model, causes have the same name, ``prior`` is no `DamagePrior`, shapes or dofs do not fit the model, no
-        record can be compared (each lacks all frequencies, a temperature, or similar weather in the training records),
-        no cause can be seen, or the model cannot be changed so.
+        fit the model, causes have the same name or that of an explanation, ``prior`` is no `DamagePrior`, shapes or
+        dofs do not fit the model, no record can be compared (each lacks all frequencies, a temperature, or similar
+        weather in the training records), a mode is more than 3 times or less than a fifth of the predicted one, no
+        cause can be seen, or the model cannot be changed so.
 
     Warns
     -----
@@ -166,6 +167,7 @@ def identify_damage(
         raise ValueError(f"prior is {prior!r}; expected a DamagePrior")
     if shapes is None and dofs is not None:
         raise ValueError("dofs came without shapes; expected both or neither")
+    check_jobs(n_jobs)
     causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
     seen = observe(fem, T, F, noise)
     effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
@@ -195,7 +197,6 @@ def identify_damage(
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 
         models = checked_models(fem, models)
-        check_jobs(n_jobs)
         seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
         jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
         posterior = Posterior.mean(Parallel(n_jobs=n_jobs)(jobs))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arguments import seem_rad_per_s
 from skthermo._formatting import SPACE, chance_text, listed, percent
 from skthermo.studies.identification._told import Amount, Told, either, told
 from skthermo.studies.identification.weighing import HIGHEST_SEVERITY, NO_DAMAGE
@@ -18,7 +17,6 @@ NAMED, MOST_NAMED = 0.01, 4
 SURE = 0.9  # probability from which on the most probable explanation is not followed by averages over all
 LIKELY = 0.1  # probability from which on a cause is named among the averages
 RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is told
-NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
 CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
 
@@ -145,8 +143,6 @@ def likely_causes(found: Any) -> str:
     """What may have shifted the frequencies where damage does not: what the shifts suggest, then what is usual."""
     known, rest = found.shifts[found.shifts["measured"].notna()], found.unexplained
     measured, error = (known[name].to_numpy(dtype=float) for name in ("measured", "standard_error"))
-    if seem_rad_per_s(1 + measured, NEAR_2_PI):
-        return "frequencies in rad/s: the measured ones are about 2 pi times the predicted ones; expected Hz"
     n_rose, mean, worst = int((measured > CLEAR * error).sum()), float(measured.mean()), int(np.nanargmax(np.abs(rest)))
     causes = []
     if len(known) > 2 and measured.std() < EVEN * abs(mean):

@@ -63,6 +63,8 @@ def other_years(T: Sequence[Any]) -> list[Any]:
 
 def _on_stamps_of(first: Any, other: Any, number: int) -> Any:
     """Another year of weather on the stamps of the first."""
+    if np.ndim(other) != 2 or not len(other) or np.isnan(as_floats(other)).all():
+        raise ValueError(f"year {number} of T is {other!r:.200}; expected a table of temperatures, as the first")
     names = [column_names(table, "T") for table in (first, other)]
     if names[0] != names[1]:
         raise ValueError(f"year {number} of T has the sensors {names[1]}; expected those of the first, {names[0]}")

@@ -1,6 +1,6 @@
 """Worlds: structures that could have given the training records of a chain, each in weather of its own."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,9 +82,9 @@ def checked_parts(uncertainty: Any) -> list[str]:
     """What varies, or an error."""
     if _is_all(uncertainty):
         return list(PARTS)
-    is_one = isinstance(uncertainty, str) or not isinstance(uncertainty, Iterable)
+    is_one = isinstance(uncertainty, str | Mapping) or not isinstance(uncertainty, Iterable)
     asked = [uncertainty] if is_one else list(uncertainty)
-    if not asked or any(part not in PARTS for part in asked):
+    if not asked or not all(isinstance(part, str) and part in PARTS for part in asked):
         raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'all', or some of {list(PARTS)}")
     return asked
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_same_rows
 from skthermo._times import has_stamps, row_times
@@ -16,6 +18,9 @@ from skthermo._validation import check_array
 from skthermo._warnings import warn_user, warnings_once
 from skthermo.studies.identification.measured._compared import ComparedRecords, left_out_rows
 from skthermo.studies.identification.measured._shift import Shift, measured_shift, outlying, record_shifts, scatter_of
+
+NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
+POSSIBLE_RATIOS = 0.2, 3.0  # of measured to predicted frequencies; damage of 95 % everywhere gives 0.22
 
 FAR_FROM_OTHERS = "far from the other records"
 
@@ -45,8 +50,22 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
         left_out[FAR_FROM_OTHERS] = outliers
         frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
         shift = measured_shift(fem, T, shifts, noise)
+    _check_ratios(np.exp(shift.mean), fem.mode_names_)
     records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values), latest(T, outliers))
     return Observation(shift, records, T, theta, frequencies)
+
+
+def _check_ratios(ratios: Array, names: Sequence[Any]) -> None:
+    """Raise an error where no change of a structure gives these ratios of measured to predicted frequencies."""
+    lowest, highest = POSSIBLE_RATIOS
+    wrong = np.flatnonzero((ratios < lowest) | (ratios > highest))
+    if len(wrong):
+        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, NEAR_2_PI) else ""
+        raise ValueError(
+            f"{len(wrong)} of {len(ratios)} modes are less than {lowest} times or more than {highest:.0f} times those "
+            f"that are predicted, {names[wrong[0]]} {ratios[wrong[0]]:.3g} times{units}; expected Hz, and modes in the "
+            "order of fit"
+        )
 
 
 def latest(T: Any, rows: NDArray[np.bool_]) -> int:

@@ -63,6 +63,12 @@ def read_causes(
         causes.append(Cause(f"{name} higher", "parameter", 0.0, MOST_HIGHER, of=(name,)))
     causes += [Cause(name, "mass", 0.0, highest, LIKELY_TIMES, of=(name,)) for name, (_, highest) in masses.items()]
     names = [cause.name for cause in causes]
+    reserved = [name for name in names if name in (SOMETHING_ELSE, NO_DAMAGE, "")]
+    if reserved:
+        raise ValueError(
+            f"causes have the names {reserved}; expected other names in groups or added_mass, since "
+            f"{SOMETHING_ELSE!r} and {NO_DAMAGE!r} are explanations of their own"
+        )
     repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if repeated:
         raise ValueError(f"the causes {repeated} have the same names; expected other names in groups or added_mass")

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from skthermo._arrays import as_floats, is_real
+from skthermo._arrays import is_real, real_array
 
 MOST_CAUSES = 3  # largest number of causes in one explanation
 
@@ -52,7 +52,7 @@ class DamagePrior:
     model_error: float = 0.03
 
     def __post_init__(self) -> None:
-        numbers = as_floats(self.numbers)
+        numbers = real_array(self.numbers, "numbers")
         if (
             numbers.ndim != 1
             or not 1 < len(numbers) <= MOST_CAUSES + 1
@@ -63,7 +63,7 @@ class DamagePrior:
                 f"numbers is {self.numbers!r}; expected probabilities of none, one, two and at most three causes, "
                 "which add up to 1"
             )
-        if self.law not in ("half-normal", "uniform"):
+        if not isinstance(self.law, str) or self.law not in ("half-normal", "uniform"):
             raise ValueError(f"law is {self.law!r}; expected 'half-normal' or 'uniform'")
         for name, lowest, highest in (("severity", 0, 1), ("something_else", 0, 1), ("model_error", 0, 1)):
             value = getattr(self, name)
