@@ -255,3 +255,18 @@ def test_few_independent_records_are_warned_of(is_few):
     kinds = dict(found.warnings())
     assert ("few independent records" in kinds) == is_few
     assert ("few independent training records" in kinds) == is_few
+
+
+@pytest.mark.parametrize(
+    ("amount", "kind", "is_at_bound"),
+    [
+        ((0.93, 0.02), "damage", True),
+        ((0.85, 0.02), "damage", False),
+        ((2.0, 0.05), "mass", False),  # twice the pattern
+        ((0.97, 0.02), "parameter", False),
+    ],
+)
+def test_only_a_severity_may_be_at_the_bound_of_severities(amount, kind, is_at_bound):
+    found = identified({"deck": (1.0, {"deck": amount})}, kinds={"deck": kind})
+    kinds = [name for name, _ in found.warnings()]
+    assert ("severity at its bound" in kinds) == is_at_bound
