@@ -9,6 +9,7 @@ from skthermo._formatting import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_damage
+from skthermo.studies.identification._sentences import explanation_text
 from skthermo.studies.identification.measured._compared import ComparedRecords
 from tests.studies.identified import identified
 
@@ -255,3 +256,23 @@ def test_few_independent_records_are_warned_of(is_few):
     kinds = dict(found.warnings())
     assert ("few independent records" in kinds) == is_few
     assert ("few independent training records" in kinds) == is_few
+
+
+@pytest.mark.parametrize(
+    ("amount", "kind", "is_at_bound"),
+    [
+        ((0.93, 0.02), "damage", True),
+        ((0.85, 0.02), "damage", False),
+        ((2.0, 0.05), "mass", False),  # twice the pattern
+        ((0.97, 0.02), "parameter", False),
+    ],
+)
+def test_only_a_severity_may_be_at_the_bound_of_severities(amount, kind, is_at_bound):
+    found = identified({"deck": (1.0, {"deck": amount})}, kinds={"deck": kind})
+    kinds = [name for name, _ in found.warnings()]
+    assert ("severity at its bound" in kinds) == is_at_bound
+
+
+@pytest.mark.parametrize(("amount", "text"), [(0.0812, "8.1"), (0.3, "30"), (-0.996, "100"), (2.12, "212")])
+def test_amounts_of_explanations_have_no_exponents(amount, text):
+    assert explanation_text(["snow", "something else"], [amount]) == f"snow {text}{SPACE}%, something else"

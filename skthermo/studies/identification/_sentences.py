@@ -18,6 +18,7 @@ SURE = 0.9  # probability from which on the most probable explanation is not fol
 LIKELY = 0.1  # probability from which on a cause is named among the averages
 RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is told
 CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
+PILED_UP = 1.05  # standard errors between the mean of an exponential law and its bound, with some margin
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
 
 
@@ -111,7 +112,7 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
     if found.unseen:
         names = ", ".join(found.unseen)
         yield "unseen groups", f"groups that these modes do not show, of which nothing is known: {names}"
-    highest = [str(cause) for cause in found.most_probable if found.severities.get(cause, 0.0) >= HIGHEST_SEVERITY]
+    highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
     if best.has_else or found.misfit_p_value < RARE:
@@ -125,6 +126,14 @@ def warnings(found: Any) -> Iterator[tuple[str, str]]:
             f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
             f"{likely_causes(found)}",
         )
+
+
+def _is_at_bound(found: Any, cause: str) -> bool:
+    """Whether the law of a severity piles up at its upper bound, so that its mean is a standard error below it."""
+    if cause not in found.table.index or found.table.loc[cause, "kind"] != "damage":
+        return False
+    amount = found.estimates.loc[(found.explanations.index[0], cause)]
+    return bool(amount["severity"] + PILED_UP * amount["standard_error"] >= HIGHEST_SEVERITY)
 
 
 def _departure(found: Any) -> str:
@@ -167,5 +176,6 @@ def _signed(shift: float) -> str:
 
 def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
     """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
-    parts = [f"{cause} {percent(abs(amount), '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    sizes = [percent(abs(amount), ".2g" if abs(amount) < 0.995 else ".0f") for amount in amounts]
+    parts = [f"{cause} {size}" for cause, size in zip(causes, sizes, strict=False)]
     return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE
