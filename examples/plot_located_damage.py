@@ -6,6 +6,9 @@ A footbridge of three equal spans is monitored for a year. In the next spring, t
 span have lost a part of their stiffness. :func:`~skthermo.studies.identify_damage` says which span has changed, and
 :func:`~skthermo.studies.locate_damage` where in it, element by element, as far as the records tell. The bridge is
 symmetric, so that frequencies alone cannot tell the first span from the last; measured mode shapes can.
+
+Run it with ``python examples/plot_located_damage.py``; figures go to the folder ``figures``. It needs
+:download:`page_recipes.py` beside it. The guide is :doc:`/guide/studies`.
 """
 
 # sphinx_gallery_thumbnail_number = 2

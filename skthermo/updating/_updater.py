@@ -93,6 +93,10 @@ class ModelUpdater(Estimator):
     covariance_ : ndarray of shape (n_parameters, n_parameters)
         Covariance of ``theta_``, if the weights describe the noise (see Notes): the inverse of the Gauss-Newton matrix
         J' J. A parameter that the measurements do not determine has an infinite variance and NaN covariances.
+    measured_ : Measured
+        What `fit` was given, with its weights.
+    has_deviations_ : bool
+        Whether `fit` was given ``frequency_std``, which `sample_models` needs.
     n_features_in_ : int
         Number of modes.
     feature_names_in_ : ndarray of str
@@ -256,8 +260,8 @@ class ModelUpdater(Estimator):
                 f"the model has no modes at any of the {self.n_starts} starts; expected some within bounds"
             )
 
-        self._measured = measured
-        self._has_deviations = frequency_std is not None
+        self.measured_ = measured
+        self.has_deviations_ = frequency_std is not None
         self.theta_ = best.theta
         self.model_ = rescaled(self.model, best.theta)
         self.starts_ = starts_table(outcomes)
@@ -353,7 +357,7 @@ class ModelUpdater(Estimator):
         [0.35 0.39 0.3  0.32 0.4  0.41]
         """
         check_is_fitted(self)
-        if not self._has_deviations:
+        if not self.has_deviations_:
             raise ValueError(
                 "fit was called without frequency_std, and how much models may differ is not known; expected "
                 "fit(F, frequency_std=...), standard deviations of the mean frequencies in Hz"
@@ -364,7 +368,7 @@ class ModelUpdater(Estimator):
         names = self.model.parameter_names
         prior = check_prior(spread if self.prior is None else self.prior, names)
         ensemble = Ensemble(
-            self.model, self._measured, self._read_bounds(), prior, groups_beside(self.model, groups), spread
+            self.model, self.measured_, self._read_bounds(), prior, groups_beside(self.model, groups), spread
         )
         parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
         outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, parallel)

@@ -354,6 +354,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         >>> [round(float(other.predict(year.temperatures)["f1"].mean()), 2) for other in (fem, *others)]
         [7.56, 7.56, 7.55, 7.55]
         """
+        check_is_fitted(self)
         chain, random = copy(self), as_random_state(random_state)
         records = self.records_.resampled(self.residuals_, self._frequencies, random)
         filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
