@@ -122,7 +122,8 @@ class IdentifiedDamageDisplay:
         IdentifiedDamageDisplay
             Itself.
         """
-        height = max(3.8, 1.4 + 0.3 * len(self.identified.table))
+        has_long_labels = self.identified.told.index[:MOST_BARS].astype(str).str.len().max() > LABEL
+        height = max(4.9 if has_long_labels else 3.8, 1.4 + 0.3 * len(self.identified.table))
         self.axes_ = panels(ax, ["explanations", "severities", "shifts"], (4.6, height), 3)
         self.figure_ = self.axes_[0].figure
         self.bars_ = self._draw_explanations(self.axes_[0])

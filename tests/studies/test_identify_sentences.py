@@ -9,6 +9,7 @@ from skthermo._formatting import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_damage
+from skthermo.studies.identification._sentences import explanation_text
 from skthermo.studies.identification.measured._compared import ComparedRecords
 from tests.studies.identified import identified
 
@@ -270,3 +271,8 @@ def test_only_a_severity_may_be_at_the_bound_of_severities(amount, kind, is_at_b
     found = identified({"deck": (1.0, {"deck": amount})}, kinds={"deck": kind})
     kinds = [name for name, _ in found.warnings()]
     assert ("severity at its bound" in kinds) == is_at_bound
+
+
+@pytest.mark.parametrize(("amount", "text"), [(0.0812, "8.1"), (0.3, "30"), (-0.996, "100"), (2.12, "212")])
+def test_amounts_of_explanations_have_no_exponents(amount, text):
+    assert explanation_text(["snow", "something else"], [amount]) == f"snow {text}{SPACE}%, something else"

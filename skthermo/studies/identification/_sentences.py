@@ -176,5 +176,6 @@ def _signed(shift: float) -> str:
 
 def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
     """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
-    parts = [f"{cause} {percent(abs(amount), '.2g')}" for cause, amount in zip(causes, amounts, strict=False)]
+    sizes = [percent(abs(amount), ".2g" if abs(amount) < 0.995 else ".0f") for amount in amounts]
+    parts = [f"{cause} {size}" for cause, size in zip(causes, sizes, strict=False)]
     return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE

@@ -40,11 +40,6 @@ class Division:
         """All members in order."""
         return [member for piece in self.pieces for member in piece]
 
-    @property
-    def can_be_finer(self) -> bool:
-        """Whether a piece has several members."""
-        return any(len(piece) > 1 for piece in self.pieces)
-
     def finer(self, chosen: Sequence[bool]) -> Division:
         """The division with the chosen pieces cut into halves."""
         flags = iter(chosen)

@@ -8,7 +8,6 @@ from skthermo._arrays import Array
 N_NODES = 12  # quadrature nodes in each dimension but the last
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(N_NODES)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
-OVERSAMPLED = 4  # candidates for each draw
 
 
 def log_probability(mean: Array, covariance: Array, lowest: Array, highest: Array) -> Array:
