@@ -162,16 +162,17 @@ class Scale:
         return not self.curves.are_small(weight.causes, weight.amounts(self.log_errors)).all()
 
     def with_large(self, weights: Sequence[Weight]) -> Scale:
-        """The same with large amounts tabulated for those causes that have them in the best set of its size."""
-        best = best_of_each(weights, np.array([total(self, weight) for weight in weights]))
-        far = {
-            cause
-            for weight in compress(weights, best)
-            for cause, is_small in zip(
-                weight.causes, self.curves.are_small(weight.causes, weight.amounts(self.log_errors)), strict=True
-            )
-            if not is_small and not self.curves.is_whole[cause]
-        }
+        """The same with large amounts tabulated for those causes that have them in the best set of its size.
+
+        Best with something else, and best without it, which would hide large damage that is not tabulated yet.
+        """
+        far = set()
+        for share in dict.fromkeys([self.prior.something_else, 0.0]):
+            scale = replace(self, prior=replace(self.prior, something_else=share))
+            best = best_of_each(weights, np.array([total(scale, weight) for weight in weights]))
+            for weight in compress(weights, best):
+                is_small = self.curves.are_small(weight.causes, weight.amounts(scale.log_errors))
+                far |= {cause for cause in compress(weight.causes, ~is_small) if not self.curves.is_whole[cause]}
         return replace(self, curves=self.curves.whole(self.effects, sorted(far), self.observed)) if far else self
 
 
