@@ -68,6 +68,14 @@ def test_damage_without_noise_is_found_exactly(fem, damage):
     np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=2e-4)
 
 
+@pytest.mark.parametrize("severity", [0.5, 0.7, 0.88, 0.92])  # modes of the truss swap places at 0.88
+def test_severe_damage_of_one_group_is_not_something_else(fem, severity):
+    F = simulated(fem, {"diagonal": severity})
+    found = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
+    assert most_probable(found) == pytest.approx({"diagonal": severity}, abs=0.02)
+    assert found.probability > 0.8
+
+
 def test_a_healthy_structure_has_no_damage(fem):
     found = identify_damage(fem, WEATHER, simulated(fem), GROUPS, noise=TINY, random_state=0)
     assert found.most_probable == ()

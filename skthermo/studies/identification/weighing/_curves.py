@@ -13,7 +13,7 @@ from skthermo.studies.identification.weighing._causes import Cause
 from skthermo.studies.identification.weighing._comparison import Effects
 from skthermo.studies.identification.weighing._evidence import Observed
 
-SHARES = np.array([0.0, 1 / 6, 1 / 3, 2 / 3, 1.0])  # of the bounds, at which effects are tabulated
+SHARES = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6, 11 / 12, 1.0])  # of the bounds, where effects are tabulated
 N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them
 
 
