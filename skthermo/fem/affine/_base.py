@@ -437,7 +437,8 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         array([[1.49 , 4.807]])
         """
         n_terms = len(self._full_core.stiffness.factors)
-        groups, divided = dict(self._groups), []
+        groups = dict(self._groups)
+        divided: list[tuple[int, Any]] = []
         for name, of_terms in parts.items():
             if name in self._groups or not isinstance(of_terms, Mapping) or not of_terms:
                 raise ValueError(f"part {name!r} is {of_terms!r:.200}; expected a new name, and matrices by position")

@@ -248,20 +248,20 @@ class Structure:
             element = self._members.get(member)
             nodes = [] if element is None else [self._coordinates[node] for node in element.nodes]
             matrices = {} if element is None else element.stiffness(np.array(nodes))
-            if properties not in matrices:
+            if element is None or properties not in matrices:
                 raise ValueError(
                     f"member {member!r} of the model is not in the structure; expected the model's structure"
                 )
             part = {part_of[member]: STIFFNESS} if member in part_of else {}
             assembler.add(member, {properties: matrices[properties]}, element.dofs(self.dimension), {}, part)
-        matrices = [matrix for _, matrix in assembler.terms()]
-        if abs(sum(matrices) - term).max() > SAME * abs(term).max():
+        summed = [matrix for _, matrix in assembler.terms()]
+        if abs(sum(summed) - term).max() > SAME * abs(term).max():
             raise ValueError(
                 f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
                 "expected the structure that assembled the model"
             )
         names = [name for name in dict.fromkeys(part_of.values()) if assembler.positions(name)]
-        return {name: matrices[assembler.positions(name)[0]] for name in names}
+        return {name: summed[assembler.positions(name)[0]] for name in names}
 
     def _bound(self, member: Hashable, bindings: Mapping[str, Target], matrix: str) -> dict[str, str]:
         """The parameters or damage groups of one member, and the property that each acts on."""
