@@ -239,6 +239,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
         ({"n_worlds": 1}, "n_worlds is 1; expected at least 2"),
         ({"models": []}, "models is .*; expected a list of FE models"),
         ({"models": [make_truss(n_modes=4)]}, "model 0 of models is .* and 4 modes; expected the chain's"),
+        ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, or 'all'"),
     ],
 )
 def test_wrong_worlds_are_refused(fem, options, message):

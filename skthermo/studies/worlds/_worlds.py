@@ -44,6 +44,10 @@ class Worlds:
         seeds = random.randint(LARGEST_SEED, size=number + 1)
         if models is not None:
             models = checked_models(fem, models)
+            if "model" not in asked:
+                raise ValueError(
+                    f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, or 'all'"
+                )
         elif "model" in asked:
             models = _models_of(fem, number, int(seeds[-1]), is_needed=not _is_all(uncertainty))
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
