@@ -151,7 +151,7 @@ class IdentifiedDamage:
 
     @property
     def damage(self) -> dict[str, float]:
-        """Severities of the model's groups in the most probable explanation, as ``simulate`` of the chain takes them."""
+        """Severities of the model's groups in the most probable explanation, for ``simulate`` of the chain."""
         found: dict[str, float] = {}
         for cause in self.most_probable:
             for member in self.members.get(cause, []):
