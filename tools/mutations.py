@@ -194,7 +194,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread beyond the range", " * (1 + excess)[:, np.newaxis]", ""),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
-        ("periods of time", 'np.argsort(row_times(self.temperatures), kind="stable")', "np.arange(len(self.inputs))"),
+        (
+            "periods of time",
+            'np.argsort(row_times(self.temperatures), kind="stable")\n        measured',
+            "np.arange(len(self.inputs))\n        measured",
+        ),
         ("blocks as long as residuals remember", "CORRELATION_TIMES = 5 ", "CORRELATION_TIMES = 0 "),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
