@@ -1,6 +1,6 @@
 """Sections of a report on the answer, and on what would be found and what not."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -93,22 +93,6 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
     scenarios = {scenario.name: scenario for scenario in study.scenarios_}
-    has_bands = study.uncertainty_ is not None
-    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds"]
-    columns += ["In one measured campaign"] if has_bands else []
-    columns += ["Records judged", "Mean time to the first alarm"]
-    cells = [
-        [
-            row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
-            element("span", described(scenarios.get(row["scenario"])), class_="text"),
-            bar(row["rate"], share_text(row["rate"])),
-            bounds_text(row["lowest"], row["highest"]),
-            *([bounds_text(row["band_lowest"], row["band_highest"])] if has_bands else []),
-            f"{row['n_records']:,}{_share_not_judged(study, row)}",
-            duration_text(row["time_to_detection"]),
-        ]
-        for _, row in results.iterrows()
-    ]
     introduction = (
         "Every scenario was simulated in the same weather, "
         f"{counted(int(results['n_repeats'].max()), 'time')}, each time with other scatter of the measurements. For "
@@ -121,7 +105,7 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
     judge = last_step(study.detectors_[study.detector_name()])
     parts = [
         paragraphs(introduction),
-        table("Alarms in every scenario.", columns, cells),
+        _alarms(study, scenarios),
         figure(
             "Share of records in alarm over the severity of the damage: tested severities with 95 % bounds, and a "
             "curve through them with its bounds. The label a90 marks the severity at which 90 % of the records raise "
@@ -139,6 +123,27 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
         ),
     ]
     return section("found", "What would be found and what not", *(part for part in parts if part))
+
+
+def _alarms(study: Any, scenarios: Mapping[str, Any]) -> Html:
+    """A row for each scenario and source."""
+    has_bands = study.uncertainty_ is not None
+    columns = ["Scenario", "What is changed", "Records in alarm", "Bounds"]
+    columns += ["In one measured campaign"] if has_bands else []
+    columns += ["Records judged", "Mean time to the first alarm"]
+    cells = [
+        [
+            row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
+            element("span", described(scenarios.get(row["scenario"])), class_="text"),
+            bar(row["rate"], share_text(row["rate"])),
+            bounds_text(row["lowest"], row["highest"]),
+            *([bounds_text(row["band_lowest"], row["band_highest"])] if has_bands else []),
+            f"{row['n_records']:,}{_share_not_judged(study, row)}",
+            duration_text(row["time_to_detection"]),
+        ]
+        for _, row in study.results_.iterrows()
+    ]
+    return table("Alarms in every scenario.", columns, cells)
 
 
 def _share_not_judged(study: Any, row: pd.Series) -> str:

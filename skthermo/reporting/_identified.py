@@ -20,18 +20,6 @@ UNITS = {
 
 def identified_damage(identified: Any) -> Html:
     """What is most probable, what else could be, how severe, and what cannot be told."""
-    told = identified.told[identified.told["probability"] >= LEAST]
-    explanations = [
-        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
-    ]
-    shifts = [
-        [
-            mode,
-            *(f"{100 * row[name]:+.2f} %" for name in ("measured", "explained")),
-            f"± {200 * row['standard_error']:.2f} %",
-        ]
-        for mode, row in identified.shifts.iterrows()
-    ]
     parts = [
         paragraphs(
             "Records of the structure as it is now were compared with what the healthy structure would do in the same "
@@ -39,12 +27,7 @@ def identified_damage(identified: Any) -> Html:
             "probability, and these add up to 100 %."
         ),
         bullets(identified.answer()),
-        table(
-            "Explanations with their probabilities. The bounds hold the severity with a probability of 90 % if the "
-            "explanation is right.",
-            ["Explanation", "Probability"],
-            explanations,
-        ),
+        _explanations(identified),
         element("h3", "What cannot be told"),
         bullets(identified.limits()) or paragraphs("All groups can be seen and told apart by the measured modes."),
         paragraphs(*identified.records.sentences()),
@@ -55,11 +38,7 @@ def identified_damage(identified: Any) -> Html:
             ["Group", "Probability", "What changes", "On average", "Bounds", "If changed, up to"],
             [_row(str(cause), row, cause in identified.unseen) for cause, row in identified.table.iterrows()],
         ),
-        table(
-            "Mean shift of each natural frequency: measured, and explained on average over all explanations.",
-            ["Mode", "Measured", "Explained", "Uncertainty of the measured shift (two standard errors)"],
-            shifts,
-        ),
+        _shifts(identified),
         figure(
             "Explanations with their probabilities; severity of each group, on average over all explanations; shift of "
             "each natural frequency, measured and explained.",
@@ -67,6 +46,37 @@ def identified_damage(identified: Any) -> Html:
         ),
     ]
     return section("identified", "Identified damage", *parts)
+
+
+def _explanations(identified: Any) -> Html:
+    """Explanations, the most probable first."""
+    told = identified.told[identified.told["probability"] >= LEAST]
+    explanations = [
+        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
+    ]
+    return table(
+        "Explanations with their probabilities. The bounds hold the severity with a probability of 90 % if the "
+        "explanation is right.",
+        ["Explanation", "Probability"],
+        explanations,
+    )
+
+
+def _shifts(identified: Any) -> Html:
+    """Shift of each mode, measured and explained."""
+    shifts = [
+        [
+            mode,
+            *(f"{100 * row[name]:+.2f} %" for name in ("measured", "explained")),
+            f"± {200 * row['standard_error']:.2f} %",
+        ]
+        for mode, row in identified.shifts.iterrows()
+    ]
+    return table(
+        "Mean shift of each natural frequency: measured, and explained on average over all explanations.",
+        ["Mode", "Measured", "Explained", "Uncertainty of the measured shift (two standard errors)"],
+        shifts,
+    )
 
 
 def _row(cause: str, row: Any, is_unseen: bool) -> list[Any]:

@@ -1,6 +1,6 @@
 """Simulated and reference records of all scenarios, as the detectors of a study judge them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -99,11 +99,15 @@ class Simulation:
         with without_warnings():
             self._calibrate(judgement, 0, seeds)
 
+    def without(self, failed: Collection[str]) -> "Simulation":
+        """The same without the detectors that failed."""
+        return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
+
     def other_repeats(
         self, judgement: Judgement, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
     ) -> None:
         """Judge the records of later repeats, too; the warnings of the first are the only ones given."""
-        left = replace(self, candidates={k: v for k, v in self.candidates.items() if k not in judgement.errors})
+        left = self.without(judgement.errors)
         with without_warnings():
             jobs = (delayed(left._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
             for later in Parallel(n_jobs=n_jobs, verbose=verbose)(jobs):

@@ -310,15 +310,31 @@ class DetectabilityStudy(BaseEstimator):
         self.worlds_ = None
         if worlds.parts:
             with stages.stage(f"{len(worlds.seeds)} worlds"):
-                left = replace(
-                    simulation, candidates={k: v for k, v in candidates.items() if k not in judgement.errors}
-                )
+                left = simulation.without(judgement.errors)
                 self.worlds_ = WorldRates.of(left, judgement, worlds, self.n_jobs, max(self.verbose - 1, 0))
         rows = judgement.ask(
             candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
         )
+        self._keep(judgement, candidates, scenarios, list(rows))
+        self.confidence_ = confidence
+        table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
+        columns = list(next(iter(rows.values()))[0])
+        results = pd.DataFrame([row for some in table for row in some], columns=columns)
+        self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
+        self.uncertainty_ = None if self.worlds_ is None else self.worlds_.table()
+        self._warn_of_many_false_alarms()
+        return self.results_
+
+    def _keep(
+        self,
+        judgement: Judgement,
+        candidates: Mapping[str, Candidate],
+        scenarios: list[BaseScenario],
+        rows: Sequence[str],
+    ) -> None:
+        """Keep what the detectors that have not failed decided, and the errors of the others."""
         self.errors_ = {name: f"{type(error).__name__}: {error}" for name, error in judgement.errors.items()}
-        self.scenarios_, self.confidence_ = scenarios, confidence
+        self.scenarios_ = scenarios
         self.detectors_ = {name: candidates[name].detector for name in rows}
         self.thresholds_ = {name: candidates[name].threshold for name in rows}
         self.arrangements_ = {name: candidates[name].arrangement for name in rows}
@@ -327,13 +343,6 @@ class DetectabilityStudy(BaseEstimator):
         self.decisions_ = {(one.detector, one.scenario.name, one.source): one.decisions for one in records}
         self.transitions_ = {key: np.array(found) for key, found in judgement.transitions.items() if key[0] in rows}
         self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
-        table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
-        columns = list(next(iter(rows.values()))[0])
-        results = pd.DataFrame([row for some in table for row in some], columns=columns)
-        self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
-        self.uncertainty_ = None if self.worlds_ is None else self.worlds_.table()
-        self._warn_of_many_false_alarms()
-        return self.results_
 
     def pod_curve(
         self, family: str, source: str = "data-informed", *, log: bool = False, detector: str | None = None
