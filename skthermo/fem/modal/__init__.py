@@ -1,5 +1,6 @@
 """Eigenproblems, tracking of modes by their shapes, and derivatives of modes."""
 
+from skthermo.fem.modal._condensation import CondensationSolver, batch_solver
 from skthermo.fem.modal._dense import EigenSolver, dense_solver, hertz
 from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
 from skthermo.fem.modal._mac import mac
@@ -12,9 +13,11 @@ from skthermo.fem.modal._stability import check_supported, count_modes
 from skthermo.fem.modal._tracking import may_be_missed, pair_modes, repeated_modes
 
 __all__ = [
+    "CondensationSolver",
     "EigenSolver",
     "LocalModes",
     "ShiftInvertSolver",
+    "batch_solver",
     "check_supported",
     "count_modes",
     "dense_solver",
