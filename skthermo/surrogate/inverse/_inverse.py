@@ -152,10 +152,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     lower with four sensors than from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of
     30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
 
-    A ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes for each simulation, more with ``dofs``, the regressor, and
-    ``8 * (2 n_parameters + n_modes + 1) + n_parameters + 1`` bytes for each training record and each set of training
-    records: 35 kB for a year of days of the truss. ``joblib.Memory(folder).reduce_size(bytes_limit="1G")`` removes
-    what has not been used for longest.
+    For each simulation, a ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes, more with ``dofs``, and for each
+    training record in each set of training records ``8 * (2 n_parameters + n_modes + 1) + n_parameters + 1`` bytes: 46
+    kB for a year of days of the truss. ``joblib.Memory(folder).reduce_size(bytes_limit="1G")`` removes what has not
+    been used for longest.
 
     References
     ----------
