@@ -19,6 +19,7 @@ from skthermo.fem.modal import (
     dense_solver,
     hertz,
     may_be_missed,
+    may_differ,
     pair_modes,
     repeated_modes,
     shape_derivatives,
@@ -75,7 +76,7 @@ class AffineCore:
     ranks: NDArray[np.intp]
     track: bool
     available: int  # how many modes the mass allows and the solver finds
-    guards: int = GUARD_MODES  # how many modes above the lowest are examined first where columns are followed
+    guards: int = GUARD_MODES  # how many modes above the lowest are computed first where columns are followed
     healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
 
     @classmethod
@@ -295,9 +296,12 @@ class AffineCore:
         order = pair_modes(mac, self.nominal.repeated)
         frequencies = np.take_along_axis(hertz(eigenvalues), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
-        doubtful = may_be_missed(mac, order, self.nominal.repeated)
+        if n_candidates < self.first_candidates:
+            doubtful, more = may_differ(mac, order, self.nominal.repeated), self.first_candidates
+        else:
+            doubtful, more = may_be_missed(mac, order, self.nominal.repeated), 2 * n_candidates
         if n_candidates < self.max_candidates and doubtful.any():
-            more = min(2 * n_candidates, self.max_candidates)
+            more = min(more, self.max_candidates)
             frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], more)
         return frequencies, shapes
 

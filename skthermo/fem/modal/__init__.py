@@ -11,7 +11,7 @@ from skthermo.fem.modal._shape_components import shape_components
 from skthermo.fem.modal._shape_derivatives import shape_derivatives
 from skthermo.fem.modal._shift_invert import ShiftInvertSolver
 from skthermo.fem.modal._stability import check_supported, count_modes
-from skthermo.fem.modal._tracking import may_be_missed, pair_modes, repeated_modes
+from skthermo.fem.modal._tracking import may_be_missed, may_differ, pair_modes, repeated_modes
 
 __all__ = [
     "CondensationSolver",
@@ -27,6 +27,7 @@ __all__ = [
     "mac",
     "match_modes",
     "may_be_missed",
+    "may_differ",
     "pair_modes",
     "repeated_modes",
     "shape_components",
