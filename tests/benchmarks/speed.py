@@ -4,12 +4,12 @@
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py --before 807a281 --rows lags study --digits
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py --rows table
 
-``works.py`` has the works. Each runs in a process of its own, by turns with the code of this folder and with that of
-another revision, which ``git archive`` puts into a temporary folder. Printed are medians of processor seconds (worker
-processes included), how many times faster it is now, and the largest peak memory. "beside" is a loop of
-``scipy.sparse.linalg.eigsh`` over the same matrices, for lags ``pandas.concat`` of shifts, in the same process; "at
-37 ms" are the seconds on a machine on which one turn of that loop over the building frame takes 37 ms. A work that
-takes longer than ``--limit`` is stopped. Rows that need data which SKTHERMO_DATA does not hold are left out.
+``works.py`` has the works. Each runs in a process of its own, by turns with a copy of the code of this folder and of
+another revision. Printed are medians of processor seconds (worker processes included), how many times faster it is now,
+and the largest peak memory. "beside" is a loop of ``scipy.sparse.linalg.eigsh`` over the same matrices, for lags
+``pandas.concat`` of shifts, in the same process; "at 37 ms" are the seconds on a machine on which one turn of that loop
+over the building frame takes 37 ms. A work that takes more processor seconds than ``--limit`` is stopped. Rows that
+need data which SKTHERMO_DATA does not hold are left out.
 
 The exit code is 1 if something beside the table's rows has become slower by more than 10 %: if even the fastest round
 takes more than 1.1 times the median of before; and, with ``--digits``, if results differ by more than is allowed.
@@ -20,6 +20,8 @@ import contextlib
 import difflib
 import json
 import os
+import resource
+import shutil
 import signal
 import statistics
 import subprocess
@@ -35,7 +37,7 @@ ROOT = HERE.parents[1]
 GOOD_LOOP = 0.037  # seconds of one solve of the building frame by eigsh on a good machine
 SLOWER = 1.1
 
-ROOMS = "fem preprocessing surrogate updating detection metrics datasets studies monitoring fleet plotting reporting"
+ROOMS = "fem preprocessing surrogate updating detection metrics datasets studies monitoring plotting reporting"
 IMPORT = """
 import json, resource, sys, time
 import pandas, sklearn.linear_model, sklearn.pipeline
@@ -93,29 +95,37 @@ class Runs:
         return f"stopped at {self.stopped:.0f} s" if self.stopped else f"{self.median():.3g}"
 
 
-@contextlib.contextmanager
-def revision(name):
-    """A folder with the package at this revision."""
-    with tempfile.TemporaryDirectory() as folder:
-        archive = subprocess.run(["git", "archive", name, "skthermo"], cwd=ROOT, check=True, capture_output=True).stdout
+def copy_of(revision, folder):
+    """A folder with the package at this revision, or as it is here now, ready as if it were installed."""
+    folder.mkdir()
+    if revision:
+        command = ["git", "archive", revision, "skthermo"]
+        archive = subprocess.run(command, cwd=ROOT, check=True, capture_output=True).stdout
         subprocess.run(["tar", "-x", "-C", folder], input=archive, check=True)
-        subprocess.run([sys.executable, "-m", "compileall", "-q", folder], check=True)
-        yield Path(folder)
+    else:
+        shutil.copytree(ROOT / "skthermo", folder / "skthermo")
+    subprocess.run([sys.executable, "-m", "compileall", "-q", folder], check=True)
+    return folder
 
 
 def run(command, package, limit):
-    """What a script prints with this state of the package; None beyond the limit. Stops the script's children too."""
+    """What a script prints with this state of the package; None if it takes more processor seconds than the limit."""
     environment = os.environ | {"PYTHONPATH": str(package), "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
-    with subprocess.Popen([sys.executable, *command], env=environment, cwd=package, **options) as process:
-        try:
-            output, errors = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            return None
-    if process.returncode:
-        raise RuntimeError(errors.strip().splitlines()[-1] if errors.strip() else f"exit code {process.returncode}")
-    return output
+    seconds = int(limit)
+    done = subprocess.run(
+        [sys.executable, *command],
+        env=environment,
+        cwd=package,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5)),
+    )
+    if -done.returncode in (signal.SIGXCPU, signal.SIGKILL):
+        return None
+    if done.returncode:
+        errors = done.stderr.strip().splitlines()
+        raise RuntimeError(errors[-1] if errors else f"exit code {done.returncode}")
+    return done.stdout
 
 
 def one_round(name, package, options, results=None):
@@ -237,10 +247,10 @@ def chosen(names):
     return [row for row in dict.fromkeys(rows) if row not in left_out]
 
 
-def loop_seconds(options):
+def loop_seconds(package, options):
     """Seconds of one solve of the building frame by eigsh, here."""
     try:
-        return json.loads(run([HERE / "works.py", "loop"], ROOT, options.limit).splitlines()[-1])["seconds"]
+        return json.loads(run([HERE / "works.py", "loop"], package, options.limit).splitlines()[-1])["seconds"]
     except RuntimeError:
         return float("nan")
 
@@ -251,7 +261,7 @@ def main():
     parser.add_argument("--rows", nargs="+", default=["table", "elsewhere", "imports"], help="rows or parts of them")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--long", type=float, default=40.0, help="seconds after which no further round begins")
-    parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a run is stopped")
+    parser.add_argument("--limit", type=float, default=300.0, help="processor seconds after which a run is stopped")
     parser.add_argument("--quick", action="store_true", help="small works")
     parser.add_argument("--digits", action="store_true", help="differences of the results, and tables of scripts")
     options = parser.parse_args()
@@ -260,17 +270,16 @@ def main():
     rows = chosen(options.rows)
     slower, digits, is_off = [], [], False
     with contextlib.ExitStack() as stack:
-        packages = {"now": ROOT}
-        if options.before:
-            packages = {"before": stack.enter_context(revision(options.before)), **packages}
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        states = {"before": options.before, "now": None} if options.before else {"now": None}
+        packages = {state: copy_of(revision, folder / state) for state, revision in states.items()}
         print(
             f"{'':18} {'before, s':>16} {'now, s':>16} {'faster':>9} {'beside':>8} {'at 37 ms':>10} {'MB':>8} {'MB':>8}"
             "  asked"
         )
         for row in rows:
             runs, files = measure(row, packages, options, folder)
-            print(line(row, runs, loop_seconds(options)), flush=True)
+            print(line(row, runs, loop_seconds(packages["now"], options)), flush=True)
             for state, found in runs.items():
                 if found.failed:
                     print(f"{'':18} {state}: {found.failed}")
