@@ -178,7 +178,7 @@ BOUND = [  # estimators and what they learn from
     (ModelUpdater(TRUSS), (TRUSS.frequencies([[1.05, 0.97, 1.02, 1]]),)),
     (ModeTracker((NOMINAL, SHAPES)), ()),
 ]
-STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0)
+STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0, uncertainty="noise")
 MONITOR = Monitor(MahalanobisDetector(), targets=["f1", "f2"])  # takes frames on a DatetimeIndex only
 YEAR = pd.DataFrame(
     np.random.default_rng(0).normal([10, 4, 9], 0.1, (400, 3)),
