@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 from sklearn import config_context
 from sklearn.base import BaseEstimator, clone
-from sklearn.covariance import EllipticEnvelope
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
 from sklearn.impute import KNNImputer
@@ -103,7 +102,6 @@ ESTIMATORS = [
     OutlierDetector(IsolationForest(n_estimators=5, random_state=0)),
     OutlierDetector(OneClassSVM()),
     OutlierDetector(LocalOutlierFactor(5, novelty=True)),
-    OutlierDetector(EllipticEnvelope(support_fraction=1.0, random_state=0)),
     TemperatureCompensator(Ridge(), targets=[1]),
     TemperatureCompensator(Ridge(), targets=[1], scale="global"),
     TemperatureCompensator(Ridge(), targets=[1], scale="local"),
