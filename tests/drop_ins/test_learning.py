@@ -99,7 +99,7 @@ def test_optuna(folder):
     assert len(values) == 3
     assert recipe["best"].inverse.noise == recipe["study"].best_params["noise"]
     assert recipe["study"].best_value == max(values) > 0.3
-    assert (folder / "simulations").is_dir()
+    assert (folder / "known").is_dir()
 
     names = {"noise": "inverse__noise", "alpha": "mapper__regressor__alpha"}
     tried = [{names[name]: [value] for name, value in trial.params.items()} for trial in recipe["study"].trials[:2]]
