@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import sklearn
+
 import skthermo
 
 TARGET = 0.01
