@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import scipy.io
+import scipy.signal  # which the library loads once it is used
 import scipy.sparse.linalg
 from bridges import frame_bridge
 from hourly_year import hourly_year
