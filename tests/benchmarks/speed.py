@@ -213,11 +213,11 @@ def differences(name, files):
 def compare_scripts(packages, options):
     """What scripts of tables print with each state of the code."""
     is_off = False
-    for script, arguments in SCRIPTS.items():
+    for script in options.scripts:
         printed = {}
         for state, package in packages.items():
             try:
-                output = run([HERE / script, *arguments], package, 10 * options.limit)
+                output = run([HERE / script, *SCRIPTS[script]], package, 10 * options.limit)
             except RuntimeError as error:
                 output = f"failed: {error}"
             printed[state] = (output or "stopped").splitlines()
@@ -264,6 +264,7 @@ def main():
     parser.add_argument("--limit", type=float, default=300.0, help="processor seconds after which a run is stopped")
     parser.add_argument("--quick", action="store_true", help="small works")
     parser.add_argument("--digits", action="store_true", help="differences of the results, and tables of scripts")
+    parser.add_argument("--scripts", nargs="*", default=[*SCRIPTS], choices=[*SCRIPTS], help="tables to compare")
     options = parser.parse_args()
     if options.digits and not options.before:
         parser.error("--digits compares with another revision: expected --before REF")
@@ -291,8 +292,7 @@ def main():
                 is_off |= is_too_far
         if options.digits:
             print("\nLargest relative differences of results", *digits, sep="\n")
-            if not options.quick:
-                is_off |= compare_scripts(packages, options)
+            is_off |= compare_scripts(packages, options)
     if options.before:
         print(f"\nslower by more than 10 %: {', '.join(slower) or 'nothing'}")
     return 1 if slower or is_off else 0
