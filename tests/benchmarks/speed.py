@@ -258,6 +258,7 @@ def loop_seconds(package, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--before", metavar="REF", help="a git revision to compare with")
+    parser.add_argument("--now", metavar="REF", help="a git revision in place of the code of this folder")
     parser.add_argument("--rows", nargs="+", default=["table", "elsewhere", "imports"], help="rows or parts of them")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--long", type=float, default=40.0, help="seconds after which no further round begins")
@@ -272,7 +273,7 @@ def main():
     slower, digits, is_off = [], [], False
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        states = {"before": options.before, "now": None} if options.before else {"now": None}
+        states = {"before": options.before, "now": options.now} if options.before else {"now": options.now}
         packages = {state: copy_of(revision, folder / state) for state, revision in states.items()}
         print(
             f"{'':18} {'before, s':>16} {'now, s':>16} {'faster':>9} {'beside':>8} {'at 37 ms':>10} {'MB':>8} {'MB':>8}"
