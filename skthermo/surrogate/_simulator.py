@@ -1,6 +1,6 @@
 """Frequencies of many rows of parameters, by the reduced model inside its box and the full model outside."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,13 @@ def tolerance(model: FEModel, reduce: bool | float) -> float | None:
     return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
 
 
+def box_around(theta: Array) -> Array:
+    """Lowest and highest of each parameter in rows of theta, with a margin; (n_parameters, 2)."""
+    lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
+    margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
+    return np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+
+
 @dataclass(frozen=True)
 class Simulator:
     """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2)."""
@@ -39,15 +46,42 @@ class Simulator:
     tol: float = DEFAULT_TOLERANCE
 
     @classmethod
-    def around(cls, model: FEModel, theta: Array, reduce: bool | float) -> "Simulator":
-        """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta."""
+    def around(
+        cls, model: FEModel, theta: Array, reduce: bool | float, others: Iterable["Simulator"] = ()
+    ) -> "Simulator":
+        """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
+
+        One of the others is taken if its reduced model is of the same model, as accurate, and covers that box.
+        """
         tol = tolerance(model, reduce)
         if tol is None:
             return cls(model)
-        lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
-        margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
-        box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+        box = box_around(theta)
+        for other in others:
+            if other.model is model and other.covers(box) and other.tol <= tol:
+                return other
         return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+
+    def covers(self, box: Array) -> bool:
+        """Whether the reduced model is accurate within a whole box."""
+        if self.box is None:
+            return False
+        return bool((self.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= self.box[:, 1]).all())
+
+    def extended(self, theta: Array, limits: Array) -> "Simulator":
+        """The simulator whose reduced model also covers a box around rows of theta, within limits (n_parameters, 2)."""
+        if self.box is None or not self.outside(theta).any():
+            return self
+        wanted = box_around(theta)
+        lowest = np.minimum(self.box[:, 0], np.maximum(wanted[:, 0], limits[:, 0]))
+        highest = np.maximum(self.box[:, 1], np.minimum(wanted[:, 1], limits[:, 1]))
+        box = np.column_stack([lowest, highest])
+        return Simulator(self.model, self.reduced.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+
+    @property
+    def approximate(self) -> "Simulator":
+        """The simulator that takes the reduced model, if there is one, outside its box as well."""
+        return self if self.reduced is None else Simulator(self.reduced.quiet())
 
     def changed(self, method: str, *args: Any, **options: Any) -> "Simulator":
         """The simulator of the structure that a method of the model gives, such as "damaged"."""
@@ -86,7 +120,7 @@ class Simulator:
         if self.reduced is None:
             self._hint(len(theta))
             return evaluate(self.model, theta, n_jobs=n_jobs)
-        outside = self._outside(theta)
+        outside = self.outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
         if outside.any():
@@ -107,7 +141,7 @@ class Simulator:
         With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta. If ``relative``,
         derivatives are d ln f / d ln theta and d phi / d ln theta.
         """
-        outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
+        outside = self.outside(theta)
         results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if rows.any():
@@ -125,7 +159,10 @@ class Simulator:
                     result[rows] = array
         return tuple(results)
 
-    def _outside(self, theta: Array) -> NDArray[np.bool_]:
+    def outside(self, theta: Array) -> NDArray[np.bool_]:
+        """Which rows the full model solves: those outside the box of the reduced model; all without one."""
+        if self.box is None:
+            return np.ones(len(theta), dtype=bool)
         lowest, highest = self.box.T
         return ((theta < lowest) | (theta > highest)).any(axis=1)
 

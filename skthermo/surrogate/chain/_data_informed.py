@@ -47,6 +47,7 @@ from skthermo.surrogate.chain._parts import (
     default_part,
     inputs_of_last_step,
     read_records,
+    simulators_in,
     surrogates_in,
     with_quick_start,
 )
@@ -258,7 +259,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
             self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
             self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-            self.simulator_ = Simulator.around(self.model, learned, self.reduce)
+            self.simulator_ = Simulator.around(self.model, learned, self.reduce, simulators_in(self.inverse_))
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())

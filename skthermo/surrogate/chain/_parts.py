@@ -15,6 +15,7 @@ from skthermo._frames import check_columns, check_same_rows, check_temperatures,
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
@@ -73,6 +74,8 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
                 f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                 f"{chain.model!r} has"
             )
+        if chain.reduce and not part.reduce and hasattr(part.model, "reduced"):
+            part.set_params(reduce=chain.reduce)
     random_state = seeded(chain.random_state)
     for part in (inverse, mapper, aligner, imputer):
         if part is not None:
@@ -96,6 +99,11 @@ def with_quick_start(chain: Any, model: Any) -> Any:
 def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:
     """Every `InverseSurrogate` that an inverse is or holds."""
     return (part for part in (inverse, *inverse.get_params().values()) if isinstance(part, InverseSurrogate))
+
+
+def simulators_in(inverse: Any) -> Iterator[Simulator]:
+    """The models, reduced or not, that fitted surrogates of an inverse are refined on."""
+    return (part.simulator_ for part in surrogates_in(inverse) if hasattr(part, "simulator_"))
 
 
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:

@@ -263,9 +263,11 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             self._learn_pairs(X, y, seed, stages)
         if self.n_steps_:
             with stages.stage("scatter of the records"):
-                self.refinement_ = Refinement.of(self)
                 measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
-                self.scatter_ = self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+                guess = self._estimate(measured)[0]
+                self.refinement_ = Refinement.of(self).adapted(measured, guess)
+                self.simulator_ = self.refinement_.simulator
+                self.scatter_ = self.refinement_.estimated_scatter(measured, guess)
         stages.end()
         return self
 

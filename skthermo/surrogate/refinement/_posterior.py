@@ -142,6 +142,12 @@ class Local:
         """How much a step would lower the objective if it were quadratic."""
         return -(self.gradient * step).sum(axis=1) - 0.5 * np.einsum("sp,spq,sq->s", step, self.hessian, step)
 
+    def moved(self, step: Array, missing: NDArray[np.bool_]) -> "Local":
+        """These rows after a small step: residuals and objective are those of the linearised model."""
+        residual = self.residual - np.einsum("smp,sp->sm", self.sensitivity, step)
+        value = self.value - self.gain(step)
+        return replace(self, x=self.x + step, value=value, residual=np.where(missing, 0.0, residual))
+
     def put(self, rows: NDArray, other: "Local") -> None:
         """Replace some rows."""
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
