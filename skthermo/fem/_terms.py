@@ -2,12 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix, as_dense
+from skthermo.fem._factors import Elimination
 from skthermo.fem._theta import ROWS_PER_CHUNK
 
 SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
@@ -160,6 +163,35 @@ class DenseTerms(AffineTerms):
         return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
 
 
+@dataclass(frozen=True, eq=False)
+class SparsityPattern:
+    """Places of the entries of a sparse matrix, as compressed sparse columns."""
+
+    rows: NDArray[np.int32]
+    pointers: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _freeze(self.rows, self.pointers)
+
+    @property
+    def n_dof(self) -> int:
+        return len(self.pointers) - 1
+
+    @property
+    def columns(self) -> NDArray[np.int32]:
+        """The column of each entry."""
+        return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """The order in which matrices of this pattern are factorised."""
+        return Elimination(self.rows, self.pointers)
+
+    def matrix(self, data: Array) -> scipy.sparse.csc_array:
+        """The matrix with these entries."""
+        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
+
+
 class SparseTerms(AffineTerms):
     """Terms on the union of their sparsity patterns: ``entries`` is (n_union, n_terms), one column for each matrix.
 
@@ -172,16 +204,15 @@ class SparseTerms(AffineTerms):
     def __init__(
         self,
         entries: scipy.sparse.csc_array,
-        pattern: tuple[NDArray[np.int32], NDArray[np.int32]],
+        pattern: SparsityPattern,
         exponents: NDArray[np.int64],
         factors: Array | None = None,
     ):
         super().__init__(exponents, factors)
         self.entries = entries
-        self.rows, self.pointers = pattern
-        self.n_dof = len(self.pointers) - 1
-        self._columns = np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
-        _freeze(entries.data, entries.indices, entries.indptr, *pattern, self.exponents, self.factors)
+        self.pattern = pattern
+        self.n_dof = pattern.n_dof
+        _freeze(entries.data, entries.indices, entries.indptr, self.exponents, self.factors)
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
@@ -193,36 +224,36 @@ class SparseTerms(AffineTerms):
         values = np.concatenate([part.data for part in parts])
         entries = scipy.sparse.csc_array((values, (position, term)), shape=(len(union), len(parts)))
         pointers = np.searchsorted(union, np.arange(n_dof + 1) * n_dof)
-        return cls(entries, ((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
+        return cls(entries, SparsityPattern((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
 
     @property
     def n_entries(self) -> int:
-        return len(self.rows)
+        return len(self.pattern.rows)
 
     def assemble(self, theta: Array) -> list[scipy.sparse.csc_array]:
-        shape = (self.n_dof, self.n_dof)
         sums = self.entries @ self.coefficients(theta).T
-        return [scipy.sparse.csc_array((data, self.rows, self.pointers), shape=shape) for data in sums.T.copy()]
+        return [self.pattern.matrix(data) for data in sums.T.copy()]
 
     def weighted_sum(self, weights: Array) -> scipy.sparse.csc_array:
         used = self.entries[:, np.flatnonzero(weights)]
-        data = used @ weights[weights != 0]
-        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
+        return self.pattern.matrix(used @ weights[weights != 0])
 
     def quadratic_forms(self, shapes: Array) -> Array:
-        forms = [self.entries.T @ (shape[self.rows] * shape[self._columns]) for shape in shapes]
+        columns = self.pattern.columns
+        forms = [self.entries.T @ (shape[self.pattern.rows] * shape[columns]) for shape in shapes]
         return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
 
     def scaled(self, factors: Array) -> "SparseTerms":
-        return SparseTerms(self.entries, (self.rows, self.pointers), self.exponents, self.factors * factors)
+        return SparseTerms(self.entries, self.pattern, self.exponents, self.factors * factors)
 
     def with_exponents(self, exponents: NDArray[np.int64]) -> "SparseTerms":
-        return SparseTerms(self.entries, (self.rows, self.pointers), exponents, self.factors)
+        return SparseTerms(self.entries, self.pattern, exponents, self.factors)
 
     @property
     def each_matrix(self) -> list[Matrix]:
         terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
-        places = ((term.data, (self.rows[term.row], self._columns[term.row])) for term in terms)
+        rows, columns = self.pattern.rows, self.pattern.columns
+        places = ((term.data, (rows[term.row], columns[term.row])) for term in terms)
         return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
 
     def projected(self, basis: Array) -> DenseTerms:

@@ -1,5 +1,6 @@
 """Eigenproblems, tracking of modes by their shapes, and derivatives of modes."""
 
+from skthermo.fem._factors import factorise
 from skthermo.fem.modal._dense import EigenSolver, dense_solver, hertz
 from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
 from skthermo.fem.modal._mac import mac
@@ -7,7 +8,7 @@ from skthermo.fem.modal._matching import match_modes
 from skthermo.fem.modal._reordering import share_reordered
 from skthermo.fem.modal._shape_components import shape_components
 from skthermo.fem.modal._shape_derivatives import shape_derivatives
-from skthermo.fem.modal._shift_invert import ShiftInvertSolver, factorise
+from skthermo.fem.modal._shift_invert import ShiftInvertSolver
 from skthermo.fem.modal._stability import check_supported, count_modes
 from skthermo.fem.modal._tracking import may_be_missed, pair_modes, repeated_modes
 

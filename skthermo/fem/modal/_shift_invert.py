@@ -7,7 +7,9 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array
+from skthermo.fem._factors import Factors
 from skthermo.fem._terms import SparseTerms
+from skthermo.fem.modal._near_modes import modes_near
 
 GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
 FEW_MASSES = 20
@@ -25,6 +27,7 @@ class ShiftInvertSolver:
         self._stiffness = stiffness
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)
+        self._factorise = stiffness.pattern.elimination.factorise
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
         return self._each(theta, n_modes, with_shapes=False)[0]
@@ -32,29 +35,44 @@ class ShiftInvertSolver:
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
         return self._each(theta, n_modes, with_shapes=True)
 
+    def modes_near(self, theta: Array, guesses: Array, n_modes: int, *, tol: float) -> tuple[Array, Array]:
+        """The same as ``modes``, to a relative error ``tol`` of the eigenvalues, faster from good guesses of shapes.
+
+        Guesses (n_samples, n_dof, n_guesses) are for at least as many modes; rows that they do not help are solved as
+        by ``modes``.
+        """
+        return self._each(theta, n_modes, with_shapes=True, guesses=guesses, tol=tol)
+
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
         return ShiftInvertSolver(self._stiffness.scaled(factors), self._mass)
 
-    def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
+    def _each(
+        self, theta: Array, n_modes: int, *, with_shapes: bool, guesses: Array | None = None, tol: float = 0.0
+    ) -> tuple[Array, Array]:
         eigenvalues = np.full((len(theta), n_modes), np.nan)
         shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
         pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
         for row, (stiffness, mass) in enumerate(pairs):
-            eigenvalues[row], vectors = lowest_modes(stiffness, factorise(stiffness), mass, n_modes, self._start)
+            factors, found = self._factorise(stiffness), None
+            if factors is not None and guesses is not None:
+                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=tol)
+            if found is None:
+                found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
+            eigenvalues[row] = found[0]
             if with_shapes:
-                shapes[row] = vectors
+                shapes[row] = found[1]
         return eigenvalues, shapes
 
     def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
         stiffness, mass = self._stiffness.assemble(theta)[0], self._mass.assemble(theta)[0]
-        factors = factorise(stiffness)
+        factors = self._factorise(stiffness)
         eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
         return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
 
 
 def lowest_modes(
     stiffness: scipy.sparse.csc_array,
-    factors: scipy.sparse.linalg.SuperLU | None,
+    factors: Factors | None,
     mass: scipy.sparse.csc_array,
     n_modes: int,
     start: Array,
@@ -82,7 +100,7 @@ def lowest_modes(
 
 
 def modes_of_few_masses(
-    factors: scipy.sparse.linalg.SuperLU, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int
+    factors: Factors, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int
 ) -> Array:
     """Lowest shapes, up to their scale, from the dense flexibility R' K^-1 R of the mass M = R R'.
 
@@ -93,17 +111,6 @@ def modes_of_few_masses(
     root[massive] = directions * np.sqrt(np.maximum(weights, 0.0))
     flexible = factors.solve(root)
     return flexible @ np.linalg.eigh(root.T @ flexible)[1][:, ::-1][:, :n_modes]
-
-
-def factorise(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU | None:
-    """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
-    try:
-        factors = scipy.sparse.linalg.splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError:  # exactly singular
-        return None
-    return factors if (factors.U.diagonal() > 0).all() else None
 
 
 def seeded_start(n_dof: int) -> Array:

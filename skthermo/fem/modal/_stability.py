@@ -7,7 +7,8 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix, as_dense
-from skthermo.fem.modal._shift_invert import factorise, seeded_start
+from skthermo.fem._factors import factorise
+from skthermo.fem.modal._shift_invert import seeded_start
 
 EPS = np.finfo(float).eps
 
