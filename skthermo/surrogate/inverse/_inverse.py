@@ -277,9 +277,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             with stages.stage("scatter of the records"):
                 measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
                 guess = self._estimate(measured)[0]
-                self.refinement_ = Refinement.of(self).adapted(measured, guess)
+                self.inversions_ = Inversions.of(self.memory, Refinement.of(self), measured, guess)
+                self.refinement_ = self.inversions_.refinement
                 self.simulator_ = self.refinement_.simulator
-                self.inversions_ = Inversions.of(self.memory, self.refinement_, measured)
                 self.scatter_ = self.inversions_.scatter(measured, guess)
         stages.end()
         return self
