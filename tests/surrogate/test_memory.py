@@ -184,8 +184,9 @@ class TestNothingStale:
         before = kept(filled, "inversion")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            known, fresh = (found(memory, records, **options) for memory in (str(filled), None))
+            known, again, fresh = (found(memory, records, **options) for memory in (str(filled), str(filled), None))
         assert_same(known, fresh)
+        assert_same(again, fresh)
         assert kept(filled, "inversion") == before + 1
 
     @pytest.mark.parametrize("module", ["skthermo", "sklearn"])
