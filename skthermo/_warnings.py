@@ -26,6 +26,7 @@ _given: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
 _told: ContextVar[frozenset[str]] = ContextVar("kinds of warnings that an estimator around gives", default=frozenset())
 _found: ContextVar[dict[str, Any] | None] = ContextVar("findings of a check by content of its tables", default=None)
 ALL = "all"  # key of findings that stand for those of all records within
+Told = tuple[type[Warning], str, str, int]  # category, text, file and line of a warning
 _explained: dict[int, tuple[Any, NDArray[np.bool_]]] = {}
 """Tables by identity while they exist, and their rows without a value of which a warning has given the cause."""
 
@@ -165,6 +166,31 @@ def warnings_of_detector(name: str | None) -> Iterator[None]:
     for one in marked:
         one.message.detector = name
         warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+
+
+@contextmanager
+def recorded() -> Iterator[list[Told]]:
+    """Keep the warnings of what runs inside in a list, for `give_again`; outside the main thread they pass as they are,
+    because filters belong to the whole process."""
+    told: list[Told] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield told
+        return
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield told
+    finally:
+        told += [(one.category, str(one.message), one.filename, one.lineno) for one in caught]
+
+
+def give_again(told: Iterable[Told]) -> None:
+    """Give warnings that were recorded, those for users at the user's line of now."""
+    for category, text, filename, line in told:
+        if category is UserWarning:
+            warn_user(text, f"again: {text}")
+        else:
+            warnings.warn_explicit(text, category, filename, line)
 
 
 @contextmanager

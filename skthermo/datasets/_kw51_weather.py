@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
+import scipy  # which loads scipy.signal once it is used
 from scipy.stats import norm
 
 from skthermo._arrays import Array
@@ -84,8 +84,8 @@ def smooth_noise(n_hours: int, n_columns: int, hours: float, random: np.random.R
     decay = np.exp(-1 / hours)
     settled = int(10 * hours)
     noise = random.standard_normal((settled + n_hours, n_columns))
-    once = lfilter([1 - decay], [1, -decay], noise, axis=0)
-    twice = lfilter([1 - decay], [1, -decay], once, axis=0)[settled:]
+    once = scipy.signal.lfilter([1 - decay], [1, -decay], noise, axis=0)
+    twice = scipy.signal.lfilter([1 - decay], [1, -decay], once, axis=0)[settled:]
     variance = (1 - decay) ** 4 * (1 + decay**2) / (1 - decay**2) ** 3
     return twice / np.sqrt(variance)
 
@@ -94,4 +94,4 @@ def memory(values: Array, hours: float) -> Array:
     """Exponentially weighted mean of the past, which starts settled at the first value."""
     decay = np.exp(-1 / hours)
     start = np.array([decay * values[0]])
-    return lfilter([1 - decay], [1, -decay], values, zi=start)[0]
+    return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=start)[0]

@@ -8,6 +8,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
+from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
@@ -18,6 +19,7 @@ from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Estimator, check_array, seed_parts, validate_data
 from skthermo.metrics import complete_r2
+from skthermo.surrogate._memory import remembered
 from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
 
 
@@ -113,8 +115,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         log_inputs: bool,
         coordinates: FrequencyCoordinates | None = None,
         sample_weight: Array | None = None,
+        memory: str | Memory | None = None,
     ) -> None:
-        """Fit on the complete rows of X and y (n_samples, n_parameters)."""
+        """Fit on the complete rows of X and y (n_samples, n_parameters); a memory keeps the regressor."""
         complete = ~(np.isnan(X).any(axis=1) | np.isnan(y).any(axis=1))
         if sample_weight is not None:
             complete &= sample_weight > 0
@@ -132,9 +135,11 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
         targets = self.targets_.transform(y)
-        targets = targets[:, 0] if targets.shape[1] == 1 else targets
+        learned = self.inputs_.transform(X), targets[:, 0] if targets.shape[1] == 1 else targets, weights
         with single_blas_thread():
-            self.regressor_ = fit_outputs(regressor, self.inputs_.transform(X), targets, weights)
+            self.regressor_ = remembered(
+                memory, "regressor", lambda: fit_outputs(regressor, *learned), lambda: (regressor, *learned)
+            )
 
     @abstractmethod
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:

@@ -1,7 +1,5 @@
 """The chain in searches, worker processes and pipelines."""
 
-import warnings
-
 import joblib
 import numpy as np
 import pandas as pd
@@ -14,15 +12,11 @@ from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cros
 
 from skthermo.fem import AffineModel
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.surrogate.chains import TRUSS, F, T, chain, inverse
+from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
-
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    FITTED = chain().fit(T, F)
+FITTED = fitted()
 
 
 LOGGED_MODEL = """
@@ -89,7 +83,7 @@ def test_large_models_are_recognised_in_worker_processes(tmp_path):
     estimator = DataInformedFEM(model, inverse=simulated, mapper=TemperatureMapper(LinearRegression()), random_state=0)
     for n_jobs in (1, 2):
         cross_val_score(estimator, air, measured, cv=2, n_jobs=n_jobs)
-    assert len(list(tmp_path.rglob("output.pkl"))) == 1
+    assert len(list(tmp_path.glob("simulations-*.lock"))) == 1
 
 
 def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # which loads scipy.signal once it is used
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from skthermo._arguments import check_noise, check_size
 from skthermo._arrays import RandomState, as_random_state, real_array
@@ -64,5 +64,5 @@ def add_noise(
     relative = as_random_state(random_state).standard_normal(clean.shape)
     if memory:
         relative[1:] *= np.sqrt(1 - memory**2)
-        relative = lfilter([1.0], [1.0, -memory], relative, axis=0)
+        relative = scipy.signal.lfilter([1.0], [1.0, -memory], relative, axis=0)
     return clean * (1 + deviation * relative)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from numbers import Integral, Real
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 import pandas as pd
+from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -36,7 +38,6 @@ from skthermo._warnings import findings_of, warn_each, warn_user
 from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import check_records
 from skthermo.surrogate._box import Box
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
@@ -46,6 +47,7 @@ from skthermo.surrogate.chain._parts import (
     clone_parts,
     default_part,
     inputs_of_last_step,
+    known_findings,
     read_records,
     surrogates_in,
     with_quick_start,
@@ -88,6 +90,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
         either side. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Rows
         outside the box are solved by the model itself, with a warning that counts them.
+    memory : str or joblib.Memory, optional
+        Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
+        and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
+        chain, makes them once for each set of training records. See ``memory`` of `InverseSurrogate`.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -159,6 +165,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         "aligner": [HasMethods(["fit", "transform", "inverse_transform"]), StrOptions({"passthrough"})],
         "imputer": [HasMethods(["fit_transform"]), StrOptions({"passthrough"})],
         "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
+        "memory": [str, HasMethods(["cache"]), None],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
         "verbose": ["verbose"],
@@ -173,6 +180,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         aligner: BaseEstimator | str = "passthrough",
         imputer: BaseEstimator | str = "passthrough",
         reduce: bool | float = False,
+        memory: str | Memory | None = None,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
         verbose: bool | int = 0,
@@ -183,6 +191,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.aligner = aligner
         self.imputer = imputer
         self.reduce = reduce
+        self.memory = memory
         self.n_jobs = n_jobs
         self.random_state = random_state
         self.verbose = verbose
@@ -240,7 +249,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        findings = findings_of(check_records, T, F)
+        findings = findings_of(partial(known_findings, self.memory), T, F)
         warn_each(mode_warnings(self.model, F))
         stages = Stages(self, 4, X, y)
         with stages.stage("inverse surrogate", self.inverse_):

@@ -13,8 +13,9 @@ from skthermo._arguments import check_model
 from skthermo._arrays import as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
-from skthermo.preprocessing import BiasAligner
+from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.surrogate._mapper import TemperatureMapper
+from skthermo.surrogate._memory import remembered
 from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
@@ -47,6 +48,11 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
     return T, F
 
 
+def known_findings(memory: Any, T: Any, F: Any) -> RecordFindings:
+    """What `check_records` finds, read from the memory if these records were checked before."""
+    return remembered(memory, "checks", lambda: check_records(T, F), lambda: (T, F))
+
+
 def default_part(chain: Any, name: str) -> Any:
     """What inverse and mapper are where they are None; None for other parameters."""
     if name == "inverse":
@@ -68,6 +74,8 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
     for part in surrogates_in(inverse):
         if part.model is None:
             part.set_params(model=chain.model)
+        if part.memory is None:
+            part.set_params(memory=chain.memory)
         if list(part.model.parameter_names) != names:
             raise ValueError(
                 f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
@@ -84,11 +92,12 @@ def with_quick_start(chain: Any, model: Any) -> Any:
     """An unfitted twin of a fitted chain, with another model, whose refining inverse learns a mere start quickly."""
     twin = clone(chain)
     parts = twin.get_params()
-    twin.set_params(**{name: model for name, part in parts.items() if part is chain.model}, verbose=0)
+    twin.set_params(**{name: model for name, part in parts.items() if part is chain.model}, verbose=0, memory=None)
     inverse = chain.inverse_
     if isinstance(inverse, InverseSurrogate) and inverse.n_steps_:
         most = min(inverse.n_samples, START_SAMPLES)
         start = {"regressor": Ridge(START_PENALTY), "n_samples": most, "narrow_bounds": False, "dofs": None}
+        start["memory"] = None  # others than the chain's own inversions are hardly asked for again
         twin.set_params(**{f"inverse__{name}": value for name, value in start.items()})
     return twin
 

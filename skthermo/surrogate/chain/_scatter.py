@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy  # which loads scipy.signal once it is used
 import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.signal import lfilter
 
 from skthermo._arrays import Array
 
@@ -159,7 +159,7 @@ def _expected(memories: Array, less_similar: Callable[[Array], Array], n_rows: i
     n_drawn = int(np.clip(N_DRAWN // n_rows, 2, MOST_DRAWN))
     start = 500
     shocks = np.random.RandomState(0).standard_normal((start + n_rows, n_drawn))
-    noise = [np.sqrt(1 - m**2) * lfilter([1.0], [1.0, -m], shocks, axis=0)[start:] for m in memories]
+    noise = [np.sqrt(1 - m**2) * scipy.signal.lfilter([1.0], [1.0, -m], shocks, axis=0)[start:] for m in memories]
     rest = np.split(less_similar(np.hstack(noise)), len(memories), axis=1)
     n_pairs = n_drawn * (n_rows - np.arange(n_lags))
     return np.array([_lagged_products(one, n_lags).sum(axis=1) / n_pairs for one in rest])
@@ -190,7 +190,7 @@ def _covariance(correlations: Array, variances: Array) -> Array:
 def _running_sums(values: Array, kept: Array) -> Array:
     """Sums of the values up to each row, of which the share ``kept`` comes from the row before."""
     if (kept[1:] == kept[-1]).all():
-        return np.asarray(lfilter([1.0], [1.0, -kept[-1]], values, axis=0))
+        return np.asarray(scipy.signal.lfilter([1.0], [1.0, -kept[-1]], values, axis=0))
     sums = values.copy()
     for row in range(1, len(sums)):
         sums[row] += kept[row] * sums[row - 1]

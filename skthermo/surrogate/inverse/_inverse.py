@@ -31,6 +31,7 @@ from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
+from skthermo.surrogate.inverse._inversions import Inversions
 from skthermo.surrogate.inverse._training import SimulatedTraining
 from skthermo.surrogate.refinement import Refinement, unconverged
 
@@ -85,9 +86,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         a relative error of 1e-5 in the frequencies; a number sets the error allowed. `inverse_transform` always uses
         the full model.
     memory : str or joblib.Memory, optional
-        Where simulations are stored, so that a search over other settings does not repeat them. If several processes
-        need the same simulations, one makes them and the others wait. With ``random_state=None``, stored simulations
-        are always the same. Clear the memory when the program behind a model of your own changes.
+        Folder for what is computed in `fit` and for the inversion of the records that `fit` saw, so that searches and
+        cross-validation make each only once: simulations and their reduced model, by model, bounds, number and seed;
+        the regressor, by its parameters and what it learns from; the inversion, by the model, the settings of the
+        refinement and the records. Anything that changes gives a new one. If several processes need the same, one makes
+        it and the others wait; warnings come again with what is read. With ``random_state=None``, what is stored is
+        always the same. Clear the memory when the program behind a model or a regressor of your own changes. See Notes.
     n_jobs : int, optional
         Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
@@ -113,6 +117,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         If there is a model: it and, with ``reduce``, its reduced model.
     refinement_ : Refinement
         If estimates are refined: the model, the box and the prior of the steps.
+    inversions_ : Inversions
+        If estimates are refined: those of the records of `fit`, which the memory keeps.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     n_steps_ : int
@@ -145,6 +151,11 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     place of the many components of shapes. Refined on frequencies and shapes, errors of the truss's verticals are 39 %
     lower with four sensors than from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of
     30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
+
+    For each simulation, a ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes, more with ``dofs``, and for each
+    training record in each set of training records ``8 * (2 n_parameters + n_modes + 1) + n_parameters + 1`` bytes: 46
+    kB for a year of days of the truss. ``joblib.Memory(folder).reduce_size(bytes_limit="1G")`` removes what has not
+    been used for longest.
 
     References
     ----------
@@ -249,8 +260,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             If there are more parameters than modes, or modes change their order in more than a tenth of the
             simulations and the model does not track them.
         """
-        random = check_random_state(self.random_state)
-        seed = None if self.random_state is None else random
+        random_state = 0 if self.random_state is None and self.memory is not None else self.random_state
+        random = check_random_state(random_state)
+        seed = None if random_state is None else random
         self.n_steps_ = self._n_steps()
         self.columns_ = InverseColumns.of(self)
         self.shape_inputs_ = self.columns_.shapes
@@ -265,7 +277,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             with stages.stage("scatter of the records"):
                 self.refinement_ = Refinement.of(self)
                 measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
-                self.scatter_ = self.refinement_.estimated_scatter(measured, self._estimate(measured)[0])
+                self.inversions_ = Inversions.of(self.memory, self.refinement_, measured)
+                self.scatter_ = self.inversions_.scatter(measured, self._estimate(measured)[0])
         stages.end()
         return self
 
@@ -365,7 +378,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"refine is {self.refine}, which means no steps for {self.model!r}; expected a positive number of steps"
             )
         inputs = self.columns_.read(self, X)
-        found = self.refinement_.refined(inputs, self._estimate(inputs)[0], self.scatter_)
+        found = self.inversions_.found(inputs, self._estimate(inputs)[0], self.scatter_)
         names = self.get_feature_names_out()
         found.update(theta=frame_like(X, found.theta, names), std=frame_like(X, found.std, names))
         return found
@@ -529,7 +542,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             inputs = self.shape_inputs_.normalised(inputs)
             self.scores_ = ShapeScores(self.shape_inputs_.n_modes, inputs, theta)
             inputs = self.scores_.transform(inputs)
-        self._learn(inputs, theta, seed, log_inputs=True)
+        self._learn(inputs, theta, seed, log_inputs=True, memory=self.memory)
 
     def _estimate(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
         """What the regressor gives for columns that have been read."""

@@ -1,22 +1,18 @@
 """Simulations that the inverse surrogate learns from."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from pickle import PicklingError
+from functools import partial
 from typing import Any
 
-import joblib
 import numpy as np
-from joblib import Memory
 from sklearn.utils import Bunch
-from sklearn.utils.validation import check_memory
 
 from skthermo._arguments import check_noise
 from skthermo._arrays import Array
-from skthermo._io import lock
 from skthermo._warnings import warn_user
 from skthermo.fem import sample, share_reordered
 from skthermo.surrogate._box import Box
+from skthermo.surrogate._memory import remembered
 from skthermo.surrogate._simulator import Simulator, tolerance
 
 ORDER_CHECKS = 256  # number of samples whose modes are looked at for another order
@@ -50,7 +46,7 @@ class SimulatedTraining:
             )
         box = Box.of(inverse.bounds, names)
         tol = tolerance(model, inverse.reduce)
-        samples, share_reordered, reduced = _draw(inverse, model, box, random, tol=tol, fixed_seed=0)
+        samples, share_reordered, reduced = _draw(inverse, model, box, random, tol=tol)
         if share_reordered > MANY_REORDERED:
             warn_user(
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
@@ -69,7 +65,7 @@ class SimulatedTraining:
             )
         box = Box(narrower(self.box.bounds, estimates), self.box.names)
         model = self.simulator.reduced or self.simulator.model
-        samples = _draw(inverse, model, box, random, tol=None, fixed_seed=1)[0]
+        samples = _draw(inverse, model, box, random, tol=None)[0]
         return SimulatedTraining(box, samples, self.simulator)
 
 
@@ -82,39 +78,16 @@ def narrower(bounds: Array, theta: Array) -> Array:
 
 
 def _draw(
-    inverse: Any, model: Any, box: Box, random: np.random.RandomState, *, tol: float | None, fixed_seed: int
+    inverse: Any, model: Any, box: Box, random: np.random.RandomState, *, tol: float | None
 ) -> tuple[Bunch, float, Any]:
-    """Samples, share with modes in another order, reduced model; always the same with a memory and without a seed."""
-    is_remembered = inverse.memory is not None and inverse.random_state is None
-    seed = fixed_seed if is_remembered else random.randint(np.iinfo(np.int32).max)
-    settings = (box.bounds, inverse.n_samples, tol, inverse.dofs, inverse.n_jobs, seed)
-    return remembered_simulations(inverse.memory, model, *settings)
-
-
-def remembered_simulations(memory: str | Memory | None, model: Any, *settings: Any) -> tuple[Bunch, float, Any]:
-    """`simulations`, read from the memory if stored there; of several processes only one makes them."""
-    try:
-        memory = check_memory(memory)
-    except OSError as error:
-        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
-    if memory.location is None:
-        return simulations("", model, *settings)
-    try:
-        identity = joblib.hash(model, coerce_mmap=True)
-    except PicklingError as error:
-        raise ValueError(
-            f"memory cannot recognise {model!r}; expected one that can be pickled, with functions and classes from a "
-            "module that can be imported (no lambda, nothing from a script, a notebook or a function), or memory=None"
-        ) from error
-    folder = Path(memory.location)
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / f"{identity}.lock", "w") as file:
-        lock(file)
-        return memory.cache(simulations, ignore=["model", "n_jobs"])(identity, model, *settings)
+    """Samples, share with modes in another order, reduced model; read from the memory if they are there."""
+    settings = (box.bounds, inverse.n_samples, tol, inverse.dofs, random.randint(np.iinfo(np.int32).max))
+    make = partial(simulations, model, *settings, n_jobs=inverse.n_jobs)
+    return remembered(inverse.memory, "simulations", make, lambda: (model, settings))
 
 
 def simulations(
-    identity: str, model: Any, bounds: Any, n_samples: int, tol: float | None, dofs: Any, n_jobs: Any, seed: int
+    model: Any, bounds: Any, n_samples: int, tol: float | None, dofs: Any, seed: int, *, n_jobs: int | None
 ) -> tuple[Bunch, float, Any]:
     """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None."""
     reduced = None if tol is None else model.reduced(bounds, tol=tol, random_state=seed)

@@ -1,0 +1,325 @@
+"""What a memory keeps: simulations, regressors, inversions and checks, each for what it depends on."""
+
+import shutil
+import warnings
+
+import joblib
+import numpy as np
+import pytest
+from joblib.externals.loky import get_reusable_executor
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.fem import CallableModel
+from skthermo.preprocessing import BiasAligner
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate.refinement import Refinement
+from tests.surrogate.chains import TRUSS
+
+YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+SETTINGS = {"regressor": Ridge(1e-3), "bounds": 0.2, "n_samples": 60, "noise": 0.01, "random_state": 0}
+THETA = np.random.default_rng(0).uniform(0.9, 1.1, (40, 4))
+
+
+def inverse(**options):
+    return InverseSurrogate(**({"model": TRUSS} | SETTINGS | options))
+
+
+def chain(memory, **options):
+    options = {"inverse": inverse(model=None), "mapper": TemperatureMapper(Ridge())} | options
+    return DataInformedFEM(TRUSS, **options, memory=memory, random_state=0)
+
+
+def kept(folder, kind):
+    return len(list(folder.glob(f"{kind}-*.lock")))
+
+
+def found(memory, records, **options):
+    """What the inverse finds, with the noise that it is based on."""
+    fitted = inverse(memory=memory, **options).fit(records)
+    return {"scatter": fitted.scatter_, **fitted.invert(records)}
+
+
+def assert_same(one, other):
+    for name, values in one.items():
+        np.testing.assert_array_equal(values, other[name], name)
+
+
+class TestOnce:
+    def test_a_search_over_the_mapper_inverts_each_set_of_training_records_once(self, tmp_path):
+        grid = {"mapper__regressor": [Ridge(penalty) for penalty in (0.1, 10.0)]}
+        folds = KFold(2, shuffle=True, random_state=0)
+        searches = [
+            GridSearchCV(chain(memory), grid, cv=folds).fit(T, F) for memory in (None, str(tmp_path), str(tmp_path))
+        ]
+        for search in searches[1:]:
+            np.testing.assert_array_equal(*(one.cv_results_["mean_test_score"] for one in (searches[0], search)))
+            np.testing.assert_array_equal(searches[0].predict(T), search.predict(T))
+        numbers = {kind: kept(tmp_path, kind) for kind in ("simulations", "regressor", "inversion", "checks")}
+        assert numbers == {"simulations": 1, "regressor": 1, "inversion": 3, "checks": 3}
+        assert len(list(tmp_path.rglob("output.pkl"))) == sum(numbers.values())
+
+    def test_cross_validation_of_other_mappers_inverts_no_more(self, tmp_path):
+        for mapper in (TemperatureMapper(Ridge()), TemperatureMapper()):
+            fresh, known = (
+                cross_val_score(
+                    chain(memory).set_params(mapper=mapper), T, F, cv=KFold(4, shuffle=True, random_state=0)
+                )
+                for memory in (None, str(tmp_path))
+            )
+            np.testing.assert_array_equal(fresh, known)
+        assert kept(tmp_path, "inversion") == 4
+
+    def test_nothing_is_computed_again(self, tmp_path, monkeypatch):
+        first = found(str(tmp_path), F, noise=0.0)
+        for owner, method in (
+            (Refinement, "refined"),
+            (Refinement, "estimated_scatter"),
+            (Ridge, "fit"),
+            (type(TRUSS), "frequencies"),
+        ):
+            monkeypatch.setattr(owner, method, refuse)
+        assert_same(first, found(str(tmp_path), F, noise=0.0))
+
+    def test_pipelines_that_transform_what_they_were_fitted_to_do_so_once(self, tmp_path):
+        pipeline = make_pipeline(BiasAligner(TRUSS), inverse(memory=str(tmp_path)))
+        first, second = (pipeline.fit(F).transform(F) for _ in range(2))
+        np.testing.assert_array_equal(first, second)
+        assert kept(tmp_path, "inversion") == 1
+
+    def test_processes_that_need_the_same_inversion_make_it_once(self, tmp_path, monkeypatch):
+        (tmp_path / "logged_roots.py").write_text(LOGGED_ROOTS)
+        monkeypatch.syspath_prepend(tmp_path)
+        get_reusable_executor().shutdown()  # its workers do not know the new path
+        from logged_roots import fitted
+
+        alone = fitted(tmp_path / "alone.txt", str(tmp_path / "of one"))
+        together = joblib.Parallel(2)(
+            joblib.delayed(fitted)(tmp_path / "together.txt", str(tmp_path / "of two")) for _ in range(4)
+        )
+        for theta in together:
+            np.testing.assert_array_equal(theta, alone)
+        assert (tmp_path / "together.txt").read_text() == (tmp_path / "alone.txt").read_text()
+
+
+def refuse(*arguments, **options):
+    raise AssertionError("it is computed again")
+
+
+LOGGED_ROOTS = """
+import time
+import numpy as np
+from sklearn.linear_model import Ridge
+from skthermo.fem import CallableModel
+from skthermo.surrogate import InverseSurrogate
+
+
+class Logged(CallableModel):
+    def __init__(self, log):
+        self.log = log
+        super().__init__(self.solve, ("k",), 2, vectorized=True)
+
+    def __reduce__(self):
+        return Logged, (self.log,)
+
+    def solve(self, theta):
+        time.sleep(0.02)  # long enough for the other process to come along
+        with open(self.log, "a") as file:
+            file.write(f"{len(theta)} ")
+        return np.sqrt(theta) * [1.0, 2.0]
+
+
+def fitted(log, memory):
+    records = np.sqrt(np.linspace(0.9, 1.1, 30))[:, np.newaxis] * [1.0, 2.0]
+    inverse = InverseSurrogate(Logged(log), Ridge(), n_samples=20, refine=3, noise=0.01, memory=memory, random_state=0)
+    return inverse.fit(records).transform(records)
+"""
+
+
+OTHERS = {
+    "a record": {"records": F * np.where(np.arange(len(F)) == 7, 1.001, 1.0)[:, np.newaxis]},
+    "a record left out": {"records": F[:-1]},
+    "a gap": {"records": F.where(F.iloc[3, 1] != F)},
+    "steps": {"refine": 2},
+    "noise": {"noise": 0.02},
+    "noise of one mode": {"noise": [0.01, 0.01, 0.01, 0.01, 0.01, 0.02]},
+    "no noise": {"noise": 0.0},
+    "a prior": {"prior": 0.05},
+    "bounds": {"bounds": 0.25},
+    "samples": {"n_samples": 61},
+    "narrow bounds": {"narrow_bounds": True},
+    "a regressor's parameter": {"regressor": Ridge(10.0)},
+    "a reduced model": {"reduce": 1e-4},
+    "sensors": {"dofs": [3, 9], "shapes": True},
+    "other sensors": {"dofs": [3, 11], "shapes": True},
+    "noise of shapes": {"dofs": [3, 9], "shapes": True, "shape_noise": 0.02},
+    "a seed": {"random_state": 1},
+    "a model": {"model": TRUSS.damaged({"bottom": 0.1})},
+    "other modes": {"model": TRUSS.with_modes([0, 1, 2, 3, 5, 4])},
+}
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory):
+    """A memory of another case than the one that is asked for."""
+    folder = tmp_path_factory.mktemp("memory")
+    found(str(folder), F)
+    return folder
+
+
+class TestNothingStale:
+    @pytest.mark.parametrize("what", OTHERS)
+    def test_what_changes_gives_a_new_inversion(self, filled, what):
+        options = dict(OTHERS[what])
+        records = options.pop("records", F)
+        if options.pop("shapes", False):
+            at_sensors = inverse(dofs=options["dofs"]).fit().inverse_transform(THETA)
+            records = at_sensors * np.random.default_rng(1).normal(1, 0.005, at_sensors.shape)
+        before = kept(filled, "inversion")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            known, fresh = (found(memory, records, **options) for memory in (str(filled), None))
+        assert_same(known, fresh)
+        assert kept(filled, "inversion") == before + 1
+
+    @pytest.mark.parametrize("module", ["skthermo", "sklearn"])
+    def test_another_version_computes_anew(self, tmp_path, monkeypatch, module):
+        found(str(tmp_path), F)
+        monkeypatch.setattr(f"{module}.__version__", "another")
+        found(str(tmp_path), F)
+        assert kept(tmp_path, "inversion") == kept(tmp_path, "simulations") == 2
+
+    def test_weights_are_the_mappers_alone(self, tmp_path):
+        weights = np.linspace(0, 1, len(F))
+        for weight in (None, weights, weights[::-1]):
+            known, fresh = (
+                chain(memory).fit(T, F, sample_weight=weight).predict(T) for memory in (str(tmp_path), None)
+            )
+            np.testing.assert_array_equal(known, fresh)
+        assert kept(tmp_path, "inversion") == 1
+
+    def test_damaged_files_are_made_anew(self, tmp_path):
+        first = found(str(tmp_path), F)
+        for file in tmp_path.rglob("output.pkl"):
+            file.write_bytes(file.read_bytes()[:20])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # joblib's, which says so
+            assert_same(first, found(str(tmp_path), F))
+
+
+class TestWarnings:
+    """What a memory reads comes with the warnings that its making gave."""
+
+    def texts(self, make, *arguments):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            make(*arguments)
+        assert all(__file__ == one.filename for one in caught if one.category is UserWarning)
+        return [str(one.message) for one in caught]
+
+    @pytest.mark.parametrize(
+        ("options", "records", "text"),
+        [
+            ({"refine": 1, "noise": 0.0}, F, "did not converge in 1 steps"),
+            ({"bounds": 0.01, "prior": 0.1}, F * 1.1, "parameters far outside the bounds"),
+            ({"regressor": MLPRegressor(hidden_layer_sizes=(8,), max_iter=2)}, F, "Maximum iterations"),
+        ],
+    )
+    def test_of_inverses(self, tmp_path, options, records, text):
+        def make(memory):
+            return inverse(memory=memory, **options).fit(records).transform(records)
+
+        first, again, fresh = (self.texts(make, memory) for memory in (str(tmp_path), str(tmp_path), None))
+        assert first == again == fresh
+        assert any(text in one for one in first)
+
+    def test_of_chains(self, tmp_path):
+        gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.15)
+        first, again, fresh = (
+            self.texts(lambda memory: chain(memory, inverse=inverse(noise=0.0005)).fit(T, gaps), memory)
+            for memory in (str(tmp_path), str(tmp_path), None)
+        )
+        assert first == again == fresh
+        assert any("because of gaps, a record carries" in one for one in first)
+
+    def test_of_models_that_fail(self, tmp_path):
+        model = CallableModel(fails_where_soft, TRUSS.parameter_names, 6)
+        make = [lambda: inverse(model=model, refine=0, memory=str(tmp_path)).fit()] * 2
+        first, again = map(self.texts, make)
+        assert first == again
+        assert any("fails" in one for one in first)
+
+    def test_that_are_errors(self, tmp_path):
+        options = {"regressor": MLPRegressor(hidden_layer_sizes=(8,), max_iter=2), "memory": str(tmp_path)}
+        for _ in range(2):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                with pytest.raises(ConvergenceWarning):
+                    inverse(**options).fit()
+
+
+def fails_where_soft(theta):
+    if theta[0] < 0.85:
+        raise RuntimeError("it fails there")
+    return TRUSS.frequencies(theta[np.newaxis])[0]
+
+
+class TestBounded:
+    def test_records_that_fit_has_not_seen_are_not_kept(self, tmp_path):
+        fitted = inverse(memory=str(tmp_path)).fit(F)
+        before = len(list(tmp_path.rglob("*")))
+        fitted.transform(F[:20])
+        fitted.round_trip()
+        assert len(list(tmp_path.rglob("*"))) == before
+
+    def test_chains_of_other_records_are_not_kept(self, tmp_path):
+        fem = chain(str(tmp_path)).fit(T, F)
+        before = len(list(tmp_path.rglob("*")))
+        other = fem.refitted(T, F * 1.001)
+        assert len(list(tmp_path.rglob("*"))) == before
+        assert not np.array_equal(other.predict(T), fem.predict(T))
+
+    def test_a_memory_that_was_removed_is_not_made_again(self, tmp_path):
+        memory = tmp_path / "memory"
+        fitted = inverse(memory=str(memory)).fit(F)
+        before = fitted.invert(F)
+        shutil.rmtree(memory)
+        assert_same(before, fitted.invert(F))
+        assert not memory.exists()
+
+    def test_a_stated_noise_needs_no_file(self, tmp_path):
+        found(str(tmp_path), F)
+        assert kept(tmp_path, "scatter") == 0
+
+
+@pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
+def test_without_a_seed_what_is_kept_is_always_the_same(tmp_path):
+    first, second, elsewhere = (
+        found(str(tmp_path / folder), F, random_state=None, regressor=MLPRegressor(hidden_layer_sizes=(8,)))
+        for folder in ("here", "here", "there")
+    )
+    assert_same(first, second)
+    assert_same(first, elsewhere)
+    assert kept(tmp_path / "here", "regressor") == 1
+
+
+def test_a_chain_hands_its_memory_to_an_inverse_without_one(tmp_path):
+    own, chains = tmp_path / "own", tmp_path / "chain"
+    chain(str(chains), inverse=inverse(memory=str(own))).fit(T, F)
+    assert [kept(own, kind) for kind in ("simulations", "inversion", "checks")] == [1, 1, 0]
+    assert [kept(chains, kind) for kind in ("simulations", "inversion", "checks")] == [0, 0, 1]
+    default = DataInformedFEM(TRUSS, memory=str(chains), random_state=0).fit(T, F)
+    assert kept(chains, "inversion") == 1
+    assert default.inverse_.memory == str(chains)
+
+
+def test_a_memory_of_nowhere_keeps_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    nowhere = joblib.Memory(None)
+    assert_same(found(nowhere, F), found(None, F))
+    assert list(tmp_path.iterdir()) == []
