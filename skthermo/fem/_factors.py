@@ -1,10 +1,11 @@
 """Factorisation of sparse symmetric matrices: the only place that calls a direct solver.
 
-The environment variable SKTHERMO_SOLVER names the solver: "superlu", which SciPy brings, or "rslab", an optional package
-that is faster where factors fill.
+The environment variable SKTHERMO_SOLVER names the solver: "superlu", which SciPy brings, or "rslab", an optional
+package that is faster where factors fill.
 """
 
 import os
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -138,7 +139,10 @@ class _RslabFactors:
         return np.asarray(solve(np.ascontiguousarray(columns)))
 
 
-SOLVERS = {"superlu": SuperLUElimination, "rslab": RslabElimination}
+SOLVERS: dict[str, Callable[[NDArray[np.int32], NDArray[np.int32]], Elimination]] = {
+    "superlu": SuperLUElimination,
+    "rslab": RslabElimination,
+}
 
 
 def _rslab() -> ModuleType:

@@ -191,13 +191,11 @@ def main():
         write(folder, terms, mass)
         entries = sum(matrix.nnz for matrix in terms.values())
         print(f"{options.kind} of {mass.shape[0]} degrees of freedom, {entries} entries of stiffness")
-        del terms, mass
         model, _ = timed("load_affine, with all checks", lambda: load_affine(folder))
     print(model, model.frequencies(np.ones((1, 5)))[0].round(3))
     stiffness, mass = model.matrices(np.ones(5))
     timed("check_supported alone", lambda: check_supported(stiffness))
     timed("count_modes alone", lambda: count_modes(mass, at_least=6))
-    del stiffness, mass
     theta = 1 + BOUNDS * np.random.default_rng(1).uniform(-1, 1, (options.solves, 5))
     timed(f"frequencies of {options.solves} theta", lambda: model.frequencies(theta))
     timed(f"Jacobians of {options.solves} theta", lambda: model.jacobian(theta))
