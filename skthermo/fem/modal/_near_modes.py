@@ -42,7 +42,7 @@ def modes_near(
     columns = np.hstack([lowest, random])
     basis, weighted = orthonormal(columns, mass, nothing, nothing)
     images, block = nothing, weighted
-    for step in range(MAX_STEPS):
+    for _ in range(MAX_STEPS):
         if not block.shape[1] or basis.shape[1] < n_modes:
             return None
         images = np.hstack([images, factors.solve(block)])
@@ -51,7 +51,7 @@ def modes_near(
         vectors = images @ weights
         residuals = vectors - basis @ (weights * values)
         distances = np.sqrt(np.einsum("im,im->m", residuals, mass @ residuals))
-        if step and are_found(values, distances, n_modes, tol):
+        if are_found(values, distances, n_modes, tol):
             shapes = vectors[:, :n_modes]
             shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
             return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
