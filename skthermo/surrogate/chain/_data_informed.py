@@ -39,7 +39,7 @@ from skthermo._weather import FillError, SensorRegression, TrainingRange, told_f
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._box import Box
-from skthermo.surrogate._simulator import Simulator, tolerance
+from skthermo.surrogate._simulator import tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
 from skthermo.surrogate.chain._faults import Faults
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
@@ -49,7 +49,7 @@ from skthermo.surrogate.chain._parts import (
     inputs_of_last_step,
     known_findings,
     read_records,
-    simulators_in,
+    simulator_of,
     surrogates_in,
     with_quick_start,
 )
@@ -268,7 +268,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
             self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
             self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-            self.simulator_ = Simulator.around(self.model, learned, self.reduce, simulators_in(self.inverse_))
+            self.simulator_ = simulator_of(self, learned)
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
