@@ -74,7 +74,7 @@ for ax, shape in zip(display.axes_, display.shapes.T, strict=True):
 
 # %%
 # The method solves the model thousands of times. ``reduced`` makes a model of a few basis vectors with the same
-# frequencies, within a tolerance, that is much faster; :doc:`/guide/scaling` has numbers.
+# frequencies, within a tolerance, that is much faster; :doc:`/guide/costs` has numbers.
 
 print(model.reduced(0.3, tol=1e-4, random_state=0))
 save_figures(options.figures)

@@ -28,6 +28,7 @@ from skthermo.preprocessing._stamps import as_duration, as_stamps
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row
 MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end the interpreter
+EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
 LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
@@ -143,6 +144,38 @@ class LagFeatures(TransformerMixin, Estimator):
             not positive or has no fixed length, as a month; if a stamp is missing or occurs twice; if the index holds
             durations, or stamps as text.
         """
+        self._learn(X)
+        return self
+
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
+        """`fit` and `transform` of the same records, which are checked once.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_sensors * n_lags)
+            A frame gives a frame on its own index.
+
+        Raises
+        ------
+        ValueError
+            As in `fit`.
+        """
+        return self._lagged(X, *self._learn(X))
+
+    def _learn(self, X: Any) -> tuple[NDArray, pd.DatetimeIndex | None]:
+        """Read the lags, store the records; their values and stamps."""
         values = self._validated(X, reset=True)
         self.lags_ = _read_lags(self.lags, len(values))
         self.freq_ = self.tolerance_ = self.history_ = self.stamps_ = self.time_zone_ = None
@@ -167,7 +200,7 @@ class LagFeatures(TransformerMixin, Estimator):
             self.stamps_ = stamps.as_unit("ns").asi8.view("datetime64[ns]")
             self.time_zone_ = _time_zone(stamps)
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
-        return self
+        return values, stamps
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -205,6 +238,10 @@ class LagFeatures(TransformerMixin, Estimator):
             kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
             had, has = kinds if stamps is None else kinds[::-1]
             raise ValueError(f"X has {has}; expected {had}, as in fit")
+        return self._lagged(X, values, stamps)
+
+    def _lagged(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> Any:
+        """Lagged values, as a frame if X is one."""
         if stamps is None:
             told = self._warn_of_padding(values)
             lagged = self._by_row(values, self.lags_)
@@ -279,7 +316,11 @@ class LagFeatures(TransformerMixin, Estimator):
         rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
             return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), np.False_
-        only_old = ~np.isin(old, own)
+        earliest = int(own.min()) - max(self.lags_) * freq - tolerance
+        found = (old >= max(earliest, EARLIEST)) & (old <= own.max())
+        found[old.argmin()] = True  # the padding of what is before the first record of all
+        only_old = np.flatnonzero(found)
+        only_old = only_old[~np.isin(old[only_old], own)]
         known = np.concatenate([old[only_old], own])
         order = np.argsort(known)
         ascending = known[order]
@@ -292,7 +333,7 @@ class LagFeatures(TransformerMixin, Estimator):
             unknown |= (stale | before) & (wanted < own.min())
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        told = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old).all() else np.False_
+        told = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old[found]).all() else np.False_
         return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources), told
 
 

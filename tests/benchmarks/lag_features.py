@@ -1,11 +1,15 @@
 """LagFeatures against pandas' shift and concat.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/lag_features.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/lag_features.py --rows 8760 --most 0.5
 
-Medians of several rounds in one run. Peak memory is what one call allocates beyond its input.
+Medians of processor time over several rounds in one run. Peak memory is what one call allocates beyond its input. The
+exit code is 1 if LagFeatures takes more than ``--most`` of what pandas takes, on any of the three kinds of input.
 """
 
 import argparse
+import sys
+import time
 
 import numpy as np
 import pandas as pd
@@ -15,11 +19,12 @@ from skthermo.preprocessing import LagFeatures
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", type=int, default=100_000)
     parser.add_argument("--sensors", type=int, default=7)
     parser.add_argument("--lags", type=int, default=24)
-    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--rounds", type=int, default=25)
+    parser.add_argument("--most", type=float, default=0.6, help="largest ratio to pandas")
     options = parser.parse_args()
     values = np.random.default_rng(0).standard_normal((options.rows, options.sensors))
     names = [f"T{i + 1}" for i in range(options.sensors)]
@@ -35,14 +40,17 @@ def main():
         "LagFeatures, frame": lambda: LagFeatures(lags).fit_transform(plain),
         "LagFeatures, by time": lambda: LagFeatures(lags, freq="1h").fit_transform(stamped),
     }
-    medians = median_seconds(ways, options.rounds)
-    reference = medians["pandas shift and concat"]
+    medians = median_seconds(ways, options.rounds, time.process_time)
+    ratios = {name: seconds / medians["pandas shift and concat"] for name, seconds in medians.items()}
     output = values.nbytes * lags / 1e6
     print(f"{options.rows} x {options.sensors}, {lags} lags ({output:.0f} MB out), median of {options.rounds} rounds")
-    print(f"{'':40s} seconds   over pandas   peak MB")
+    print(f"{'':40s} processor s   over pandas   peak MB")
     for name, way in ways.items():
-        print(f"{name:40s} {medians[name]:7.3f}   {medians[name] / reference:11.2f}   {peak_megabytes(way):7.1f}")
+        print(f"{name:40s} {medians[name]:11.4f}   {ratios[name]:11.2f}   {peak_megabytes(way):7.1f}")
+    most = max(ratio for name, ratio in ratios.items() if name.startswith("LagFeatures"))
+    print(f"most over pandas, at most {options.most:g}: {most:.2f}")
+    return int(most > options.most)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

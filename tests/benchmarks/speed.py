@@ -5,11 +5,11 @@
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py --rows table
 
 ``works.py`` has the works. Each runs in a process of its own, by turns with a copy of the code of this folder and of
-another revision. Printed are medians of processor seconds (worker
-processes included), how many times faster it is now, and the largest peak memory. "beside" is a loop of
-``scipy.sparse.linalg.eigsh`` over the same matrices, for lags ``pandas.concat`` of shifts, in the same process; "at
-37 ms" are the seconds on a machine on which one turn of that loop over the building frame takes 37 ms. A work that
-takes longer than ``--limit`` is stopped. Rows that need data which SKTHERMO_DATA does not hold are left out.
+another revision. Printed are medians of processor seconds (worker processes included), how many times faster it is now,
+and the largest peak memory. "beside" is a loop of ``scipy.sparse.linalg.eigsh`` over the same matrices, for lags
+``pandas.concat`` of shifts, in the same process; "at 37 ms" are the seconds on a machine on which one turn of that loop
+over the building frame takes 37 ms. A work that takes more processor seconds than ``--limit`` is stopped. Rows that
+need data which SKTHERMO_DATA does not hold are left out.
 
 The exit code is 1 if something beside the table's rows has become slower by more than 10 %: if even the fastest round
 takes more than 1.1 times the median of before; and, with ``--digits``, if results differ by more than is allowed.
@@ -20,6 +20,7 @@ import contextlib
 import difflib
 import json
 import os
+import resource
 import shutil
 import signal
 import statistics
@@ -108,18 +109,23 @@ def copy_of(revision, folder):
 
 
 def run(command, package, limit):
-    """What a script prints with this state of the package; None beyond the limit. Stops the script's children too."""
+    """What a script prints with this state of the package; None if it takes more processor seconds than the limit."""
     environment = os.environ | {"PYTHONPATH": str(package), "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
-    with subprocess.Popen([sys.executable, *command], env=environment, cwd=package, **options) as process:
-        try:
-            output, errors = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            return None
-    if process.returncode:
-        raise RuntimeError(errors.strip().splitlines()[-1] if errors.strip() else f"exit code {process.returncode}")
-    return output
+    seconds = int(limit)
+    done = subprocess.run(
+        [sys.executable, *command],
+        env=environment,
+        cwd=package,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5)),
+    )
+    if -done.returncode in (signal.SIGXCPU, signal.SIGKILL):
+        return None
+    if done.returncode:
+        errors = done.stderr.strip().splitlines()
+        raise RuntimeError(errors[-1] if errors else f"exit code {done.returncode}")
+    return done.stdout
 
 
 def one_round(name, package, options, results=None):
@@ -255,7 +261,7 @@ def main():
     parser.add_argument("--rows", nargs="+", default=["table", "elsewhere", "imports"], help="rows or parts of them")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--long", type=float, default=40.0, help="seconds after which no further round begins")
-    parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a run is stopped")
+    parser.add_argument("--limit", type=float, default=300.0, help="processor seconds after which a run is stopped")
     parser.add_argument("--quick", action="store_true", help="small works")
     parser.add_argument("--digits", action="store_true", help="differences of the results, and tables of scripts")
     options = parser.parse_args()

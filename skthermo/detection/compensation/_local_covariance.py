@@ -41,9 +41,8 @@ class Neighbours:
 
     def weights(self, n_records: int) -> scipy.sparse.csr_array:
         """A row for each place: 1 at the records that count, else 0."""
-        ends = np.arange(0, self.rows.size + 1, self.rows.shape[1])
-        shape = (len(self.rows), n_records)
-        return scipy.sparse.csr_array((self.counted.ravel().astype(float), self.rows.ravel(), ends), shape)
+        rows, ends = self.rows[self.counted], np.append(0, self.counted.sum(axis=1).cumsum())
+        return scipy.sparse.csr_array((np.ones(len(rows)), rows, ends), (len(self.rows), n_records))
 
 
 @dataclass(frozen=True)
@@ -59,14 +58,24 @@ class History:
     overall: Gaussian
     near: int = NEAR_IN_TIME
 
-    def neighbours(self, size: int, places: Array, order: NDArray[np.intp] | None = None) -> Neighbours:
-        """The records nearest to each place, without those near ``order`` in time."""
+    def neighbours(self, size: int, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Neighbours:
+        """The records nearest to each place, by default that of each record, without those near ``order`` in time."""
+        number = size if order is None else size + self.most_near
+        near = self._nearest[:, :number] if places is None else nearest(self.places, places, number)[1]
         if order is None:
-            near = nearest(self.places, places, size)[1]
             return Neighbours(near, np.ones(near.shape, dtype=bool))
-        near = nearest(self.places, places, size + self.most_near)[1]
         far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
         return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+
+    @cached_property
+    def _nearest(self) -> NDArray[np.intp]:
+        """Records by their distance from each record, as many as any candidate asks for."""
+        most = max(one.n_neighbors for one in self._candidates)
+        return nearest(self.places, self.places, most + self.most_near)[1]
+
+    @property
+    def _candidates(self) -> list[Smoothing]:
+        return [one for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
 
     @cached_property
     def most_near(self) -> int:
@@ -75,7 +84,7 @@ class History:
 
     def likeliest(self) -> LocalCovariance | None:
         """The covariance by weather, or none, under which records are likeliest given the others."""
-        candidates = [LocalCovariance(self, one) for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
+        candidates = [LocalCovariance(self, one) for one in self._candidates]
         plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
         likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
         return [None, *candidates][int(np.argmax(likelihoods))]
@@ -107,8 +116,8 @@ class LocalCovariance:
         scale = np.sqrt(self._variances(neighbours) / np.einsum("ijj->ij", correlation))
         return scale[:, :, np.newaxis] * correlation * scale[:, np.newaxis, :]
 
-    def at(self, places: Array, order: NDArray[np.intp] | None = None) -> Array:
-        """Covariances at some places, without the records near ``order`` in time."""
+    def at(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
+        """Covariances at places, by default those of the records, without the records near ``order`` in time."""
         return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
 
     @property
@@ -122,7 +131,7 @@ class LocalCovariance:
 
     @cached_property
     def _own(self) -> Neighbours:
-        return self.history.neighbours(self.smoothing.n_neighbors, self.history.places, self.history.order)
+        return self.history.neighbours(self.smoothing.n_neighbors, order=self.history.order)
 
     @cached_property
     def _standard(self) -> tuple[Array, Gaussian]:
@@ -136,12 +145,11 @@ class LocalCovariance:
 
     def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
         """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
-        known, filled = ~np.isnan(values), np.nan_to_num(values)
+        known, filled = ~np.isnan(values).reshape(len(values), -1), np.nan_to_num(values).reshape(len(values), -1)
         weights, pseudo = neighbours.weights(len(values)), self.smoothing.n_pseudo
-        shape = (len(neighbours.rows), *prior.shape)
-        sums = (weights @ filled.reshape(len(values), -1)).reshape(shape)
-        counts = (weights @ known.reshape(len(values), -1).astype(float)).reshape(shape)
-        return (sums + pseudo * prior) / (counts + pseudo)
+        counts = weights @ (np.ones((len(values), 1)) if known.all() else known.astype(float))
+        means = (weights @ filled + pseudo * prior.ravel()) / (counts + pseudo)
+        return means.reshape(-1, *prior.shape)
 
 
 def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:

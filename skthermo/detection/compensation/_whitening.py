@@ -74,7 +74,7 @@ class Spread:
             block = usable[first : first + step]
             by_others = covariance.at(coordinates.transform(weather[block]), order=block)
             white[block] = whitened(residuals[block], overall, by_others)[0]
-        covariances = np.concatenate([covariance.at(places), plain.covariances])
+        covariances = np.concatenate([covariance.at(), plain.covariances])
         return cls(overall, covariances, reach, covariance.smoothing, coordinates, places), white
 
     def deviations(self, weather: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from skthermo._arrays import Array, as_floats, patterns
 from skthermo._frames import check_same_rows
@@ -16,6 +18,7 @@ from skthermo._times import row_times
 
 MEAN_LENGTH = 25  # of runs of consecutive training records, before records of similar weather take over
 TAKEN_FROM = 25  # number of records with the most similar weather, and the same faults, that take over
+FEW = 10_000  # records at a joint, up to which computing all distances is about as fast as searching a tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,21 +82,26 @@ class ServiceRecords:
         passes = random_state.uniform(size=n_rows) < 1 / MEAN_LENGTH
         which = random_state.uniform(size=n_rows)
         taken = np.empty(n_rows, dtype=np.intp)
-        record = self._similar(0, places[0], which[0]) if n_rows else 0
+        trees = {joint: cKDTree(self.places[rows]) for joint, rows in self._joints.items() if len(rows) > FEW}
+        record = self._similar(0, places[0], which[0], trees) if n_rows else 0
         for row in range(n_rows):
             if row:
                 if passes[row] and self._joint_of[record]:
-                    record = self._similar(self._joint_of[record], places[row - 1], which[row])
+                    record = self._similar(self._joint_of[record], places[row - 1], which[row], trees)
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
 
-    def _similar(self, joint: int, place: Array, share: float) -> int:
+    def _similar(self, joint: int, place: Array, share: float, trees: Mapping[int, cKDTree]) -> int:
         """One of the records at a joint whose weather is most similar, or any where it is unknown."""
         rows = self._joints[joint]
         if len(rows) > TAKEN_FROM and not np.isnan(place).any():
-            distances = ((self.places[rows] - place) ** 2).sum(axis=1)
-            rows = rows[np.argpartition(distances, TAKEN_FROM)[:TAKEN_FROM]]
+            if joint in trees:
+                near = trees[joint].query(place, TAKEN_FROM)[1]
+            else:
+                distances = ((self.places[rows] - place) ** 2).sum(axis=1)
+                near = np.argpartition(distances, TAKEN_FROM)[:TAKEN_FROM]
+            rows = rows[near]
         return int(rows[int(share * len(rows))])
 
     @cached_property
@@ -106,7 +114,9 @@ class ServiceRecords:
     @cached_property
     def _joints(self) -> dict[int, NDArray[np.intp]]:
         """Records by these numbers, and all of them for 0."""
-        found = {int(joint): np.flatnonzero(self._joint_of == joint) for joint in np.unique(self._joint_of)}
+        order = np.argsort(self._joint_of, kind="stable")
+        joints, first = np.unique(self._joint_of[order], return_index=True)
+        found = dict(zip(joints.tolist(), np.split(order, first[1:]), strict=True))
         return found | {0: np.arange(len(self.places))}
 
 
