@@ -179,7 +179,7 @@ def test_posterior_mode_is_the_one_that_scipy_finds(share):
         oracle = least_squares(deviations, np.zeros(4), jac="3-point", xtol=1e-12, ftol=1e-12, gtol=1e-12)
         laplace = np.sqrt(np.diag(np.linalg.inv(oracle.jac.T @ oracle.jac)))
         assert (np.abs(np.log(theta) - oracle.x) < 0.01 * laplace).all()
-        np.testing.assert_allclose(std / theta, laplace, rtol=1e-4)
+        np.testing.assert_allclose(std / theta, laplace, rtol=1e-3)
 
 
 def test_intervals_hold_the_truth_though_half_of_the_modes_are_missing():
@@ -315,7 +315,7 @@ def test_rows_where_the_model_fails_keep_the_guess_and_are_counted():
 
 def test_rows_out_of_steps_are_counted():
     with pytest.warns(UserWarning, match="20 of 20 rows did not converge in 1 steps"):
-        surrogate(regressor=DummyRegressor(), refine=1).transform(TRUSS.frequencies(drawn(20)))
+        surrogate(regressor=DummyRegressor(), refine=1, n_samples=20).transform(TRUSS.frequencies(drawn(20)))
 
 
 def test_refining_wants_a_model():

@@ -87,10 +87,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
         there; without refining, they do not train M2.
     reduce : bool or float, default=False
-        Whether predictions and simulations use the reduced model ``model.reduced``, which makes large models much
-        faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
-        either side. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Rows
-        outside the box are solved by the model itself, with a warning that counts them.
+        Whether M1, predictions and simulations use a reduced model, ``model.reduced``, which makes large models much
+        faster. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Every
+        `InverseSurrogate` of the inverse whose own ``reduce`` is False gets this value: it simulates and refines with a
+        reduced model for its bounds, or for a wider box where the records have parameters outside them. Predictions
+        use that reduced model if its box covers the parameters that M2 gives for the training weather, plus a quarter
+        of their range on either side, else one of their own for this box. Rows outside the box are solved by the model
+        itself, with a warning that counts them; so are all where no basis is as accurate as that.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
         and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
