@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pickle import PicklingError
 from threading import Lock
@@ -35,11 +35,17 @@ def tolerance(model: FEModel, reduce: bool | float) -> float | None:
     return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
 
 
-def box_around(theta: Array) -> Array:
-    """Lowest and highest of each parameter in rows of theta, with a margin; (n_parameters, 2)."""
+def box_around(theta: Array, limits: Array | None = None) -> Array:
+    """Lowest and highest of each parameter in rows of theta, with a margin, within limits; (n_parameters, 2)."""
     lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
     margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
-    return np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+    box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+    if limits is None:
+        return box
+    first, last = limits.T
+    return np.column_stack(
+        [np.clip(box[:, 0], first, last / (1 + LEAST_MARGIN)), np.clip(box[:, 1], first * (1 + LEAST_MARGIN), last)]
+    )
 
 
 class KnownChanges:
@@ -83,19 +89,30 @@ class Simulator:
     _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
 
     @classmethod
-    def around(cls, model: FEModel, theta: Array, reduce: bool | float, others: Iterable[Simulator] = ()) -> Simulator:
+    def around(cls, model: FEModel, theta: Array, reduce: bool | float, known: Simulator | None = None) -> Simulator:
         """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
 
-        One of the others is taken if its reduced model is of the same model, as accurate, and covers that box.
+        A known simulator is taken if its reduced model is of the same model, as accurate, and covers that box.
         """
         tol = tolerance(model, reduce)
         if tol is None:
             return cls(model)
         box = box_around(theta)
-        for other in others:
-            if other.model is model and other.covers(box) and other.tol <= tol:
-                return other
-        return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+        if known is not None and known.model is model and known.covers(box) and known.tol <= tol:
+            return known
+        try:
+            return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+        except RuntimeError as error:
+            ranges = ", ".join(
+                f"{name!r} {low:.3g} to {high:.3g}"
+                for name, (low, high) in zip(model.parameter_names, box, strict=True)
+            )
+            warn_user(
+                f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): {error}; "
+                "all rows are solved by the full model, which takes long: expected a model updated to the records",
+                "no reduced model",
+            )
+            return cls(model)
 
     @property
     def size(self) -> int:
@@ -109,14 +126,19 @@ class Simulator:
         return bool((self.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= self.box[:, 1]).all())
 
     def extended(self, theta: Array, limits: Array) -> Simulator:
-        """The simulator whose reduced model also covers a box around rows of theta, within limits (n_parameters, 2)."""
+        """The simulator whose reduced model also covers a box around rows of theta, within limits (n_parameters, 2).
+
+        Where no basis is accurate in so wide a box, the reduced model stays as it is.
+        """
         if self.box is None or not self.outside(theta).any():
             return self
-        wanted = box_around(theta)
-        lowest = np.minimum(self.box[:, 0], np.maximum(wanted[:, 0], limits[:, 0]))
-        highest = np.maximum(self.box[:, 1], np.minimum(wanted[:, 1], limits[:, 1]))
+        wanted = box_around(theta, limits)
+        lowest, highest = np.minimum(self.box[:, 0], wanted[:, 0]), np.maximum(self.box[:, 1], wanted[:, 1])
         box = np.column_stack([lowest, highest])
-        return Simulator(self.model, self.reduced.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+        try:
+            return Simulator(self.model, self.reduced.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+        except RuntimeError:
+            return self
 
     @property
     def approximate(self) -> Simulator:

@@ -10,7 +10,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arguments import check_model
-from skthermo._arrays import as_floats
+from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
@@ -110,9 +110,10 @@ def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:
     return (part for part in (inverse, *inverse.get_params().values()) if isinstance(part, InverseSurrogate))
 
 
-def simulators_in(inverse: Any) -> Iterator[Simulator]:
-    """The models, reduced or not, that fitted surrogates of an inverse are refined on."""
-    return (part.simulator_ for part in surrogates_in(inverse) if hasattr(part, "simulator_"))
+def simulator_of(chain: Any, theta: Array) -> Simulator:
+    """What a fitted chain simulates with; with ``reduce``, M1's reduced model if it covers what M2 gives."""
+    inverse = next(surrogates_in(chain.inverse_), None)
+    return Simulator.around(chain.model, theta, chain.reduce, getattr(inverse, "simulator_", None))
 
 
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:

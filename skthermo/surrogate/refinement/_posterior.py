@@ -41,6 +41,11 @@ class Prior:
         mean, half = np.log(bounds.mean(axis=1)), (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
+    @property
+    def limits(self) -> Array:
+        """Lowest and highest multiplier of an estimate, (n_parameters, 2)."""
+        return np.exp(np.column_stack([self.lowest, self.highest]))
+
     def information(self, sensitivity: Array, noise: Array) -> Array:
         """Precision of ln theta given derivatives of the observations and the noise, infinite where one is missing."""
         scaled = sensitivity / noise[:, :, np.newaxis]

@@ -31,7 +31,7 @@ LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model r
 ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
 ROWS_FOR_SCATTER = 365
 STEPS_ON_SURFACE = 100
-ROWS_TO_ADAPT = 365  # number of records that tell where the parameters of all are
+ROWS_TO_ADAPT = 200  # number of records that tell where the parameters of all are
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
@@ -78,8 +78,7 @@ class Refinement:
             return self
         objective, start = self._problem(inputs[rows], guess[rows])
         x = refine(objective, start, self.n_steps, sorts=self._sorts).local.x
-        limits = np.exp(np.column_stack([self.prior.lowest, self.prior.highest]))
-        simulator = self.simulator.extended(np.exp(x), limits)
+        simulator = self.simulator.extended(np.exp(x), self.prior.limits)
         if self.surface is None:
             return replace(self, simulator=simulator)
         solved = simulator.approximate.linearise(np.exp(x), self.n_jobs, relative=True)
