@@ -1,6 +1,7 @@
 """Sparse generalised eigenproblems K phi = lambda M phi, one theta after the other."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.fem._factors import Factors
 from skthermo.fem._terms import SparseTerms
+from skthermo.fem._theta import nominal_theta
+from skthermo.fem.modal._dense import EigenSolver
 from skthermo.fem.modal._near_modes import modes_near
 
 GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
@@ -28,6 +31,10 @@ class ShiftInvertSolver:
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)
         self._factorise = stiffness.pattern.elimination.factorise
+        self._references: dict[int, Array] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_references": {}}  # what was solved before is no part of a model
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
         return self._each(theta, n_modes, with_shapes=False)[0]
@@ -41,6 +48,8 @@ class ShiftInvertSolver:
         Guesses (n_samples, n_dof, n_guesses) are for at least as many modes; rows that they do not help are solved as
         by ``modes``.
         """
+        if n_modes not in self._references:
+            self._references[n_modes] = self.modes(nominal_theta(theta.shape[1]), n_modes)[1][0]
         return self._each(theta, n_modes, with_shapes=True, guesses=guesses, tol=tol)
 
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
@@ -55,7 +64,7 @@ class ShiftInvertSolver:
         for row, (stiffness, mass) in enumerate(pairs):
             factors, found = self._factorise(stiffness), None
             if factors is not None and guesses is not None:
-                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=tol)
+                found = modes_near(stiffness, factors, mass, guesses[row], self._references[n_modes], n_modes, tol=tol)
             if found is None:
                 found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
             eigenvalues[row] = found[0]
@@ -68,6 +77,32 @@ class ShiftInvertSolver:
         factors = self._factorise(stiffness)
         eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
         return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
+
+
+class GuidedSolver:
+    """A sparse solver that starts from the shapes of the same structure on a basis, to a relative error ``tol``."""
+
+    def __init__(self, full: ShiftInvertSolver, reduced: EigenSolver, basis: Array, tol: float):
+        self._full = full
+        self._reduced = reduced
+        self._basis = basis
+        self._tol = tol
+
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        return self.modes(theta, n_modes)[0]
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        n_guesses = min(n_modes + GUARD_VECTORS, self._basis.shape[1])
+        if n_guesses < n_modes:
+            return self._full.modes(theta, n_modes)
+        guesses = self._basis @ self._reduced.modes(theta, n_guesses)[1]
+        return self._full.modes_near(theta, guesses, n_modes, tol=self._tol)
+
+    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        return self._full.local_modes(theta, n_modes)
+
+    def scaled(self, factors: Array) -> EigenSolver:
+        return self._full.scaled(factors)
 
 
 def lowest_modes(
