@@ -68,7 +68,10 @@ def counted_number(value: float, noun: str, digits: int = 6) -> str:
 
 def printable(text: Any) -> str:
     """Text in which control characters are seen as their escapes and harm no reader; white space becomes one space."""
-    spaced = re.sub(r"[\t\n\v\f\r\x85\u2028\u2029]+", " ", str(text))
+    text = str(text)
+    if text.isprintable():
+        return text
+    spaced = re.sub(r"[\t\n\v\f\r\x85\u2028\u2029]+", " ", text)
     return "".join(
         letter if unicodedata.category(letter) not in ("Cc", "Cs") and letter not in TURNING else ascii(letter)[1:-1]
         for letter in spaced

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats, real_array
+from skthermo._arrays import Array, as_floats, median, real_array
 from skthermo._validation import _num_samples
 from skthermo._warnings import warn_user
 
@@ -142,9 +142,10 @@ def warn_of_absurd(X: ArrayLike) -> None:
     values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
     if np.isnan(values).all(axis=0).any():
         return
-    distances = np.abs(values - np.nanmedian(values, axis=0))
-    far = distances > ABSURD * 1.4826 * np.nanmedian(distances, axis=0)
-    if (far & (np.nanmedian(distances, axis=0) > 0)).any():
+    distances = np.abs(values - median(values))
+    middle = median(distances)
+    far = distances > ABSURD * 1.4826 * middle
+    if (far & (middle > 0)).any():
         row, column = np.argwhere(far)[0]
         warn_user(
             f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "

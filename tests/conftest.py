@@ -1,5 +1,6 @@
 """One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen."""
 
+import gc
 import os
 import sys
 
@@ -9,6 +10,12 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+def pytest_collection_finish(session):
+    """What all modules hold stays until the end: the garbage collector need not look through it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

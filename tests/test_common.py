@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 from sklearn import config_context
 from sklearn.base import BaseEstimator, clone
-from sklearn.covariance import EllipticEnvelope
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
 from sklearn.impute import KNNImputer
@@ -103,7 +102,6 @@ ESTIMATORS = [
     OutlierDetector(IsolationForest(n_estimators=5, random_state=0)),
     OutlierDetector(OneClassSVM()),
     OutlierDetector(LocalOutlierFactor(5, novelty=True)),
-    OutlierDetector(EllipticEnvelope(support_fraction=1.0, random_state=0)),
     TemperatureCompensator(Ridge(), targets=[1]),
     TemperatureCompensator(Ridge(), targets=[1], scale="global"),
     TemperatureCompensator(Ridge(), targets=[1], scale="local"),
@@ -178,7 +176,7 @@ BOUND = [  # estimators and what they learn from
     (ModelUpdater(TRUSS), (TRUSS.frequencies([[1.05, 0.97, 1.02, 1]]),)),
     (ModeTracker((NOMINAL, SHAPES)), ()),
 ]
-STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0)
+STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0, uncertainty="noise")
 MONITOR = Monitor(MahalanobisDetector(), targets=["f1", "f2"])  # takes frames on a DatetimeIndex only
 YEAR = pd.DataFrame(
     np.random.default_rng(0).normal([10, 4, 9], 0.1, (400, 3)),

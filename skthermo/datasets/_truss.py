@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -86,6 +87,12 @@ def truss_structure() -> Structure:
         supports=sheet["supports"],
         groups={group: [str(member) for member in members] for group, members in groups.items()},
     )
+
+
+@lru_cache(maxsize=1)
+def truth_model() -> AffineModel:
+    """The truss whose parameters are Young's moduli in the thermal zones; models are never changed."""
+    return truss_structure().assemble(ZONES, groups=PARAMETERS)
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
@@ -227,7 +234,7 @@ def make_truss_campaign(
         index=index,
         columns=ZONES,
     )
-    model = truss_structure().assemble(ZONES, groups=PARAMETERS)
+    model = truth_model()
     theta = steel_modulus(temperatures)
     if drift is None and damage_from is None:
         clean = model.damaged({} if damage is None else damage).frequencies(theta)

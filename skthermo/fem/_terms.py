@@ -33,6 +33,7 @@ class AffineTerms(ABC):
     def __init__(self, exponents: NDArray[np.int64], factors: Array | None = None):
         self.exponents = exponents
         self.factors = np.ones(len(exponents)) if factors is None else factors
+        self._used = [(t, p, exponents[t, p]) for t, p in np.argwhere(exponents)]
 
     @property
     def is_constant(self) -> bool:
@@ -41,7 +42,10 @@ class AffineTerms(ABC):
 
     def products(self, theta: Array) -> Array:
         """The product of each term's parameters, (n_samples, n_terms)."""
-        return np.prod(theta[:, np.newaxis] ** self.exponents, axis=2)
+        products = np.ones((len(theta), len(self.exponents)))
+        for term, parameter, exponent in self._used:
+            products[:, term] *= theta[:, parameter] ** exponent
+        return products
 
     def coefficients(self, theta: Array) -> Array:
         """The factor of each matrix, (n_samples, n_terms)."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._arrays import Array, as_floats, median, spread_evenly
 
 MOST_COORDINATES = 3  # principal components of the weather
 EXPLAINED = 0.99  # share of its variance that is enough
@@ -24,14 +24,6 @@ def robust_deviation(values: Array) -> Array:
     """Standard deviations of columns that outliers hardly move, NaN ignored; from the median of the distances."""
     distances = np.abs(values - median(values))
     return NORMAL * median(distances)
-
-
-def median(values: Array) -> Array:
-    """Median of each column, NaN ignored; NaN for a column without a value."""
-    result = np.full(values.shape[1], np.nan)
-    known = ~np.isnan(values).all(axis=0)
-    result[known] = np.nanmedian(values[:, known], axis=0)
-    return result
 
 
 @dataclass(frozen=True)

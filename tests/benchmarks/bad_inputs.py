@@ -22,7 +22,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import sklearn
-from bad_input_examples import EXAMPLES, LEGAL, NOT_CALLED, public_arguments
 
 import skthermo
 
@@ -127,10 +126,9 @@ def verdict(example, argument, cause, value, good_result, good_warnings):
     return ("warned", next(iter(new))) if new else ("silent", f"gave {result!r:.80}")
 
 
-def without_example():
+def without_example(examples, arguments):
     """Public arguments that no example gives."""
-    covered = {(example.name, argument) for example in EXAMPLES for argument in example.bad}
-    return sorted(set(public_arguments()) - covered)
+    return sorted(set(arguments) - {(example.name, argument) for example in examples for argument in example.bad})
 
 
 def main():
@@ -138,6 +136,8 @@ def main():
     parser.add_argument("--of", default="", help="regular expression of the callables that are tried")
     parser.add_argument("--all", action="store_true", help="show every answer")
     options = parser.parse_args()
+    from bad_input_examples import EXAMPLES, LEGAL, NOT_CALLED, public_arguments  # which takes a quarter of a minute
+
     counts, causes, shown = collections.Counter(), collections.defaultdict(collections.Counter), []
     for example in EXAMPLES:
         if not re.search(options.of, example.name):
@@ -168,7 +168,7 @@ def main():
     for cause, kinds in worst:
         if kinds["silent"] + kinds["unclear"]:
             print(f"{cause:32s} {kinds['silent']:4d} silent {kinds['unclear']:4d} unclear of {kinds.total():4d}")
-    missing = without_example() if not options.of else []
+    missing = without_example(EXAMPLES, public_arguments()) if not options.of else []
     for name, argument in missing:
         print(f"no example: {name}({argument})")
     total = max(counts.total(), 1)

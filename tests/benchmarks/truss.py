@@ -16,7 +16,7 @@ from sklearn.utils import Bunch
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
-from skthermo.fem import add_noise
+from skthermo.fem import add_noise, linearise
 from skthermo.metrics import error_table, minimum_detectable_damage, probability_of_detection
 from skthermo.studies import sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
@@ -147,9 +147,9 @@ def best_theta(model, frequencies, steps=20, damping=1e-4):
     """
     theta = np.ones((len(frequencies), len(model.parameter_names)))
     for _ in range(steps):
-        fitted = model.frequencies(theta)
+        fitted, jacobian = linearise(model, theta)
         residual = (frequencies / fitted - 1)[:, :, np.newaxis]
-        slope = model.jacobian(theta) / fitted[:, :, np.newaxis] * theta[:, np.newaxis]
+        slope = jacobian / fitted[:, :, np.newaxis] * theta[:, np.newaxis]
         transposed = slope.swapaxes(1, 2)
         step = np.linalg.solve(transposed @ slope + damping * np.eye(theta.shape[1]), transposed @ residual)
         theta *= np.exp(np.clip(step[:, :, 0], -0.1, 0.1))

@@ -345,7 +345,8 @@ def detectability(clock, quick):
         "compensated": make_pipeline(TemperatureCompensator(LinearRegression(), targets=modes), MahalanobisDetector()),
     }
     scenarios = [{}, *({group: s} for group in ("bottom", "top", "diagonal") for s in (0.1, 0.2))]
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=2 if quick else 10, random_state=0)
+    uncertainty = ("noise",) if quick else ("noise", "baseline")
+    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=5, uncertainty=uncertainty, random_state=0)
     with clock.work():
         table = study.run(year.temperatures, year.frequencies)
     clock.keep(1e-6, rates=1 + table["rate"])

@@ -99,16 +99,12 @@ def test_optuna(folder):
     assert len(values) == 3
     assert recipe["best"].inverse.noise == recipe["study"].best_params["noise"]
     assert recipe["study"].best_value == max(values) > 0.3
-    assert (folder / "simulations").is_dir()
+    assert (folder / "known").is_dir()
 
-    grid = {"noise": [0.01], "alpha": [0.1, 10.0]}
-    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.GridSampler(grid, seed=0))
-    study.optimize(recipe["objective"], n_trials=2)
     names = {"noise": "inverse__noise", "alpha": "mapper__regressor__alpha"}
-    search = GridSearchCV(recipe["fem"], {names[name]: grid[name] for name in grid}, cv=KFold(3), refit=False)
-    search.fit(recipe["T"], recipe["F"])
-    theirs = {trial.params["alpha"]: trial.value for trial in study.trials}
-    np.testing.assert_array_equal([theirs[alpha] for alpha in grid["alpha"]], search.cv_results_["mean_test_score"])
+    tried = [{names[name]: [value] for name, value in trial.params.items()} for trial in recipe["study"].trials[:2]]
+    search = GridSearchCV(recipe["fem"], tried, cv=KFold(3), refit=False).fit(recipe["T"], recipe["F"])
+    np.testing.assert_array_equal(search.cv_results_["mean_test_score"], values[:2])
     assert isinstance(recipe["fem"].mapper.regressor, Ridge)
 
 

@@ -1,10 +1,12 @@
 """The Z24 examples on a bridge that freezes by a known law, and without data."""
 
+import functools
 from copy import copy
 
 import pytest
 
 from skthermo.datasets import make_z24
+from skthermo.studies import sweep
 from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
 from tests.examples.pages import recipes, run
 
@@ -20,9 +22,19 @@ pytestmark = [
 FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "broken lines", "broken lines, whitened", "linear regression")
 
 
+@functools.cache
 def small_model():
     """A model of the bridge for parameters within 50 %, which is made fast."""
     return make_z24().reduced(0.5, tol=1e-4, random_state=0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _models_made_once():
+    with pytest.MonkeyPatch.context() as patch:
+        once = functools.cache(Z24.bridge_model)
+        for module in (Z24, DAMAGE, BENCH):
+            patch.setattr(module, "bridge_model", once)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +115,7 @@ def test_the_parameter_that_was_damaged_falls(frozen):
 
 def test_a_choice_sees_training_rows_only(frozen, few, monkeypatch):
     monkeypatch.setattr(BENCH, "bridge_model", small_model)
+    monkeypatch.setattr(BENCH, "sweep", lambda fem: sweep(fem, (0.1, 0.3), groups=["piers", "soil"]))
     some = {name: few[name] for name in FEW[1:4]}
     spoilt = copy(frozen)
     spoilt.T_damaged = spoilt.F_damaged = None

@@ -37,7 +37,10 @@ def models():
     }
 
 
-@pytest.mark.parametrize(("name", "model"), models().items(), ids=list(models()))
+MODELS = models()
+
+
+@pytest.mark.parametrize(("name", "model"), MODELS.items(), ids=MODELS)
 def test_derivatives_are_those_of_one_theta_at_a_time(name, model):
     theta = sample(model, 0.1, 3, random_state=1).theta
     dofs = DOFS if model.n_dof > 5 else [0, 2]

@@ -1,5 +1,8 @@
 """A small chain and its records, for tests."""
 
+import functools
+import warnings
+
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
@@ -27,3 +30,11 @@ def mapper(lags=2):
 def chain(**options):
     defaults = {"inverse": inverse(), "mapper": mapper(), "aligner": BiasAligner(TRUSS)}
     return DataInformedFEM(TRUSS, **(defaults | options))
+
+
+@functools.cache
+def fitted():
+    """The chain that all tests share; none changes it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return chain().fit(T, F)

@@ -1,7 +1,6 @@
 """The whole chain and its laws."""
 
 import pickle
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -21,17 +20,13 @@ from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.surrogate.chain._parts import clone_parts
-from tests.surrogate.chains import TRUSS, F, T, chain, inverse, mapper
+from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse, mapper
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 
 LATER = make_truss_campaign(random_state=1)
-
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    FITTED = chain().fit(T, F)
+FITTED = fitted()
 
 
 def test_predicts_unseen_temperatures_to_a_fraction_of_the_noise():

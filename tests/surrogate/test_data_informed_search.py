@@ -1,7 +1,5 @@
 """The chain in searches, worker processes and pipelines."""
 
-import warnings
-
 import joblib
 import numpy as np
 import pandas as pd
@@ -14,15 +12,11 @@ from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cros
 
 from skthermo.fem import AffineModel
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.surrogate.chains import TRUSS, F, T, chain, inverse
+from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
-
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    FITTED = chain().fit(T, F)
+FITTED = fitted()
 
 
 LOGGED_MODEL = """

@@ -21,9 +21,6 @@ CHECK_POINTS = 20
 MAX_ROUNDS = 40
 
 LEAST_ENERGY = 1e-13  # share of strain energy below which a direction is rounding error
-WIDEST_SPECTRUM = 1e13
-"""Largest ratio of highest to lowest eigenvalue, divided by ``tol``, for which the standard form is accurate
-enough."""
 
 
 class Basis(NamedTuple):
@@ -53,7 +50,7 @@ def grow_basis(
     for _ in range(MAX_ROUNDS):
         snapshots = np.hstack([snapshots, snapshots_at(full, points)])
         vectors = orthonormal(snapshots, stiffness, drop=tol)
-        core = projected_core(full, vectors, tol)
+        core = full.projected(vectors, tol)
         candidates = draw(bounds, random, CANDIDATES_PER_ROUND)
         errors = estimated_errors(full, core, vectors, candidates, factors)
         if errors.max() < tol / 2:
@@ -67,11 +64,6 @@ def grow_basis(
         f"after {MAX_ROUNDS} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
         "larger tol, or narrower bounds"
     )
-
-
-def projected_core(full: AffineCore, vectors: Array, tol: float) -> AffineCore:
-    """The core on basis vectors, in a form that is accurate to ``tol``."""
-    return full.projected(vectors, widest_spectrum=tol * WIDEST_SPECTRUM)
 
 
 def own_stream(seed: RandomState) -> np.random.RandomState:

@@ -10,23 +10,36 @@ from skthermo._arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal import (
+    CondensationSolver,
     EigenSolver,
     LocalModes,
     ShiftInvertSolver,
+    batch_solver,
     count_modes,
     dense_solver,
     hertz,
     may_be_missed,
+    may_differ,
     pair_modes,
     repeated_modes,
     shape_derivatives,
 )
 
 GUARD_MODES = 4
-"""Number of modes above the tracked ones that are examined first: modes that swap move up by a few ranks only."""
+"""Largest number of modes above the tracked ones that are examined first: modes that swap move up by a few ranks
+only."""
 
 MAX_CANDIDATES_PER_MODE = 8  # how many times as many candidates as modes are examined before a mode counts as dissolved
 CHUNK_BYTES = 2**25
+
+WIDEST_SPECTRUM = 1e13
+"""Largest ratio of highest to lowest eigenvalue, divided by ``tol``, for which the standard form is accurate
+enough."""
+
+ITERATION_SHARE = 0.02
+"""Error of an eigenvalue by iteration, as a share of ``tol``. The error of its frequency is half of it."""
+
+LEAST_TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +76,7 @@ class AffineCore:
     ranks: NDArray[np.intp]
     track: bool
     available: int  # how many modes the mass allows and the solver finds
+    guards: int = GUARD_MODES  # how many modes above the lowest are computed first where columns are followed
     healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
 
     @classmethod
@@ -88,6 +102,11 @@ class AffineCore:
     def first_candidates(self) -> int:
         """How many of the lowest modes are examined at first, where columns are followed."""
         return min(self.n_lowest + GUARD_MODES, self.max_candidates)
+
+    @property
+    def n_solved(self) -> int:
+        """How many of the lowest modes are computed at first."""
+        return min(self.n_lowest + self.guards, self.max_candidates) if self.track else self.n_lowest
 
     @property
     def max_candidates(self) -> int:
@@ -171,13 +190,30 @@ class AffineCore:
         stiffness = stiffness.scaled(self.stiffness.factors[origin])
         return replace(self, stiffness=stiffness, solver=eigen_solver(stiffness, self.mass))
 
-    def projected(self, basis: Array, widest_spectrum: float) -> "AffineCore":
-        """The core on a basis (n_dof, n) of shapes."""
+    def projected(self, basis: Array, tol: float) -> "AffineCore":
+        """The core on a basis (n_dof, n) of shapes, whose own relative errors are much smaller than ``tol``."""
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
         nominal = replace(self.nominal, weighted_shapes=basis.T @ self.nominal.weighted_shapes)
-        solver = dense_solver(stiffness, mass, nominal_theta(stiffness.exponents.shape[1]), widest_spectrum)
+        at = nominal_theta(stiffness.exponents.shape[1])
+        lapack = dense_solver(stiffness, mass, at, tol * WIDEST_SPECTRUM)
+        solver = batch_solver(stiffness, mass, at, lapack, max(ITERATION_SHARE * tol, LEAST_TOL))
         available = min(self.max_candidates, basis.shape[1])
-        return replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
+        projected = replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
+        return replace(projected, guards=projected.guards_below_a_gap())
+
+    def guards_below_a_gap(self) -> int:
+        """Number of guards up to the widest gap between nominal eigenvalues: few modes swap across it."""
+        highest = min(self.n_lowest + GUARD_MODES + 1, self.available)
+        at = nominal_theta(self.stiffness.exponents.shape[1])
+        eigenvalues = self.solver.eigenvalues(at, highest)[0, self.n_lowest - 1 :]
+        ratios = eigenvalues[1:] / eigenvalues[:-1]
+        return int(ratios.argmax()) if len(ratios) and np.isfinite(ratios).all() else GUARD_MODES
+
+    def certified(self, theta: Array) -> NDArray[np.bool_]:
+        """Rows that are solved by iteration; the others are solved by LAPACK."""
+        if isinstance(self.solver, CondensationSolver):
+            return self.solver.certified(theta, self.n_solved)
+        return np.zeros(len(theta), dtype=bool)
 
     def frequencies(self, theta: Array) -> tuple[Array]:
         """Frequencies in Hz, (n_samples, n_modes)."""
@@ -188,7 +224,7 @@ class AffineCore:
     def modes(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and shapes (n_samples, n, n_modes)."""
         if self.track:
-            return self._tracked(theta, self.first_candidates)
+            return self._tracked(theta, self.n_solved)
         eigenvalues, shapes = self.solver.modes(theta, self.n_lowest)
         return hertz(eigenvalues[:, self.ranks]), shapes[:, :, self.ranks]
 
@@ -260,9 +296,12 @@ class AffineCore:
         order = pair_modes(mac, self.nominal.repeated)
         frequencies = np.take_along_axis(hertz(eigenvalues), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
-        doubtful = may_be_missed(mac, order, self.nominal.repeated)
+        if n_candidates < self.first_candidates:
+            doubtful, more = may_differ(mac, order, self.nominal.repeated), self.first_candidates
+        else:
+            doubtful, more = may_be_missed(mac, order, self.nominal.repeated), 2 * n_candidates
         if n_candidates < self.max_candidates and doubtful.any():
-            more = min(2 * n_candidates, self.max_candidates)
+            more = min(more, self.max_candidates)
             frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], more)
         return frequencies, shapes
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arguments import check_bounds, check_theta
 from skthermo._arrays import Array, Bounds, RandomState
 from skthermo.fem.affine._base import AffineBase
-from skthermo.fem.affine._basis import Basis, grow_basis, projected_core
+from skthermo.fem.affine._basis import Basis, grow_basis
 from skthermo.fem.affine._core import AffineCore
 
 
@@ -109,6 +109,25 @@ class ReducedModel(AffineBase):
         """Number of basis vectors."""
         return self._core.stiffness.n_dof
 
+    def certified(self, theta: ArrayLike) -> NDArray[np.bool_]:
+        """Rows whose modes are found by iteration from the nominal modes, and certified to be the lowest.
+
+        The other rows, and all rows of a small basis or of a mass that varies, are solved by LAPACK, which takes about
+        five times as long. The results are the same within a hundredth of ``tol``.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+
+        Returns
+        -------
+        ndarray of bool of shape (n_samples,)
+            True where the iteration is certified.
+        """
+        rows = check_theta(theta, self.parameter_names)
+        return self._core.certified(rows)
+
     def damaged(self, damage: Mapping[str, float]) -> Self:
         """A new model with less stiffness (or more) in some groups, with a basis checked for the damage.
 
@@ -142,7 +161,7 @@ class ReducedModel(AffineBase):
         return self._twin(
             _full=full,
             _bounds=self._bounds / row.T,
-            _core=projected_core(full._core, self._basis, self._tol),
+            _core=full._core.projected(self._basis, self._tol),
             check_points_=self.check_points_ / row,
             snapshot_points_=self.snapshot_points_ / row,
         )

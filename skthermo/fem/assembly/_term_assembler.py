@@ -38,7 +38,8 @@ class TermAssembler:
         """Add one member's matrices, given the parameters and damage groups bound to its properties."""
         rows = np.array([self._index.get(dof, -1) for dof in dofs])
         free = np.flatnonzero(rows >= 0)
-        grid = np.meshgrid(rows[free], rows[free], indexing="ij")
+        square, kept = np.ix_(free, free), rows[free]
+        grid = np.repeat(kept, len(kept)), np.tile(kept, len(kept))
         for properties, matrix in matrices.items():
             key = tuple(
                 parameter
@@ -46,7 +47,7 @@ class TermAssembler:
                 for _ in range(1 if prop in (STIFFNESS, MASS) else properties.count(prop))
             )
             groups = frozenset(g for g, prop in (damage or {}).items() if prop in (STIFFNESS, *properties))
-            block = matrix[np.ix_(free, free)]
+            block = matrix[square].ravel()
             self._entries.setdefault((key, groups), []).append((block, *grid))
             self._contents.setdefault((key, groups), []).append((member, properties))
 
@@ -68,5 +69,5 @@ class TermAssembler:
         shape = (len(self._index), len(self._index))
         if not blocks:
             return scipy.sparse.csr_array(shape)
-        values, rows, columns = (np.concatenate([b[i].ravel() for b in blocks]) for i in range(3))
+        values, rows, columns = (np.concatenate([b[i] for b in blocks]) for i in range(3))
         return scipy.sparse.csr_array((values, (rows, columns)), shape=shape)

@@ -37,6 +37,16 @@ def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: N
     return (assigned < left).any(axis=1)
 
 
+def may_differ(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples in which the assignment could be another one if more candidates were examined.
+
+    It is final where every reference is assigned its best candidate, which no mode beyond these can surpass.
+    """
+    spans = repeated @ mac
+    assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
+    return (assigned < spans.max(axis=2)).any(axis=1) | may_be_missed(mac, order, repeated)
+
+
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which of some ascending eigenvalues equal each other up to rounding, (n_modes, n_modes)."""
     cluster = np.cumsum(np.diff(eigenvalues, prepend=0) > REPEATED * eigenvalues)

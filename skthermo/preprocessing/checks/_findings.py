@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._arrays import Array, as_floats, median, spread_evenly
 from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
-from skthermo.preprocessing._weather_regression import WeatherBasis, median, out_of_fold, robust_deviation
+from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold, robust_deviation
 from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
 from skthermo.preprocessing.checks._stuck import stuck_runs
 from skthermo.preprocessing.checks._swaps import swapped_modes
