@@ -1,5 +1,6 @@
 """A basis of mode shapes that represents a model within a box, enlarged until a stated error is reached."""
 
+from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
@@ -12,9 +13,12 @@ from skthermo._arrays import Array, RandomState, as_random_state
 from skthermo._threads import map_on_blas_threads
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.modal import factorise, may_be_missed, pair_modes
+from skthermo.fem.modal import GuidedSolver, ShiftInvertSolver, factorise, may_be_missed, pair_modes
 
 FIRST_SNAPSHOTS = 16
+UNGUIDED = 3  # snapshots, beside which all others start from the modes of a basis
+SNAPSHOT_SHARE = 10.0  # largest error of an eigenvalue of a snapshot, as a share of the basis's tolerance
+CHECK_SHARE = 1e-2  # the same at a check point
 SNAPSHOTS_PER_ROUND = 12
 CANDIDATES_PER_ROUND = 96
 CHECK_POINTS = 20
@@ -42,20 +46,22 @@ def grow_basis(
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     factors = factorise(stiffness)
     if start is None:
-        snapshots = np.empty((full.stiffness.n_dof, 0))
-        points = np.vstack([nominal, draw(bounds, random, FIRST_SNAPSHOTS)])
+        points = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
+        used, snapshots, points = [points], snapshots_at(full, points[:UNGUIDED]), points[UNGUIDED:]
     else:
-        snapshots, points = start, nominal[:0]
-    used = [points]
+        used, snapshots, points = [nominal[:0]], start, nominal[:0]
+    vectors, core = enlarged(full, snapshots, stiffness, tol)
     for _ in range(MAX_ROUNDS):
-        snapshots = np.hstack([snapshots, snapshots_at(full, points)])
-        vectors = orthonormal(snapshots, stiffness, drop=tol)
-        core = full.projected(vectors, tol)
-        candidates = draw(bounds, random, CANDIDATES_PER_ROUND)
-        errors = estimated_errors(full, core, vectors, candidates, factors)
-        if errors.max() < tol / 2:
-            candidates = without(draw(bounds, random, CHECK_POINTS), np.vstack(used))
-            errors = true_errors(full, core, candidates)
+        if len(points):
+            snapshots = np.hstack([snapshots, snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points)])
+            vectors, core = enlarged(full, snapshots, stiffness, tol)
+        for candidates in drawn(bounds, random, CANDIDATES_PER_ROUND)[::-1]:  # errors are largest at corners
+            errors = estimated_errors(full, core, vectors, candidates, factors)
+            if errors.max() >= tol / 2:
+                break
+        else:
+            candidates = without(np.vstack(drawn(bounds, random, CHECK_POINTS)), np.vstack(used))
+            errors = true_errors(guided(full, core, vectors, CHECK_SHARE * tol), core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
         points = candidates[np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]]
@@ -66,19 +72,32 @@ def grow_basis(
     )
 
 
+def enlarged(full: AffineCore, snapshots: Array, stiffness: csc_array, tol: float) -> tuple[Array, AffineCore]:
+    """A basis of the space that snapshots span, and the core on it."""
+    vectors = orthonormal(snapshots, stiffness, drop=tol)
+    return vectors, full.projected(vectors, tol)
+
+
+def guided(full: AffineCore, core: AffineCore, vectors: Array, tol: float) -> AffineCore:
+    """The full core; a sparse one is solved from the shapes of the core on the basis, to a relative error ``tol``."""
+    if not isinstance(full.solver, ShiftInvertSolver):
+        return full
+    return replace(full, solver=GuidedSolver(full.solver, core.solver, vectors, tol))
+
+
 def own_stream(seed: RandomState) -> np.random.RandomState:
     """A random stream that differs from that of a sample drawn with the same seed."""
     return np.random.RandomState(as_random_state(seed).randint(2**32, size=8, dtype=np.uint32))
 
 
-def draw(bounds: Array, random: np.random.RandomState, n_points: int) -> Array:
+def drawn(bounds: Array, random: np.random.RandomState, n_points: int) -> tuple[Array, Array]:
     """Uniform random points of a box, and as many of its corners, or all of these where they are fewer."""
     lowest, highest = bounds.T
     if 2 ** len(bounds) <= n_points // 2:
         corners = np.array([*product(*bounds)])
     else:
         corners = np.where(random.randint(2, size=(n_points // 2, len(bounds))), highest, lowest)
-    return np.vstack([random.uniform(lowest, highest, size=(n_points - len(corners), len(bounds))), corners])
+    return random.uniform(lowest, highest, size=(n_points - len(corners), len(bounds))), corners
 
 
 def without(points: Array, others: Array) -> Array:

@@ -9,13 +9,14 @@ from skthermo.fem.modal._matching import match_modes
 from skthermo.fem.modal._reordering import share_reordered
 from skthermo.fem.modal._shape_components import shape_components
 from skthermo.fem.modal._shape_derivatives import shape_derivatives
-from skthermo.fem.modal._shift_invert import ShiftInvertSolver
+from skthermo.fem.modal._shift_invert import GuidedSolver, ShiftInvertSolver
 from skthermo.fem.modal._stability import check_supported, count_modes
 from skthermo.fem.modal._tracking import may_be_missed, may_differ, pair_modes, repeated_modes
 
 __all__ = [
     "CondensationSolver",
     "EigenSolver",
+    "GuidedSolver",
     "LocalModes",
     "ShiftInvertSolver",
     "batch_solver",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.fem._factors import Factors
 from skthermo.fem._terms import SparseTerms
+from skthermo.fem.modal._dense import EigenSolver
 from skthermo.fem.modal._near_modes import modes_near
 
 GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
@@ -68,6 +69,32 @@ class ShiftInvertSolver:
         factors = self._factorise(stiffness)
         eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
         return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
+
+
+class GuidedSolver:
+    """A sparse solver that starts from the shapes of the same structure on a basis, to a relative error ``tol``."""
+
+    def __init__(self, full: ShiftInvertSolver, reduced: EigenSolver, basis: Array, tol: float):
+        self._full = full
+        self._reduced = reduced
+        self._basis = basis
+        self._tol = tol
+
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        return self.modes(theta, n_modes)[0]
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        n_guesses = min(n_modes + GUARD_VECTORS, self._basis.shape[1])
+        if n_guesses < n_modes:
+            return self._full.modes(theta, n_modes)
+        guesses = self._basis @ self._reduced.modes(theta, n_guesses)[1]
+        return self._full.modes_near(theta, guesses, n_modes, tol=self._tol)
+
+    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        return self._full.local_modes(theta, n_modes)
+
+    def scaled(self, factors: Array) -> EigenSolver:
+        return self._full.scaled(factors)
 
 
 def lowest_modes(
