@@ -121,7 +121,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     where the baseline itself is scaled. Of more than 5000 baseline records, as many, evenly spaced in time, teach the
     covariances. A new record takes S from the baseline record with the most similar weather; where a value is missing
     that no sensor tells, from all records. Where its temperatures lie outside the baseline's by e ranges of their
-    columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
+    columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the
+    regression says there is less certain.
 
     Missing values:
 
