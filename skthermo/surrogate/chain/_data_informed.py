@@ -139,6 +139,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     learns parameters in coordinates in which their errors count as those of frequencies do, free of the shrinkage that
     the inverse's prior causes, and rows with missing modes count less: by their posterior precision, if ``fit`` of the
     mapper takes ``sample_weight``. If temperatures are a frame, results are frames.
+    Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
+    among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
+    5000. Time and memory then grow in proportion to the rows.
     A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in the
     training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as one
     without any temperature, is NaN; no row is dropped.
