@@ -280,6 +280,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
+    ("preprocessing/_lags.py", "preprocessing/test_lags.py"): [
+        ("records that lags reach to", "max(self.lags_) * freq - tolerance", "max(self.lags_) * freq"),
+    ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
@@ -289,7 +292,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
-        ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
+        ("weight of all records", "filled + pseudo * prior.ravel()) / (counts + pseudo)", "filled) / counts"),
     ],
     ("detection/compensation/_whitening.py", "detection/test_whitening.py"): [
         ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),
