@@ -63,6 +63,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
     ],
+    ("fem/_factors.py", "fem/test_factors.py"): [
+        ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
+        ("order of elimination", "solution[self._order] =", "solution[:] ="),
+    ],
+    ("fem/modal/_near_modes.py", "fem/test_factors.py"): [
+        ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
+    ],
     ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
