@@ -181,6 +181,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes = slopes",
         ),
     ],
+    ("surrogate/inverse/_inversions.py", "surrogate/test_memory.py"): [
+        (
+            "stale inversions in memory",
+            "content_of(replace(refinement, n_jobs=None), inputs, guess)",
+            "content_of(guess)",
+        ),
+    ],
+    ("surrogate/_simulator.py", "surrogate/test_known_changes.py"): [
+        ("changes of another simulator", "default_factory=KnownChanges, init=False,", "default_factory=KnownChanges,"),
+    ],
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
         ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
     ],
