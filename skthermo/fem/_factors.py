@@ -1,6 +1,13 @@
-"""Factorisation of sparse symmetric matrices: the only place that calls a direct solver."""
+"""Factorisation of sparse symmetric matrices: the only place that calls a direct solver.
 
-from typing import Protocol
+The environment variable SKTHERMO_SOLVER names the solver: "superlu", which SciPy brings, or "rslab", an optional
+package that is faster where factors fill.
+"""
+
+import os
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse.linalg
@@ -8,7 +15,9 @@ from numpy.typing import NDArray
 
 from skthermo._arrays import Array
 
+VARIABLE = "SKTHERMO_SOLVER"
 SYMMETRIC = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+MINIMUM_DEGREE = "MMD_AT_PLUS_A"
 
 
 class Factors(Protocol):
@@ -18,11 +27,31 @@ class Factors(Protocol):
         """The solution x of K x = columns, one vector or several side by side."""
 
 
-class Elimination:
-    """Factorises matrices of one sparsity pattern, whose order of elimination is computed once.
+class Elimination(Protocol):
+    """Factorises matrices of one sparsity pattern, whose order of elimination is computed once."""
 
-    The order is that of minimum degree. It depends on the pattern alone.
-    """
+    def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:
+        """Factors of a matrix of the pattern, or None where it is not positive definite."""
+
+
+def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimination:
+    """The elimination of a pattern, given as compressed sparse columns with sorted rows, by the chosen solver."""
+    name = os.environ.get(VARIABLE, "superlu")
+    if name not in SOLVERS:
+        raise ValueError(f"{VARIABLE} is {name!r}; expected one of {list(SOLVERS)}")
+    return SOLVERS[name](rows, pointers)
+
+
+def factorise(matrix: scipy.sparse.csc_array) -> Factors | None:
+    """Factors of a single matrix, or None where it is not positive definite."""
+    if os.environ.get(VARIABLE, "superlu") == "superlu":
+        return superlu(matrix, MINIMUM_DEGREE)
+    matrix = matrix.sorted_indices()
+    return elimination(matrix.indices, matrix.indptr).factorise(matrix)
+
+
+class SuperLUElimination:
+    """Minimum degree, and L U without pivoting."""
 
     def __init__(self, rows: NDArray[np.int32], pointers: NDArray[np.int32]):
         n_dof, n_entries = len(pointers) - 1, len(rows)
@@ -30,7 +59,7 @@ class Elimination:
         dominant = pattern + scipy.sparse.diags_array(np.diff(pointers) + 1.0, format="csc")
         # With all that may be dropped dropped, an incomplete factorisation costs little more than its order.
         incomplete = scipy.sparse.linalg.spilu(
-            dominant, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC
+            dominant, drop_tol=1.0, fill_factor=1.0, permc_spec=MINIMUM_DEGREE, **SYMMETRIC
         )
         self._order = np.argsort(incomplete.perm_c)
         places = scipy.sparse.csc_array((np.arange(1, n_entries + 1), rows, pointers), shape=(n_dof, n_dof))
@@ -42,7 +71,7 @@ class Elimination:
         """Factors of a matrix of the pattern, or None where it is not positive definite."""
         entries = matrix.data[self._places], self._rows, self._pointers
         ordered = scipy.sparse.csc_array(entries, shape=matrix.shape)
-        factors = _superlu(ordered, "NATURAL", panel_size=1, relax=1)
+        factors = superlu(ordered, "NATURAL", panel_size=1, relax=1)
         return None if factors is None else _Reordered(factors, self._order)
 
 
@@ -59,15 +88,64 @@ class _Reordered:
         return solution
 
 
-def factorise(matrix: scipy.sparse.csc_array) -> Factors | None:
-    """Factors of a single matrix, or None where it is not positive definite."""
-    return _superlu(matrix, "MMD_AT_PLUS_A")
-
-
-def _superlu(matrix: scipy.sparse.csc_array, order: str, **options: int) -> scipy.sparse.linalg.SuperLU | None:
+def superlu(matrix: scipy.sparse.csc_array, order: str, **options: int) -> scipy.sparse.linalg.SuperLU | None:
     """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
     try:
         factors = scipy.sparse.linalg.splu(matrix, permc_spec=order, **SYMMETRIC, **options)
     except RuntimeError:  # exactly singular
         return None
     return factors if (factors.U.diagonal() > 0).all() else None
+
+
+class RslabElimination:
+    """Nested dissection or minimum degree, whichever fills less, and supernodal L D L'.
+
+    One thread each: results are the same to the last bit, and rows of theta are spread over cores.
+    """
+
+    def __init__(self, rows: NDArray[np.int32], pointers: NDArray[np.int32]):
+        n_dof = len(pointers) - 1
+        columns = np.repeat(np.arange(n_dof, dtype=rows.dtype), np.diff(pointers))
+        self._lower = np.flatnonzero(rows >= columns)
+        counts = np.bincount(columns[self._lower], minlength=n_dof)
+        self._rows, self._pointers = rows[self._lower], np.append(0, np.cumsum(counts))
+        self._analysis: Any = None
+        _rslab()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_analysis": None}  # it cannot be sent to a worker, which makes its own
+
+    def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:
+        """Factors of a matrix of the pattern, or None where it is not positive definite."""
+        data = matrix.data[self._lower]
+        if self._analysis is None:
+            pattern = scipy.sparse.csc_array((data, self._rows, self._pointers), shape=matrix.shape)
+            self._analysis = _rslab().analyze(pattern, path="ldlt", threads=1)
+        try:
+            factors = self._analysis.factor(data)
+        except RuntimeError:  # a pivot is zero
+            return None
+        return _RslabFactors(factors) if factors.inertia == (len(self._pointers) - 1, 0, 0) else None
+
+
+class _RslabFactors:
+    """Factors by rslab, which has one method for a vector and another for several."""
+
+    def __init__(self, factors: Any):
+        self._factors = factors
+
+    def solve(self, columns: Array) -> Array:
+        solve = self._factors.solve if columns.ndim == 1 else self._factors.solve_many
+        return np.asarray(solve(np.ascontiguousarray(columns)))
+
+
+SOLVERS: dict[str, Callable[[NDArray[np.int32], NDArray[np.int32]], Elimination]] = {
+    "superlu": SuperLUElimination,
+    "rslab": RslabElimination,
+}
+
+
+def _rslab() -> ModuleType:
+    from skthermo._validation import import_optional  # imported here because scikit-learn imports pandas
+
+    return import_optional("rslab", extra="sparse")

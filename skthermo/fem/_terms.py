@@ -10,7 +10,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._arrays import Array, Matrix, as_dense
-from skthermo.fem._factors import Elimination
+from skthermo.fem._factors import Elimination, elimination
 from skthermo.fem._theta import ROWS_PER_CHUNK
 
 SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
@@ -189,7 +189,7 @@ class SparsityPattern:
     @cached_property
     def elimination(self) -> Elimination:
         """The order in which matrices of this pattern are factorised."""
-        return Elimination(self.rows, self.pointers)
+        return elimination(self.rows, self.pointers)
 
     def matrix(self, data: Array) -> scipy.sparse.csc_array:
         """The matrix with these entries."""

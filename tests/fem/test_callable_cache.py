@@ -1,12 +1,11 @@
 """Solved samples on disk: nothing is lost, nothing is solved twice, and nobody else's file is touched."""
 
 import json
+import multiprocessing
 import os
 import pickle
 import re
 import signal
-import subprocess
-import sys
 import time
 import warnings
 
@@ -268,29 +267,30 @@ def test_workers_share_one_file(file):
     assert not counted.rows
 
 
-PROGRAM = """
-import os, sys, time
-import numpy as np
-from skthermo.fem import CallableModel
-
-cache, log, start, stop, stall = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:])
-theta = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
-begun = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-
-def slow(row):
-    os.write(begun, row.tobytes())
-    time.sleep(60 if os.fstat(begun).st_size == 16 * stall else 0.001)
-    return np.sqrt(row[0] + row[1] * np.arange(1.0, 4.0)) / 3
-
-CallableModel(slow, ["E", "k"], 3, cache=cache).frequencies(theta[start:stop])
-"""
 MANY = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
+PROCESSES = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
+
+
+def program(file, log, start, stop, stall):
+    begun = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+
+    def slow(row):
+        os.write(begun, row.tobytes())
+        time.sleep(60 if os.fstat(begun).st_size == 16 * stall else 0.001)
+        return three_modes(row)
+
+    CallableModel(slow, NAMES, 3, cache=file).frequencies(MANY[start:stop])
 
 
 def run_program(file, log, start, stop, stall=0):
-    arguments = [sys.executable, "-c", PROGRAM, file, log, start, stop, stall]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    return subprocess.Popen([str(a) for a in arguments], env=environment)
+    process = PROCESSES.Process(target=program, args=(file, log, start, stop, stall))
+    process.start()
+    return process
+
+
+def ended(process):
+    process.join()
+    return process.exitcode
 
 
 def begun(log):
@@ -306,25 +306,27 @@ def check_all_solved(file):
     np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
 
 
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 def test_killed_in_the_middle_of_a_thousand_solves(file, tmp_path):
     log = tmp_path / "log"
     for solved, stall in ((300, 300), (700, 0)):  # first within a solve, then wherever it is
         process = run_program(file, log, 0, 1000, stall)
-        while process.poll() is None and len(begun(log)) < solved:
+        while process.is_alive() and len(begun(log)) < solved:
             time.sleep(0.005)
         process.kill()
-        assert process.wait() == -signal.SIGKILL or not stall
-    assert run_program(file, log, 0, 1000).wait() == 0
+        assert ended(process) == -signal.SIGKILL or not stall
+    assert ended(run_program(file, log, 0, 1000)) == 0
     assert len(np.unique(begun(log), axis=0)) == 1000
     assert 1000 < len(begun(log)) <= 1002  # again only what was under way
     check_all_solved(file)
 
 
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_two_processes_at_once(file, tmp_path):
     logs = tmp_path / "log1", tmp_path / "log2"
     both = [run_program(file, logs[0], 0, 700), run_program(file, logs[1], 300, 1000)]
-    assert [process.wait() for process in both] == [0, 0]
+    assert [ended(process) for process in both] == [0, 0]
     header = len(json.dumps({"skthermo": "solved samples 1", "parameter_names": NAMES, "n_modes": 3})) + 1
     assert (file.stat().st_size - header) % RECORD == 0
     assert file.stat().st_size - header == RECORD * sum(len(begun(log)) for log in logs)

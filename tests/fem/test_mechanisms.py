@@ -15,18 +15,18 @@ def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
     return Structure(nodes, beams, supports, {"all": list(beams)}).assemble(["all"], n_modes=2)
 
 
-@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
-def test_a_fine_mesh_is_no_mechanism(direction):
+@pytest.mark.parametrize(("direction", "n_beams"), [((1.0, 0.0, 0.0), 500), ((1.0, 2.0, 3.0), 2000)])
+def test_a_fine_mesh_is_no_mechanism(direction, n_beams):
     exact = 1.875104068711961**2 / (2 * np.pi) * np.sqrt(210e9 * 1e-5 / (7850 * 0.02)) / 10**2
-    frequencies = cantilever(2000, {0: "xyz rx ry rz"}, direction=direction).frequencies([[1.0]])
+    frequencies = cantilever(n_beams, {0: "xyz rx ry rz"}, direction=direction).frequencies([[1.0]])
     np.testing.assert_allclose(frequencies[0, 0], exact, rtol=2e-3)
 
 
-@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
-def test_a_mechanism_is_one_in_every_mesh(direction):
-    for n_beams in (5, 40, 400):
+@pytest.mark.parametrize(("direction", "finest"), [((1.0, 0.0, 0.0), 500), ((1.0, 2.0, 3.0), 2000)])
+def test_a_mechanism_is_one_in_every_mesh(direction, finest):
+    for n_beams in (5, 100):
         for ends in ({}, {0: "xyz"}, {0: "xyz", n_beams: "xyz"}):
             with pytest.raises(ValueError, match="the structure is a mechanism"):
                 cantilever(n_beams, ends, direction=direction)
     with pytest.raises(ValueError, match="the structure is a mechanism"):
-        cantilever(2000, {0: "xyz", 2000: "xyz"}, direction=direction)
+        cantilever(finest, {0: "xyz", finest: "xyz"}, direction=direction)

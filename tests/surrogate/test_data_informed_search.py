@@ -4,7 +4,6 @@ import joblib
 import numpy as np
 import pandas as pd
 import pytest
-from joblib.externals.loky import get_reusable_executor
 from sklearn.base import clone
 from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import LinearRegression
@@ -12,30 +11,11 @@ from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cros
 
 from skthermo.fem import AffineModel
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse
+from tests.surrogate.chains import TRUSS, F, Logged, T, chain, fitted, inverse
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 FITTED = fitted()
-
-
-LOGGED_MODEL = """
-import time
-import numpy as np
-
-class Logged:
-    parameter_names = ("k",)
-    n_modes = 1
-
-    def __init__(self, log):
-        self.log = log
-
-    def frequencies(self, theta):
-        time.sleep(0.3 * (len(theta) == 77))  # long enough for the other process to come along
-        with open(self.log, "a") as file:
-            file.write(f"{len(theta)}\\n")
-        return np.sqrt(theta)
-"""
 
 
 def test_simulated_noise_is_relative_and_seeded():
@@ -55,12 +35,7 @@ def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
     np.testing.assert_array_equal(*(search.predict(T) for search in searches))
 
 
-def test_processes_that_search_together_simulate_once(tmp_path, monkeypatch):
-    (tmp_path / "logged_model.py").write_text(LOGGED_MODEL.replace("\\\\n", "\\n"))
-    monkeypatch.syspath_prepend(tmp_path)
-    get_reusable_executor().shutdown()  # its workers do not know the new path
-    from logged_model import Logged
-
+def test_processes_that_search_together_simulate_once(tmp_path):
     model = Logged(tmp_path / "solved.txt")
     air = np.linspace(0, 30, 60)[:, np.newaxis]
     measured = np.sqrt(1 - 0.005 * air)

@@ -7,7 +7,7 @@ from skthermo._arrays import Array
 from skthermo.fem._factors import Factors
 
 MAX_STEPS = 6
-RANDOM_COLUMNS = 2  # a mode that all guesses lack shows in these
+FURTHER, RANDOM_COLUMNS, RANDOM_STEPS = 2, 2, 3
 CLUSTER = 0.01  # relative distance of eigenvalues that are judged together
 DEPENDENT = 1e-14  # share of modal mass below which a direction is rounding error
 
@@ -17,23 +17,31 @@ def modes_near(
     factors: Factors,
     mass: scipy.sparse.csc_array,
     guesses: Array,
+    reference: Array,
     n_modes: int,
     *,
     tol: float,
 ) -> tuple[Array, Array] | None:
     """Eigenvalues in ascending order and shapes of unit modal mass, or None where few steps do not find them.
 
-    Rayleigh-Ritz of A = K^-1 M, in the inner product of M, on the guesses, two random columns and their images by A. A
-    residual r of unit modal mass says that an eigenvalue of A lies within |r|, and bounds the error of a converged one
-    by |r|^2 over the distance to the next (Kato and Temple). The modes are found once this is below ``tol`` for all
-    that may be among the lowest.
+    Rayleigh-Ritz of A = K^-1 M, in the inner product of M, on the guesses, two more of the best directions that they
+    and the modes of a reference state span, two columns that a few steps of inverse iteration make of random ones, and
+    the images of all these by A. A mode that the guesses lack shows among the others. A residual r of unit modal mass
+    says that an eigenvalue of A lies within |r|, and bounds the error of a converged one by |r|^2 over the distance to
+    the next (Kato and Temple). The modes are found once this is below ``tol`` for all that may be among the lowest.
     """
-    if not np.isfinite(guesses).all():
+    columns = np.hstack([guesses, reference])
+    if not np.isfinite(columns).all():
         return None
+    nothing = columns[:, :0]
+    known = orthonormal(columns, mass, nothing, nothing)[0]
+    lowest = known @ np.linalg.eigh(known.T @ (stiffness @ known))[1][:, : guesses.shape[1] + FURTHER]
     random = np.random.default_rng(0).standard_normal((len(guesses), RANDOM_COLUMNS))
-    columns = np.hstack([guesses, random])
-    basis, weighted = orthonormal(columns, mass, columns[:, :0], columns[:, :0])
-    images, block = columns[:, :0], weighted
+    for _ in range(RANDOM_STEPS):  # towards the lowest modes beside those
+        random = factors.solve(orthonormal(random, mass, lowest, mass @ lowest)[1])
+    columns = np.hstack([lowest, random])
+    basis, weighted = orthonormal(columns, mass, nothing, nothing)
+    images, block = nothing, weighted
     for _ in range(MAX_STEPS):
         if not block.shape[1] or basis.shape[1] < n_modes:
             return None

@@ -1,6 +1,7 @@
 """Sparse generalised eigenproblems K phi = lambda M phi, one theta after the other."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from skthermo._arrays import Array
 from skthermo.fem._factors import Factors
 from skthermo.fem._terms import SparseTerms
+from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal._dense import EigenSolver
 from skthermo.fem.modal._near_modes import modes_near
 
@@ -29,6 +31,10 @@ class ShiftInvertSolver:
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)
         self._factorise = stiffness.pattern.elimination.factorise
+        self._references: dict[int, Array] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_references": {}}  # what was solved before is no part of a model
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
         return self._each(theta, n_modes, with_shapes=False)[0]
@@ -42,6 +48,8 @@ class ShiftInvertSolver:
         Guesses (n_samples, n_dof, n_guesses) are for at least as many modes; rows that they do not help are solved as
         by ``modes``.
         """
+        if n_modes not in self._references:
+            self._references[n_modes] = self.modes(nominal_theta(theta.shape[1]), n_modes)[1][0]
         return self._each(theta, n_modes, with_shapes=True, guesses=guesses, tol=tol)
 
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
@@ -56,7 +64,7 @@ class ShiftInvertSolver:
         for row, (stiffness, mass) in enumerate(pairs):
             factors, found = self._factorise(stiffness), None
             if factors is not None and guesses is not None:
-                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=tol)
+                found = modes_near(stiffness, factors, mass, guesses[row], self._references[n_modes], n_modes, tol=tol)
             if found is None:
                 found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
             eigenvalues[row] = found[0]

@@ -67,7 +67,8 @@ def _solved(
         yield from map_on_blas_threads(task, chunks)
     else:
         parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-        yield from parallel(delayed(_on_one_thread)(task, chunk) for chunk in chunks)
+        job = _Job(task)
+        yield from parallel(delayed(_on_one_thread)(job, chunk) for chunk in chunks)
 
 
 def _parallel(**options: Any) -> Parallel:
@@ -78,6 +79,16 @@ def _parallel(**options: Any) -> Parallel:
         return Parallel(**options)
 
 
-def _on_one_thread(task: Callable[[Array], Any], chunk: Array) -> Any:
+class _Job:
+    """What is done with every chunk; Dask sends it to a worker once, because it says that it is large."""
+
+    def __init__(self, task: Callable[[Array], Any]):
+        self.task = task
+
+    def __sizeof__(self) -> int:
+        return 2**20
+
+
+def _on_one_thread(job: _Job, chunk: Array) -> Any:
     with single_blas_thread():
-        return task(chunk)
+        return job.task(chunk)

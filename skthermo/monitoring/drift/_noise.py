@@ -70,7 +70,7 @@ class DailyNoise:
         thinness = usual / np.maximum(counts, 1)
         columns = np.concatenate([np.nan_to_num(values)[:, :, np.newaxis], regressors], axis=2)
         known = ~np.isnan(values)
-        products, logarithms, _ = _innovations(columns, known, thinness, candidates)
+        products, logarithms, _ = _innovations(columns, known, thinness, candidates[:, np.newaxis])
         n_days, n_regressors = known.sum(axis=0), regressors.shape[2]
         gram, cross = products[:, :, 1:, 1:], products[:, :, 1:, 0]
         size = np.trace(gram, axis1=2, axis2=3)[:, :, np.newaxis, np.newaxis]
@@ -82,13 +82,7 @@ class DailyNoise:
         likelihood = -(logarithms + np.linalg.slogdet(gram + ridge)[1] + freedom * np.log(variances)) / 2
         best, modes = likelihood.argmax(axis=0), np.arange(values.shape[1])
         chosen, deviations = candidates[best], np.sqrt(variances[best, modes])
-        whitened = np.stack(
-            [
-                _innovations(columns[:, [m]], known[:, [m]], thinness[:, [m]], chosen[[m]], keep=True)[2][:, 0, 0]
-                for m in modes
-            ],
-            axis=1,
-        )
+        whitened = _innovations(columns, known, thinness, chosen[np.newaxis], keep=True)[2][:, 0]
         residuals = whitened[:, :, 0] - np.einsum("tmk,mk->tm", whitened[:, :, 1:], coefficients[best, modes])
         residuals = np.where(known, residuals / deviations, 0.0)
         together = known.T.astype(float) @ known
@@ -111,10 +105,11 @@ def _innovations(
 ) -> tuple[Array, Array, Array]:
     """Sums of products of whitened columns, (n_candidates, n_modes, n_columns, n_columns), and of log variances.
 
-    The columns, (n_days, n_modes, n_columns), are whitened by the scalar Kalman filter of each candidate.
+    The columns, (n_days, n_modes, n_columns), are whitened by the scalar Kalman filter of each candidate, which has a
+    memory and a share for all modes, (n_candidates, 1, 2), or for each, (n_candidates, n_modes, 2).
     """
     n_days, n_modes, n_columns = columns.shape
-    memory, share = candidates[:, 0, np.newaxis], candidates[:, 1, np.newaxis]
+    memory, share = candidates[..., 0], candidates[..., 1]
     expected = np.zeros((len(candidates), n_modes, n_columns))
     spread = np.broadcast_to(share, (len(candidates), n_modes)).copy()
     products = np.zeros((len(candidates), n_modes, n_columns, n_columns))

@@ -1,0 +1,238 @@
+"""Time and memory of exported models of 100,000 degrees of freedom and more, from the files to a fitted chain.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/large_models.py --kind grid --dof 100000
+    OMP_NUM_THREADS=1 SKTHERMO_SOLVER=rslab python tests/benchmarks/large_models.py --kind solid --dof 100000
+
+A slab bridge as a grillage of beams (two-dimensional, 6 degrees of freedom a node) or as a lattice of solid elements
+(three-dimensional, 3 a node), with 5 parameters: three thirds of the deck, its pavement or cross beams, and its
+bearings. The matrices are written as a folder of .npz files, as an FE program would, and read by `load_affine`. The
+factorisation is compared with what the core gives: the rate of matrix products, and of a sum of long vectors.
+"""
+
+import argparse
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import scipy.sparse
+
+from skthermo.fem import load_affine
+from skthermo.fem.modal import check_supported, count_modes
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+
+SPAN, WIDTH, DEPTH = 48.0, 12.0, 1.2
+E, POISSON, DENSITY, BEARING = 35e9, 0.2, 2500.0, 5e9
+BOUNDS = 0.2
+
+
+def assembled(matrices, places, n_dof):
+    """The sum of element matrices, one for all or one for each, at rows of places."""
+    size = places.shape[1]
+    rows, columns = np.repeat(places, size, axis=1), np.tile(places, size)
+    data = np.broadcast_to(np.reshape(matrices, (-1, size * size)), rows.shape)
+    return scipy.sparse.coo_array((data.ravel(), (rows.ravel(), columns.ravel())), shape=(n_dof, n_dof)).tocsc()
+
+
+def brick(edges):
+    """Stiffness for a unit modulus and mass for a unit density of an 8-node brick, by 2 x 2 x 2 Gauss points."""
+    corners = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    shear = (1 - 2 * POISSON) / 2
+    law = np.diag([1 - 2 * POISSON] * 3 + [shear] * 3)
+    law[:3, :3] += POISSON
+    law /= (1 + POISSON) * (1 - 2 * POISSON)
+    stiffness, mass, volume = np.zeros((24, 24)), np.zeros((24, 24)), np.prod(edges)
+    for point in corners / np.sqrt(3):
+        factors = 1 + corners * point
+        shapes = factors.prod(axis=1) / 8
+        slopes = np.stack([corners[:, d] * factors[:, np.arange(3) != d].prod(axis=1) / 8 for d in range(3)])
+        dx, dy, dz = slopes * 2 / np.reshape(edges, (3, 1))
+        strain = np.zeros((6, 24))
+        strain[0, 0::3], strain[1, 1::3], strain[2, 2::3] = dx, dy, dz
+        strain[3, 0::3], strain[3, 1::3] = dy, dx
+        strain[4, 1::3], strain[4, 2::3] = dz, dy
+        strain[5, 0::3], strain[5, 2::3] = dz, dx
+        stiffness += strain.T @ law @ strain * volume / 8
+        mass += np.kron(np.outer(shapes, shapes), np.eye(3)) * volume / 8
+    return stiffness, mass
+
+
+def beam(length, direction):
+    """Stiffness of a square beam between two nodes of 6 degrees of freedom, along x (0) or y (1)."""
+    area, inertia, torsion, shear = DEPTH**2, DEPTH**4 / 12, 0.14 * DEPTH**4, E / (2 * (1 + POISSON))
+    local = np.zeros((12, 12))
+    for i, k in ((0, E * area), (3, shear * torsion)):
+        local[np.ix_([i, i + 6], [i, i + 6])] = k / length * np.array([[1, -1], [-1, 1]])
+    for i, j, sign in ((1, 5, 1), (2, 4, -1)):
+        a = sign * length
+        bending = [[12, 6 * a, -12, 6 * a], [6 * a, 4 * a * a, -6 * a, 2 * a * a]]
+        bending += [[-12, -6 * a, 12, -6 * a], [6 * a, 2 * a * a, -6 * a, 4 * a * a]]
+        places = [i, j, i + 6, j + 6]
+        local[np.ix_(places, places)] = E * inertia / length**3 * np.array(bending)
+    turn = np.kron(np.eye(4), np.eye(3) if direction == 0 else np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
+    return turn.T @ local @ turn
+
+
+def bearings(places, n_dof):
+    data = np.bincount(places, minlength=n_dof) * BEARING / max(len(places) / 6, 1)
+    return scipy.sparse.diags_array(data).tocsc()
+
+
+def solid(n_dof):
+    """A slab of brick elements: terms and mass."""
+    n = max(2, round((n_dof / 3 / 32) ** (1 / 3)))
+    shape = np.array([16 * n, 4 * n, n // 2 + 1])
+    edges = np.array([SPAN, WIDTH, DEPTH]) / shape
+    numbers = np.arange(np.prod(shape + 1)).reshape(shape + 1)
+    corners = [
+        numbers[i : i + shape[0], j : j + shape[1], k : k + shape[2]].ravel()
+        for i in (0, 1)
+        for j in (0, 1)
+        for k in (0, 1)
+    ]
+    places = (3 * np.stack(corners, axis=1)[:, :, np.newaxis] + np.arange(3)).reshape(-1, 24)
+    stiffness, mass = brick(edges)
+    x, _, z = np.unravel_index(np.arange(len(places)), shape)
+    zones = np.where(z == shape[2] - 1, 3, x * 3 // shape[0])
+    size = 3 * numbers.size
+    held = (3 * numbers[[0, -1], :, 0].reshape(-1, 1) + np.arange(3)).ravel()
+    names = ("E_west", "E_middle", "E_east", "E_pavement")
+    terms = {name: assembled(E * stiffness, places[zones == zone], size) for zone, name in enumerate(names)}
+    return terms | {"bearings": bearings(held, size)}, assembled(DENSITY * mass, places, size)
+
+
+def grid(n_dof):
+    """A grillage of beams: terms and lumped mass."""
+    n = max(2, round(np.sqrt(n_dof / 6) / 2))
+    shape = np.array([4 * n, n])
+    numbers = np.arange(shape.prod()).reshape(shape)
+    steps = np.array([SPAN, WIDTH]) / (shape - 1)
+    size = 6 * numbers.size
+    along = [np.stack([numbers[:-1].ravel(), numbers[1:].ravel()], axis=1), 0]
+    across = [np.stack([numbers[:, :-1].ravel(), numbers[:, 1:].ravel()], axis=1), 1]
+    places = [(6 * ends[:, :, np.newaxis] + np.arange(6)).reshape(-1, 12) for ends, _ in (along, across)]
+    zones = along[0][:, 0] // shape[1] * 3 // (shape[0] - 1)
+    first = beam(steps[0], 0) / shape[1]
+    names = ("E_west", "E_middle", "E_east")
+    terms = {name: assembled(first, places[0][zones == zone], size) for zone, name in enumerate(names)}
+    terms["E_cross"] = assembled(beam(steps[1], 1) / shape[0], places[1], size)
+    held = (6 * numbers[[0, -1]].reshape(-1, 1) + np.arange(3)).ravel()
+    each = DENSITY * SPAN * WIDTH * DEPTH / numbers.size
+    mass = scipy.sparse.diags_array(np.tile([each] * 3 + [0.0] * 3, numbers.size)).tocsc()
+    return terms | {"bearings": bearings(held, size)}, mass
+
+
+KINDS = {"grid": grid, "solid": solid}
+
+
+def write(folder, terms, mass):
+    for name, matrix in (terms | {"M0": mass}).items():
+        scipy.sparse.save_npz(Path(folder) / f"{name}.npz", scipy.sparse.csc_matrix(matrix), compressed=False)
+
+
+def records(model, n_days):
+    """A year of temperatures and frequencies: stiffness falls by .4 % a degree in the deck."""
+    random = np.random.default_rng(0)
+    days = pd.date_range("2021-01-01", periods=n_days, freq="D")
+    season = 10 - 12 * np.cos(2 * np.pi * np.arange(n_days) / 365)
+    T = pd.DataFrame({"air": season + random.normal(0, 3, n_days)}, index=days)
+    theta = 1 - 0.004 * (T.to_numpy() - 10) * np.array([1.0, 1.0, 1.0, 1.2, 0.3])
+    frequencies = model.frequencies(np.clip(theta, 0.82, 1.18))
+    return T, frequencies * (1 + 0.001 * random.standard_normal(frequencies.shape))
+
+
+def peak_megabytes():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+def timed(what, way):
+    """Run a way once; print its seconds of wall and processor, and the peak memory of the process so far."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = way()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    print(f"{what:<44}{cpu:9.2f} s CPU{wall:9.2f} s{peak_megabytes():9.0f} MB", flush=True)
+    return result, cpu
+
+
+def roofline(seconds, flops, n_bytes):
+    """What a factorisation needs against what this core gives."""
+    a = np.random.default_rng(0).standard_normal((1500, 1500))
+    a @ a
+    gemm, stream = [], []
+    long = np.zeros(20_000_000)
+    for _ in range(5):
+        start = time.process_time()
+        a @ a
+        gemm.append(2 * 1500**3 / (time.process_time() - start))
+        start = time.process_time()
+        np.add(long, 1.0, out=long)
+        stream.append(16 * len(long) / (time.process_time() - start))
+    rate, bandwidth = max(gemm), max(stream)
+    print(
+        f"factorisation: {flops / 1e9:.2f} Gflop, {n_bytes / 1e6:.0f} MB of factors, {flops / seconds / 1e9:.1f} "
+        f"Gflop/s; matrix products give {rate / 1e9:.0f} Gflop/s and a stream {bandwidth / 1e9:.1f} GB/s: bound "
+        f"{max(flops / rate, n_bytes / bandwidth):.3f} s, measured {seconds:.3f} s"
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kind", choices=list(KINDS), default="grid")
+    parser.add_argument("--dof", type=int, default=100_000)
+    parser.add_argument("--days", type=int, default=365, help="records of the chain; 0 leaves the chain out")
+    parser.add_argument("--solves", type=int, default=3, help="full solves whose time is measured")
+    parser.add_argument("--full-only", action="store_true", help="leave out the reduced model and the chain")
+    options = parser.parse_args()
+    print(f"{'':<44}{'':>15}{'wall':>9}  {'peak so far'}")
+    with tempfile.TemporaryDirectory() as folder:
+        (terms, mass), _ = timed("generating the matrices", lambda: KINDS[options.kind](options.dof))
+        write(folder, terms, mass)
+        entries = sum(matrix.nnz for matrix in terms.values())
+        print(f"{options.kind} of {mass.shape[0]} degrees of freedom, {entries} entries of stiffness")
+        model, _ = timed("load_affine, with all checks", lambda: load_affine(folder))
+    print(model, model.frequencies(np.ones((1, 5)))[0].round(3))
+    stiffness, mass = model.matrices(np.ones(5))
+    timed("check_supported alone", lambda: check_supported(stiffness))
+    timed("count_modes alone", lambda: count_modes(mass, at_least=6))
+    theta = 1 + BOUNDS * np.random.default_rng(1).uniform(-1, 1, (options.solves, 5))
+    timed(f"frequencies of {options.solves} theta", lambda: model.frequencies(theta))
+    timed(f"Jacobians of {options.solves} theta", lambda: model.jacobian(theta))
+    roofline(*factorisation(model))
+    if options.full_only:
+        return
+    reduced, _ = timed("reduced(0.2)", lambda: model.reduced(BOUNDS, random_state=0))
+    print(f"{reduced.basis_size_} vectors, {len(reduced.snapshot_points_)} snapshots, error {reduced.error_:.1e}")
+    if options.days:
+        T, F = records(reduced, options.days)
+        inverse = InverseSurrogate(bounds=BOUNDS, n_samples=500, random_state=0)
+        chain = DataInformedFEM(model, inverse=inverse, reduce=True, random_state=0)
+        timed(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
+        timed("predict", lambda: chain.predict(T))
+
+
+def factorisation(model):
+    """Seconds, flops and bytes of one factorisation L L', the order of elimination left out."""
+    matrix = model.matrices(np.ones(5))[0]
+    elimination = model._core.stiffness.pattern.elimination
+    seconds = []
+    for _ in range(3):
+        start = time.process_time()
+        elimination.factorise(matrix)
+        seconds.append(time.process_time() - start)
+    return min(seconds[1:]), *work(elimination, matrix)
+
+
+def work(elimination, matrix):
+    """Flops, and bytes of the entries of L, from the columns' lengths or the solver's dense fronts."""
+    if hasattr(elimination, "_analysis"):  # rslab: columns and rows of each front
+        fronts = np.array(elimination._analysis.front_dims, dtype=float)
+        lengths = np.concatenate([rows - np.arange(columns) for columns, rows in fronts])
+    else:
+        lengths = np.diff(elimination.factorise(matrix)._factors.L.indptr).astype(float)
+    return (lengths**2).sum(), 8 * lengths.sum()
+
+
+if __name__ == "__main__":
+    main()
