@@ -124,13 +124,23 @@ class ChangedStructure:
         is_sparse = getattr(model, "prefer", "threads") == "processes" and hasattr(model, "reduced")
         return is_sparse or hasattr(model, "full") or self.fem.simulator_.reduced is not None
 
+    def _around(self, theta: Array) -> Array:
+        """Bounds of the parameters that the chain has learned, which are the same for all records, or of theta too."""
+        rows = self.fem.records_.learned
+        for _ in range(2):
+            lowest, highest = (1 - AROUND) * np.nanmin(rows, axis=0), (1 + AROUND) * np.nanmax(rows, axis=0)
+            if ((lowest <= theta) & (theta <= highest)).all():
+                break
+            rows = np.vstack([rows, theta])
+        return np.column_stack([lowest, highest])
+
     def _simulator(self, near: bool, theta: Array) -> Any:
         """The simulator that has the amounts as further columns of theta, around some rows of it."""
         if near not in self.simulators:
             groups, masses, simulator = self.changes.groups, self.changes.masses, self.fem.simulator_
             box = simulator.box
             if box is None:
-                box = np.column_stack([(1 - AROUND) * theta.min(axis=0), (1 + AROUND) * theta.max(axis=0)])
+                box = self._around(theta)
             box = np.vstack([box, np.ones((len(groups) + len(masses), 2))]) * self.changes.near()
             self.simulators[near] = simulator.with_columns(groups, masses, box if near else None)
         return self.simulators[near]

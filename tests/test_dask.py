@@ -1,6 +1,7 @@
 """A Dask cluster gives the bits of one process."""
 
 import os
+from operator import itemgetter
 
 import joblib
 import numpy as np
@@ -54,6 +55,24 @@ def test_samples_are_solved_by_the_workers(cluster):
     with joblib.parallel_config("dask"):
         processes = set(sample(where, 0.2, 64, random_state=0).frequencies.ravel())
     assert processes <= set(cluster.run(os.getpid).values())
+
+
+def test_a_model_is_sent_once():
+    sent = []
+
+    class Program:
+        def __call__(self, row):
+            return row[:1]
+
+        def __reduce__(self):
+            sent.append(self)
+            return itemgetter, (slice(0, 1),)
+
+    model = CallableModel(Program(), ["E"], 1)
+    with joblib.parallel_config("dask"):
+        drawn = sample(model, 0.2, 20 * model.rows_per_chunk, random_state=0)
+    np.testing.assert_array_equal(drawn.frequencies, drawn.theta)
+    assert 1 <= len(sent) <= 2  # one for each worker at most
 
 
 def test_a_grid_search_is_that_of_one_process():

@@ -66,6 +66,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/modal/_condensation.py", "fem/test_condensation.py"): [
         ("certificate against missed modes", "return positive & (np.triu", "return (np.triu"),
     ],
+    ("fem/_factors.py", "fem/test_factors.py"): [
+        ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
+        ("order of elimination", "solution[self._order] =", "solution[:] ="),
+    ],
+    ("fem/modal/_near_modes.py", "fem/test_factors.py"): [
+        ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
+    ],
     ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
@@ -276,6 +283,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
+    ("preprocessing/_lags.py", "preprocessing/test_lags.py"): [
+        ("records that lags reach to", "max(self.lags_) * freq - tolerance", "max(self.lags_) * freq"),
+    ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
@@ -285,7 +295,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
-        ("weight of all records", "(sums + pseudo * prior) / (counts + pseudo)", "(sums + prior) / (counts + 1)"),
+        ("weight of all records", "filled + pseudo * prior.ravel()) / (counts + pseudo)", "filled) / counts"),
     ],
     ("detection/compensation/_whitening.py", "detection/test_whitening.py"): [
         ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),

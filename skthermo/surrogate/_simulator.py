@@ -1,9 +1,14 @@
 """Frequencies of many rows of parameters, by the reduced model inside its box and the full model outside."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pickle import PicklingError
+from threading import Lock
 from typing import Any
 
+import joblib
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +19,7 @@ from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
 DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
 MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their range, and of their values
+MOST_KEPT = 25_000_000  # numbers, of 8 bytes, in the bases of reduced models that are kept
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
@@ -29,6 +35,49 @@ def tolerance(model: FEModel, reduce: bool | float) -> float | None:
     return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
 
 
+def box_around(theta: Array, limits: Array | None = None) -> Array:
+    """Lowest and highest of each parameter in rows of theta, with a margin, within limits; (n_parameters, 2)."""
+    lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
+    margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
+    box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
+    if limits is None:
+        return box
+    first, last = limits.T
+    return np.column_stack(
+        [np.clip(box[:, 0], first, last / (1 + LEAST_MARGIN)), np.clip(box[:, 1], first * (1 + LEAST_MARGIN), last)]
+    )
+
+
+class KnownChanges:
+    """Simulators of changed structures, whose reduced models are made once; copies and other processes begin with none.
+
+    Those asked for last are kept, as many as have `MOST_KEPT` numbers in their bases.
+    """
+
+    def __init__(self) -> None:
+        self._simulators: dict[str, Simulator] = {}
+        self._lock = Lock()
+
+    def __reduce__(self) -> tuple[type[KnownChanges], tuple[()]]:
+        return KnownChanges, ()
+
+    def simulator(self, make: Callable[[], Simulator], *change: Any) -> Simulator:
+        """What ``make`` gives for a change, made now or before."""
+        try:
+            key = joblib.hash(change)
+        except PicklingError:
+            return make()
+        found = self._simulators.get(key) or make()
+        with self._lock:
+            self._simulators.pop(key, None)
+            self._simulators[key] = found  # the last one
+            size = sum(one.size for one in self._simulators.values())
+            while size > MOST_KEPT:
+                oldest = next(iter(self._simulators))
+                size -= self._simulators.pop(oldest).size
+        return found
+
+
 @dataclass(frozen=True)
 class Simulator:
     """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2)."""
@@ -37,30 +86,81 @@ class Simulator:
     reduced: Any = None
     box: Array | None = None
     tol: float = DEFAULT_TOLERANCE
+    _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
 
     @classmethod
-    def around(cls, model: FEModel, theta: Array, reduce: bool | float) -> "Simulator":
-        """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta."""
+    def around(cls, model: FEModel, theta: Array, reduce: bool | float, known: Simulator | None = None) -> Simulator:
+        """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
+
+        A known simulator is taken if its reduced model is of the same model, as accurate, and covers that box.
+        """
         tol = tolerance(model, reduce)
         if tol is None:
             return cls(model)
-        lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
-        margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
-        box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
-        return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+        box = box_around(theta)
+        if known is not None and known.model is model and known.covers(box) and known.tol <= tol:
+            return known
+        try:
+            return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+        except RuntimeError as error:
+            ranges = ", ".join(
+                f"{name!r} {low:.3g} to {high:.3g}"
+                for name, (low, high) in zip(model.parameter_names, box, strict=True)
+            )
+            warn_user(
+                f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): {error}; "
+                "all rows are solved by the full model, which takes long: expected a model updated to the records",
+                "no reduced model",
+            )
+            return cls(model)
 
-    def changed(self, method: str, *args: Any, **options: Any) -> "Simulator":
+    @property
+    def size(self) -> int:
+        """Number of numbers in the bases of reduced models."""
+        return sum(model.basis_size_ * model.n_dof for model in (self.model, self.reduced) if hasattr(model, "full"))
+
+    def covers(self, box: Array) -> bool:
+        """Whether the reduced model is accurate within a whole box."""
+        if self.box is None:
+            return False
+        return bool((self.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= self.box[:, 1]).all())
+
+    def extended(self, theta: Array, limits: Array) -> Simulator:
+        """The simulator whose reduced model also covers a box around rows of theta, within limits (n_parameters, 2).
+
+        Where no basis is accurate in so wide a box, the reduced model stays as it is.
+        """
+        if self.box is None or not self.outside(theta).any():
+            return self
+        wanted = box_around(theta, limits)
+        lowest, highest = np.minimum(self.box[:, 0], wanted[:, 0]), np.maximum(self.box[:, 1], wanted[:, 1])
+        box = np.column_stack([lowest, highest])
+        try:
+            return Simulator(self.model, self.reduced.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+        except RuntimeError:
+            return self
+
+    @property
+    def approximate(self) -> Simulator:
+        """The simulator that takes the reduced model, if there is one, outside its box as well."""
+        return self if self.reduced is None else Simulator(self.reduced.quiet())
+
+    def changed(self, method: str, *args: Any, **options: Any) -> Simulator:
         """The simulator of the structure that a method of the model gives, such as "damaged"."""
         if not hasattr(self.model, method):
             raise ValueError(f"{self.model!r} has no method {method!r}; expected a model with one, such as AffineModel")
-        reduced = None if self.reduced is None else getattr(self.reduced, method)(*args, **options)
-        return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box, self.tol)
 
-    def damaged(self, damage: Mapping[str, float] | None) -> "Simulator":
+        def make() -> Simulator:
+            reduced = None if self.reduced is None else getattr(self.reduced, method)(*args, **options)
+            return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box, self.tol)
+
+        return self._known.simulator(make, method, args, options) if self.size else make()
+
+    def damaged(self, damage: Mapping[str, float] | None) -> Simulator:
         """The simulator of the damaged structure; itself without damage."""
         return self.changed("damaged", damage) if damage else self
 
-    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float) -> "Simulator":
+    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group."""
         severities = (min(lowest, 0.0) - MARGIN_OF_SEVERITY, min(max(highest, 0.0) + MARGIN_OF_SEVERITY, 0.99))
         changed = self.changed("with_damage_parameters", groups, severities=severities)
@@ -69,24 +169,28 @@ class Simulator:
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
 
-    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None) -> "Simulator":
+    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
 
         Within the box, (n_columns, 2), a reduced model is used, if there is a box.
         """
-        model: Any = getattr(self.model, "full", self.model)
-        model = model.with_damage_parameters(groups) if groups else model
-        model = model.with_mass_parameters(masses) if masses else model
-        if box is None:
-            return Simulator(model)
-        return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+
+        def make() -> Simulator:
+            model: Any = getattr(self.model, "full", self.model)
+            model = model.with_damage_parameters(groups) if groups else model
+            model = model.with_mass_parameters(masses) if masses else model
+            if box is None:
+                return Simulator(model)
+            return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)
+
+        return make() if box is None else self._known.simulator(make, "with_columns", list(groups), dict(masses), box)
 
     def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""
         if self.reduced is None:
             self._hint(len(theta))
             return evaluate(self.model, theta, n_jobs=n_jobs)
-        outside = self._outside(theta)
+        outside = self.outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
         if outside.any():
@@ -107,7 +211,7 @@ class Simulator:
         With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta. If ``relative``,
         derivatives are d ln f / d ln theta and d phi / d ln theta.
         """
-        outside = np.ones(len(theta), dtype=bool) if self.reduced is None else self._outside(theta)
+        outside = self.outside(theta)
         results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if rows.any():
@@ -125,7 +229,10 @@ class Simulator:
                     result[rows] = array
         return tuple(results)
 
-    def _outside(self, theta: Array) -> NDArray[np.bool_]:
+    def outside(self, theta: Array) -> NDArray[np.bool_]:
+        """Which rows the full model solves: those outside the box of the reduced model; all without one."""
+        if self.box is None:
+            return np.ones(len(theta), dtype=bool)
         lowest, highest = self.box.T
         return ((theta < lowest) | (theta > highest)).any(axis=1)
 

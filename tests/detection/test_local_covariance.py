@@ -26,6 +26,8 @@ def test_neighbours_are_the_nearest_in_weather_that_are_not_near_in_time(history
     anywhere = history.neighbours(size, history.places[[row]])
     assert row in anywhere.rows[anywhere.counted]
     assert anywhere.counted.sum() == size
+    own = history.neighbours(size, order=history.order)
+    assert set(own.rows[row, own.counted[row]]) == set(expected)
 
 
 def test_standard_deviations_are_those_of_the_neighbours_drawn_to_those_of_all(history):

@@ -74,6 +74,18 @@ def test_records_of_fit_are_the_history_of_transform():
         assert np.isnan(lags.transform(T.iloc[[29]])["T1_lag1"]).all()  # nine hours old
 
 
+@pytest.mark.parametrize("tolerance", ["0h", "3h"])
+@pytest.mark.parametrize("rows", [slice(0, 4), slice(40, 43), slice(90, 95), slice(95, 100)])
+def test_a_batch_has_the_lags_that_it_has_among_all_records(rows, tolerance):
+    random = np.random.default_rng(0)
+    hours = pd.Timestamp("2025-01-01") + pd.to_timedelta(np.sort(random.choice(160, 100, replace=False)), "h")
+    frame = pd.DataFrame(random.normal(size=(100, 2)), hours)
+    options = {"lags": [0, 1, 5, 12], "freq": "1h", "tolerance": tolerance}
+    history, batch = frame.iloc[random.permutation(95)], frame[rows]
+    found = LagFeatures(**options).fit(history).transform(batch)
+    np.testing.assert_array_equal(found, LagFeatures(**options).fit_transform(frame)[rows])
+
+
 def test_history_holds_the_records_of_fit_and_only_where_lags_go_by_time():
     lags = LagFeatures(3).fit(T)
     np.testing.assert_array_equal(lags.history_, T)

@@ -23,6 +23,7 @@ from tests.surrogate.chains import TRUSS
 YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 SETTINGS = {"regressor": Ridge(1e-3), "bounds": 0.2, "n_samples": 60, "noise": 0.01, "random_state": 0}
+KINDS = "simulations", "regressor", "adaptation", "inversion", "checks"
 THETA = np.random.default_rng(0).uniform(0.9, 1.1, (40, 4))
 
 
@@ -60,8 +61,8 @@ class TestOnce:
         for search in searches[1:]:
             np.testing.assert_array_equal(*(one.cv_results_["mean_test_score"] for one in (searches[0], search)))
             np.testing.assert_array_equal(searches[0].predict(T), search.predict(T))
-        numbers = {kind: kept(tmp_path, kind) for kind in ("simulations", "regressor", "inversion", "checks")}
-        assert numbers == {"simulations": 1, "regressor": 1, "inversion": 3, "checks": 3}
+        numbers = {kind: kept(tmp_path, kind) for kind in KINDS}
+        assert numbers == {"simulations": 1, "regressor": 1, "adaptation": 3, "inversion": 3, "checks": 3}
         assert len(list(tmp_path.rglob("output.pkl"))) == sum(numbers.values())
 
     def test_cross_validation_of_other_mappers_inverts_no_more(self, tmp_path):
@@ -183,8 +184,9 @@ class TestNothingStale:
         before = kept(filled, "inversion")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            known, fresh = (found(memory, records, **options) for memory in (str(filled), None))
+            known, again, fresh = (found(memory, records, **options) for memory in (str(filled), str(filled), None))
         assert_same(known, fresh)
+        assert_same(again, fresh)
         assert kept(filled, "inversion") == before + 1
 
     @pytest.mark.parametrize("module", ["skthermo", "sklearn"])

@@ -178,6 +178,7 @@ def test_models_without_derivatives_are_refined_on_request():
     np.testing.assert_allclose(refined.predict(X), INVERSE.predict(X), rtol=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore:the parameters of 1 of 5 rows")
 def test_reduced_models_and_stored_simulations_give_the_same(tmp_path):
     model = portal(n_modes=3, track=True).with_parameters(["columns", "beams"])
     dofs = [40, 100, 160, 220]

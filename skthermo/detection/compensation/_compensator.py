@@ -118,10 +118,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
     given the others, records of the same day (at least 24 rows around each) left out; such records are left out too
-    where the baseline itself is scaled. A new record takes S from the baseline record with the most similar weather;
-    where a value is missing that no sensor tells,
-    from all records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over
-    the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the regression says there is less certain.
+    where the baseline itself is scaled. Of more than 5000 baseline records, as many, evenly spaced in time, teach the
+    covariances. A new record takes S from the baseline record with the most similar weather; where a value is missing
+    that no sensor tells, from all records. Where its temperatures lie outside the baseline's by e ranges of their
+    columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the
+    regression says there is less certain.
 
     Missing values:
 

@@ -23,6 +23,9 @@ SNAPSHOTS_PER_ROUND = 12
 CANDIDATES_PER_ROUND = 96
 CHECK_POINTS = 20
 MAX_ROUNDS = 40
+HOPELESS, HOPELESS_ROUNDS = 1000, 3
+"""Estimated errors, in units of ``tol``, that are given up if so many further rounds have not halved them: points where
+the modes that are followed have dissolved among others, far from the nominal state."""
 
 LEAST_ENERGY = 1e-13  # share of strain energy below which a direction is rounding error
 
@@ -51,6 +54,7 @@ def grow_basis(
     else:
         used, snapshots, points = [nominal[:0]], start, nominal[:0]
     vectors, core = enlarged(full, snapshots, stiffness, tol)
+    largest: list[float] = []
     for _ in range(MAX_ROUNDS):
         if len(points):
             snapshots = np.hstack([snapshots, snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points)])
@@ -64,10 +68,14 @@ def grow_basis(
             errors = true_errors(guided(full, core, vectors, CHECK_SHARE * tol), core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
+        largest.append(float(errors.max()))
+        before = largest[-1 - HOPELESS_ROUNDS] if len(largest) > HOPELESS_ROUNDS else np.inf
+        if largest[-1] > max(before / 2, HOPELESS * tol):
+            break
         points = candidates[np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]]
         used.append(points)
     raise RuntimeError(
-        f"after {MAX_ROUNDS} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
+        f"after {len(largest)} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
         "larger tol, or narrower bounds"
     )
 

@@ -39,7 +39,7 @@ from skthermo._weather import FillError, SensorRegression, TrainingRange, told_f
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._box import Box
-from skthermo.surrogate._simulator import Simulator, tolerance
+from skthermo.surrogate._simulator import tolerance
 from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
 from skthermo.surrogate.chain._faults import Faults
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
@@ -49,6 +49,7 @@ from skthermo.surrogate.chain._parts import (
     inputs_of_last_step,
     known_findings,
     read_records,
+    simulator_of,
     surrogates_in,
     with_quick_start,
 )
@@ -86,10 +87,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
         there; without refining, they do not train M2.
     reduce : bool or float, default=False
-        Whether predictions and simulations use the reduced model ``model.reduced``, which makes large models much
-        faster. Its box covers the parameters that M2 gives for the training weather, plus a quarter of their range on
-        either side. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Rows
-        outside the box are solved by the model itself, with a warning that counts them.
+        Whether M1, predictions and simulations use a reduced model, ``model.reduced``, which makes large models much
+        faster. True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. Every
+        `InverseSurrogate` of the inverse whose own ``reduce`` is False gets this value: it simulates and refines with a
+        reduced model for its bounds, or for a wider box where the records have parameters outside them. Predictions
+        use that reduced model if its box covers the parameters that M2 gives for the training weather, plus a quarter
+        of their range on either side, else one of their own for this box. Rows outside the box are solved by the model
+        itself, with a warning that counts them; so are all where no basis is as accurate as that.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
         and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
@@ -135,6 +139,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     learns parameters in coordinates in which their errors count as those of frequencies do, free of the shrinkage that
     the inverse's prior causes, and rows with missing modes count less: by their posterior precision, if ``fit`` of the
     mapper takes ``sample_weight``. If temperatures are a frame, results are frames.
+    Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
+    among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
+    5000. Time and memory then grow in proportion to the rows.
     A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in the
     training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as one
     without any temperature, is NaN; no row is dropped.
@@ -267,7 +274,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
             self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
             self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-            self.simulator_ = Simulator.around(self.model, learned, self.reduce)
+            self.simulator_ = simulator_of(self, learned)
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_floats
@@ -33,13 +33,15 @@ class Estimates:
     """What M1 finds for each training record: parameters and, where it refines, how well they are known.
 
     ``residuals``, (n_samples, n_modes), are ln f measured minus ln f of the model; ``weights`` the posterior precision
-    as a share of that of a record with all modes.
+    as a share of that of a record with all modes; ``full_solves`` tells how often the full model was solved for each
+    because its steps left the box of the reduced model.
     """
 
     theta: Array
     residuals: Array | None = None
     weights: Array | None = None
     n_unconverged: int | None = None
+    full_solves: NDArray[np.intp] | None = None
 
     @classmethod
     def of(cls, inverse: Any, aligned: Any, parameter_names: list[str]) -> "Estimates":
@@ -60,7 +62,8 @@ class Estimates:
                 "imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
                 "scarce modes",
             )
-        return cls(as_floats(found.theta), found.residuals, found.weight, int(unconverged(found).sum()))
+        n_unconverged = int(unconverged(found).sum())
+        return cls(as_floats(found.theta), found.residuals, found.weight, n_unconverged, found.full_solves)
 
     def weighted(self, weights: Array | None) -> Array | None:
         """Weights of rows multiplied with a user's own; None where there are neither."""

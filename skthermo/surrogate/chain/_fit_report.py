@@ -84,6 +84,9 @@ class FitReport(SavesFrames):
         Number of rows used for ``errors``, spread evenly over the training rows.
     n_unconverged : int or None
         Rows whose parameters have not converged in refining; None without refining.
+    n_by_full_model, n_full_solves : int
+        Rows whose refined parameters are outside the box of the reduced model, and how often the full model was solved
+        for them; 0 without ``reduce``.
     round_trip : Series or None
         Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
         where the inverse does not give it.
@@ -116,6 +119,8 @@ class FitReport(SavesFrames):
     errors: pd.DataFrame
     n_scored: int
     n_unconverged: int | None = None
+    n_by_full_model: int = 0
+    n_full_solves: int = 0
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
     findings: RecordFindings | None = None
@@ -151,6 +156,11 @@ class FitReport(SavesFrames):
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
         if self.n_unconverged:
             lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
+        if self.n_by_full_model:
+            lines.append(
+                f"The parameters of {self.n_by_full_model} rows are outside the box of the reduced model: the full one "
+                f"was solved {self.n_full_solves} times."
+            )
         if self.findings is not None and len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
@@ -246,6 +256,7 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
+    full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
     known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
     last = last_step(chain.inverse_)
     round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
@@ -263,6 +274,8 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
         errors=pd.DataFrame(errors, index=modes),
         n_scored=len(rows),
         n_unconverged=estimates.n_unconverged,
+        n_by_full_model=int((full_solves > 0).sum()),
+        n_full_solves=int(full_solves.sum()),
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
         findings=findings,

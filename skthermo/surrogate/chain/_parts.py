@@ -10,12 +10,13 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arguments import check_model
-from skthermo._arrays import as_floats
+from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._memory import remembered
+from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
@@ -81,6 +82,8 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
                 f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                 f"{chain.model!r} has"
             )
+        if chain.reduce and not part.reduce and hasattr(part.model, "reduced"):
+            part.set_params(reduce=chain.reduce)
     random_state = seeded(chain.random_state)
     for part in (inverse, mapper, aligner, imputer):
         if part is not None:
@@ -105,6 +108,12 @@ def with_quick_start(chain: Any, model: Any) -> Any:
 def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:
     """Every `InverseSurrogate` that an inverse is or holds."""
     return (part for part in (inverse, *inverse.get_params().values()) if isinstance(part, InverseSurrogate))
+
+
+def simulator_of(chain: Any, theta: Array) -> Simulator:
+    """What a fitted chain simulates with; with ``reduce``, M1's reduced model if it covers what M2 gives."""
+    inverse = next(surrogates_in(chain.inverse_), None)
+    return Simulator.around(chain.model, theta, chain.reduce, getattr(inverse, "simulator_", None))
 
 
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:

@@ -82,9 +82,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Standard deviations of a Gaussian prior of ln theta about the middle of the bounds, for refining. By default
         that of values spread evenly over the box.
     reduce : bool or float, default=False
-        Whether to simulate with the reduced model ``model.reduced(bounds)``, much faster for large models. True allows
-        a relative error of 1e-5 in the frequencies; a number sets the error allowed. `inverse_transform` always uses
-        the full model.
+        Whether to simulate and refine with the reduced model ``model.reduced(bounds)``, much faster for large models.
+        True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. If the records that
+        `fit` sees have parameters outside the bounds, it makes a reduced model for a wider box that holds them, within
+        the limits of estimates (three times the half-width of the bounds, in ln theta). Rows that end outside that box
+        are solved by the full model, with a warning that counts them. `inverse_transform` and `round_trip` always use
+        the full model for the way back.
     memory : str or joblib.Memory, optional
         Folder for what is computed in `fit` and for the inversion of the records that `fit` saw, so that searches and
         cross-validation make each only once: simulations and their reduced model, by model, bounds, number and seed;
@@ -114,7 +117,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     scores_ : ShapeScores
         With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
     simulator_ : Simulator
-        If there is a model: it and, with ``reduce``, its reduced model.
+        If there is a model: it and, with ``reduce``, the reduced model of the steps.
     refinement_ : Refinement
         If estimates are refined: the model, the box and the prior of the steps.
     inversions_ : Inversions
@@ -142,6 +145,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     -----
     Frequencies cannot determine more parameters than there are modes, and an estimate is an effective stiffness, not a
     material property.
+
+    The steps of a row start on a response surface, a polynomial fitted to the simulations and to solutions near 200 of
+    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step that is below 1 % of each
+    parameter's posterior standard deviation and whose curvature changes no frequency by more than 1 % of the noise; the
+    noise is what is stated or, where the residuals of the row show more, what they show. What is left is of second
+    order in that step. Frequencies that count as exact end below a step of 1e-6.
 
     Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
     refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
@@ -275,10 +284,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             self._learn_pairs(X, y, seed, stages)
         if self.n_steps_:
             with stages.stage("scatter of the records"):
-                self.refinement_ = Refinement.of(self)
                 measured = np.ones((0, self.n_features_in_)) if X is None else self.columns_.read(self, X)
-                self.inversions_ = Inversions.of(self.memory, self.refinement_, measured)
-                self.scatter_ = self.inversions_.scatter(measured, self._estimate(measured)[0])
+                guess = self._estimate(measured)[0]
+                self.inversions_ = Inversions.of(self.memory, Refinement.of(self), measured, guess)
+                self.refinement_ = self.inversions_.refinement
+                self.simulator_ = self.refinement_.simulator
+                self.scatter_ = self.inversions_.scatter(measured, guess)
         stages.end()
         return self
 
@@ -355,7 +366,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
               they have reached; rows that have stalled keep the regressor's estimate;
             - ``outside`` (n_samples, n_parameters): whether a parameter contradicts the prior: farther from the middle
-              of the bounds than their whole width, and by more than its uncertainty explains.
+              of the bounds than their whole width, and by more than its uncertainty explains;
+            - ``solves`` (n_samples,): how often a model was solved with its derivatives for the row;
+            - ``full_solves`` (n_samples,): with ``reduce``, how many of these were of the full model, because the steps
+              of the row ended outside the box of the reduced one.
 
         Raises
         ------
@@ -384,7 +398,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         return found
 
     def warn_of(self, found: Bunch) -> None:
-        """Warn if many rows have not converged or are far outside the bounds.
+        """Warn if many rows have not converged or are far outside the bounds, and of rows that the full model solved.
 
         Parameters
         ----------
@@ -398,6 +412,14 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
                 "they keep what they reached, or the regressor's estimate",
                 "not converged",
+            )
+        rows = np.flatnonzero(found.full_solves)
+        if rows.size:
+            warn_user(
+                f"the parameters of {rows.size} of {len(theta)} rows, row {rows[0]} the first, are outside the box of "
+                f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "
+                "like those that fit saw, wider bounds, or the noise of the measurement",
+                "refined by the full model",
             )
         self._warn_of_box(theta, found.outside)
 

@@ -10,14 +10,16 @@ from sklearn.utils import Bunch
 
 from skthermo._arrays import Array
 from skthermo.surrogate._memory import content_of, folder_of, remembered
-from skthermo.surrogate.refinement import Refinement
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.refinement import Refinement, ResponseSurface
 
 
 @dataclass(frozen=True)
 class Inversions:
     """Inversions by a refinement; those of the records of `InverseSurrogate.fit` are read from its memory.
 
-    ``content`` tells the refinement from others, and ``seen`` the inputs of `fit`; both are empty without a memory.
+    ``content`` tells refinement, inputs and guess of `fit` from others, and ``seen`` the inputs; both are empty without
+    a memory.
     """
 
     refinement: Refinement
@@ -26,12 +28,18 @@ class Inversions:
     seen: str = ""
 
     @classmethod
-    def of(cls, memory: str | Memory | None, refinement: Refinement, inputs: Array) -> Inversions:
-        """Inversions of the inputs of `fit` by a refinement."""
+    def of(cls, memory: str | Memory | None, refinement: Refinement, inputs: Array, guess: Array) -> Inversions:
+        """Inversions by a refinement that is adapted to the inputs of `fit` and the regressor's guess."""
         if folder_of(memory) is None:
-            return cls(refinement)
-        settings = replace(refinement, n_jobs=None, recent=[])
-        return cls(refinement, memory, content_of(settings), joblib.hash(inputs))
+            return cls(refinement.adapted(inputs, guess))
+        content = content_of(replace(refinement, n_jobs=None), inputs, guess)
+        simulator, surface = remembered(
+            memory, "adaptation", lambda: _changes(refinement, refinement.adapted(inputs, guess)), lambda: (content,)
+        )
+        if simulator is not None:
+            simulator = replace(simulator, model=refinement.simulator.model)  # not the copy that was read
+        adapted = replace(refinement, simulator=simulator or refinement.simulator, surface=surface)
+        return cls(adapted, memory, content, joblib.hash(inputs))
 
     def found(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:
         """What `Refinement.refined` gives."""
@@ -41,7 +49,7 @@ class Inversions:
             self.memory if is_kept else None,
             "inversion",
             lambda: self.refinement.refined(inputs, guess, scatter),
-            lambda: (self.content, self.seen, guess, scatter),
+            lambda: (self.content, guess, scatter),
         )
 
     def scatter(self, inputs: Array, guess: Array) -> Array:
@@ -51,5 +59,10 @@ class Inversions:
             None if is_stated else self.memory,
             "scatter",
             lambda: self.refinement.estimated_scatter(inputs, guess),
-            lambda: (self.content, self.seen, guess),
+            lambda: (self.content,),
         )
+
+
+def _changes(before: Refinement, after: Refinement) -> tuple[Simulator | None, ResponseSurface | None]:
+    """What an adapted refinement has of its own; no simulator where it has the same as before."""
+    return None if after.simulator is before.simulator else after.simulator, after.surface

@@ -53,7 +53,8 @@ class SimulatedTraining:
                 "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
                 "order of modes",
             )
-        return cls(box, samples, Simulator(model, reduced, box.bounds))
+        simulator = Simulator(model) if reduced is None else Simulator(model, reduced, box.bounds, tol)
+        return cls(box, samples, simulator)
 
     def narrower(self, inverse: Any, random: np.random.RandomState, estimates: Array) -> "SimulatedTraining":
         """As many samples from the part of the box where records have their parameters, as far as estimates tell."""

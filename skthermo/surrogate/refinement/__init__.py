@@ -2,6 +2,7 @@
 
 from skthermo.surrogate.refinement._posterior import Prior
 from skthermo.surrogate.refinement._refinement import Refinement, unconverged
+from skthermo.surrogate.refinement._response_surface import ResponseSurface
 from skthermo.surrogate.refinement._shapes import ShapeInputs
 
-__all__ = ["Prior", "Refinement", "ShapeInputs", "unconverged"]
+__all__ = ["Prior", "Refinement", "ResponseSurface", "ShapeInputs", "unconverged"]

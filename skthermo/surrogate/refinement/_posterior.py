@@ -41,6 +41,11 @@ class Prior:
         mean, half = np.log(bounds.mean(axis=1)), (highest - lowest) / 2
         return cls(mean, half / np.sqrt(3) if width is None else width, mean - REACH * half, mean + REACH * half)
 
+    @property
+    def limits(self) -> Array:
+        """Lowest and highest multiplier of an estimate, (n_parameters, 2)."""
+        return np.exp(np.column_stack([self.lowest, self.highest]))
+
     def information(self, sensitivity: Array, noise: Array) -> Array:
         """Precision of ln theta given derivatives of the observations and the noise, infinite where one is missing."""
         scaled = sensitivity / noise[:, :, np.newaxis]
@@ -141,6 +146,12 @@ class Local:
     def gain(self, step: Array) -> Array:
         """How much a step would lower the objective if it were quadratic."""
         return -(self.gradient * step).sum(axis=1) - 0.5 * np.einsum("sp,spq,sq->s", step, self.hessian, step)
+
+    def moved(self, step: Array, missing: NDArray[np.bool_]) -> "Local":
+        """These rows after a small step: residuals and objective are those of the linearised model."""
+        residual = self.residual - np.einsum("smp,sp->sm", self.sensitivity, step)
+        value = self.value - self.gain(step)
+        return replace(self, x=self.x + step, value=value, residual=np.where(missing, 0.0, residual))
 
     def put(self, rows: NDArray, other: "Local") -> None:
         """Replace some rows."""

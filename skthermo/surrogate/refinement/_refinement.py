@@ -13,11 +13,10 @@ from sklearn.utils import Bunch
 from skthermo._arguments import check_bounds, check_noise, check_prior
 from skthermo._arrays import Array, spread_evenly
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.refinement._levenberg_marquardt import refine
-from skthermo.surrogate.refinement._posterior import Local, Objective, Prior
+from skthermo.surrogate.refinement._levenberg_marquardt import Refined, minimise, refine
+from skthermo.surrogate.refinement._posterior import Linearise, Objective, Prior
+from skthermo.surrogate.refinement._response_surface import ResponseSurface
 from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
-
-Refined = tuple[Local, NDArray[np.bool_], NDArray[np.bool_]]
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
@@ -31,6 +30,8 @@ TINY_SHARE = 1e-12
 LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model rather than noise
 ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
 ROWS_FOR_SCATTER = 365
+STEPS_ON_SURFACE = 100
+ROWS_TO_ADAPT = 200  # number of records that tell where the parameters of all are
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
@@ -43,6 +44,8 @@ class Refinement:
     """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
     ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
+    Rows start where the response ``surface`` has its posterior mode, or at the regressor's guess without one. Steps are
+    taken on the reduced model, if there is one; rows that end outside its box go on with the full model.
     ``recent`` holds the rows that the scatter was estimated from until they are asked for, mostly at once.
     """
 
@@ -52,6 +55,7 @@ class Refinement:
     n_steps: int
     n_jobs: int | None
     shapes: ShapeInputs | None = None
+    surface: ResponseSurface | None = None
     recent: list[tuple[Array, Refined]] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -61,66 +65,108 @@ class Refinement:
         width = None if inverse.prior is None else check_prior(inverse.prior, names)
         prior = Prior.of_box(check_bounds(inverse.bounds, names), width)
         noise = check_noise(inverse.noise, inverse.model.n_modes, getattr(inverse, "feature_names_in_", None))
-        return cls(inverse.simulator_, noise, prior, inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_)
+        drawn, surface = inverse.samples_, None
+        if inverse.box_ is not None and inverse.shape_inputs_ is None:
+            surface = ResponseSurface.of_samples(drawn.theta, drawn.frequencies)
+        settings = inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_, surface
+        return cls(inverse.simulator_, noise, prior, *settings)
+
+    def adapted(self, inputs: Array, guess: Array) -> Refinement:
+        """The refinement whose reduced model and response surface suit where records have their parameters."""
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), ROWS_TO_ADAPT)
+        if not rows.size or (self.surface is None and self.simulator.reduced is None):
+            return self
+        objective, start = self._problem(inputs[rows], guess[rows])
+        x = refine(objective, start, self.n_steps, sorts=self._sorts).local.x
+        simulator = self.simulator.extended(np.exp(x), self.prior.limits)
+        if self.surface is None:
+            return replace(self, simulator=simulator)
+        solved = simulator.approximate.linearise(np.exp(x), self.n_jobs, relative=True)
+        return replace(self, simulator=simulator, surface=self.surface.near(x, *solved))
 
     def refined(self, inputs: Array, guess: Array, scatter: Array, *, remember: bool = False) -> Bunch:
         """What `InverseSurrogate.invert` gives, for rows of inputs and the regressor's guess."""
-        frequencies = inputs[:, : len(self.noise)]
-        some, gaps = ~np.isnan(inputs).all(axis=1), np.isnan(frequencies).any(axis=1)
+        n_modes, some = len(self.noise), ~np.isnan(inputs).all(axis=1)
         result = Bunch(
             theta=np.full_like(guess, np.nan),
             std=np.full_like(guess, np.nan),
-            residuals=np.full_like(frequencies, np.nan),
+            residuals=np.full((len(guess), n_modes), np.nan),
             weight=np.zeros(len(guess)),
             converged=np.zeros(len(guess), dtype=bool),
             outside=np.zeros(guess.shape, dtype=bool),
+            solves=np.zeros(len(guess), dtype=np.intp),
+            full_solves=np.zeros(len(guess), dtype=np.intp),
         )
         if not some.any():
             return result
-        prior, measured, guess = self.prior, np.log(frequencies[some]), guess[some]
-        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT)[some, np.newaxis])
-        start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
-        objective = self._objective(inputs[some], measured, noise)
-        found, converged, stalled = self._refine(inputs[some], objective, start)
+        prior, guess = self.prior, guess[some]
+        objective, start = self._problem(inputs[some], guess)
+        found = self._recall(inputs[some], objective, start)
         if remember:
-            self.recent.append((inputs[some], (found, converged, stalled)))
-        lost, complete = stalled[:, np.newaxis], self._with_shapes(np.maximum(noise, scatter))
+            self.recent.append((inputs[some], found))
+        local, lost = found.local, found.stalled[:, np.newaxis]
+        complete = self._with_shapes(np.maximum(objective.noise[:, :n_modes], scatter))
         deviations, at_best = (
-            prior.deviations(np.nan_to_num(found.sensitivity), spread)
+            prior.deviations(np.nan_to_num(local.sensitivity), spread)
             for spread in (np.where(objective.missing, np.inf, complete), complete)
         )
-        result.theta[some] = np.where(lost, guess, np.exp(found.x))
+        result.theta[some] = np.where(lost, guess, np.exp(local.x))
         result.std[some] = np.where(lost, prior.width, deviations) * result.theta[some]
-        residuals = found.residual[:, : len(self.noise)]
-        result.residuals[some] = np.where(lost | np.isnan(measured), np.nan, residuals)
+        unknown = lost | np.isnan(objective.log_measured)
+        result.residuals[some] = np.where(unknown, np.nan, local.residual[:, :n_modes])
         result.weight[some] = ((at_best / deviations) ** 2).mean(axis=1)
-        result.converged[some] = converged
-        result.outside[some] = self._contradicts(found.x, deviations)
+        result.outside[some] = self._contradicts(local.x, deviations)
+        result.converged[some] = found.converged
+        result.solves[some], result.full_solves[some] = found.solves, found.full_solves
         return result
 
-    def _refine(self, inputs: Array, objective: Objective, start: Array) -> Refined:
+    def _problem(self, inputs: Array, guess: Array) -> tuple[Objective, Array]:
+        """The objective of rows of inputs, by the reduced model where there is one, and where their steps start."""
+        prior, frequencies = self.prior, inputs[:, : len(self.noise)]
+        gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
+        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT))
+        shapes = None if self.shapes is None else MeasuredShapes(self.shapes.unit_shapes(inputs))
+        observed = np.log(frequencies), self._with_shapes(noise)
+        objective = Objective(self._by(self.simulator.approximate), *observed, prior, shapes)
+        start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
+        if self.surface is not None:
+            start = minimise(replace(objective, linearise=self.surface.linearise), start, STEPS_ON_SURFACE).local.x
+        return objective, start
+
+    def _by(self, simulator: Simulator) -> Linearise:
+        """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
+        dofs = None if self.shapes is None else self.shapes.dofs
+        return partial(simulator.linearise, n_jobs=self.n_jobs, dofs=dofs, relative=True)
+
+    def _recall(self, inputs: Array, objective: Objective, start: Array) -> Refined:
         """Refine rows, except those that were refined just before; rows do not depend on each other."""
-        sorts = not getattr(self.simulator.model, "track", False)
         if not self.recent:
-            return refine(objective, start, self.n_steps, sorts=sorts)
-        known_inputs, (found, converged, stalled) = self.recent.pop()
+            return self._refine(objective, start)
+        known_inputs, found = self.recent.pop()
         places = {row.tobytes(): place for place, row in enumerate(known_inputs)}
         place = np.array([places.get(row.tobytes(), -1) for row in inputs], dtype=np.intp)
         new = np.flatnonzero(place < 0)
         if new.size:
             place[new] = len(known_inputs) + np.arange(new.size)
-            others, *states = refine(objective.of(new), start[new], self.n_steps, sorts=sorts)
-            found = found.beside(others)
-            converged, stalled = (np.append(*pair) for pair in zip((converged, stalled), states, strict=True))
-        return found.of(place), converged[place], stalled[place]
+            found = found.beside(self._refine(objective.of(new), start[new]))
+        return found.of(place)
 
-    def _objective(self, inputs: Array, log_measured: Array, noise: Array) -> Objective:
-        linearise = partial(self.simulator.linearise, n_jobs=self.n_jobs, relative=True)
-        if self.shapes is None:
-            return Objective(linearise, log_measured, noise, self.prior)
-        measured = MeasuredShapes(self.shapes.unit_shapes(inputs))
-        linearise = partial(linearise, dofs=self.shapes.dofs)
-        return Objective(linearise, log_measured, self._with_shapes(noise), self.prior, measured)
+    def _refine(self, objective: Objective, start: Array) -> Refined:
+        """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
+        found = refine(objective, start, self.n_steps, sorts=self._sorts)
+        if self.simulator.reduced is not None:
+            outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
+            if outside.size:
+                exact = replace(objective.of(outside), linearise=self._by(Simulator(self.simulator.model)))
+                last = minimise(exact, found.local.x[outside], self.n_steps)
+                last.full_solves += last.solves
+                last.solves += found.solves[outside]
+                found.put(outside, last)
+        return found
+
+    @property
+    def _sorts(self) -> bool:
+        return not getattr(self.simulator.model, "track", False)
 
     def _with_shapes(self, noise: Array) -> Array:
         """Standard deviations of all observations, (n_samples, n_observations), given those of ln f."""
