@@ -10,6 +10,7 @@ checking it counts as part of every reduced sample. Medians of several rounds in
 import argparse
 import os
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,7 @@ def compare_small(model, options):
         "1000 with derivatives": lambda: linearise(reduced, theta),
     }
     print(f"{100 * (1 - reduced.certified(theta).mean()):.1f} % of rows go to LAPACK")
-    for name, seconds in median_seconds(ways, options.rounds).items():
+    for name, seconds in median_seconds(ways, options.rounds, time.process_time).items():
         print(f"{name}: {seconds:.2f} s")
 
 
@@ -106,7 +107,7 @@ def compare(model, options):
         "reduced exact Jacobian": lambda: reduced.jacobian(inner),
         "reduced central differences": lambda: central_differences(reduced, inner),
     }
-    seconds = median_seconds(ways, options.rounds)
+    seconds = median_seconds(ways, options.rounds, time.process_time)
     loop, full = (seconds[name] / options.loop for name in ("loop of eigsh", "full model"))
     basis, solve = seconds["making the basis"], seconds["1000 reduced samples"] / 1000
     print(f"milliseconds a solve: loop {1e3 * loop:.1f}, full model {1e3 * full:.1f}, reduced {1e3 * solve:.3f}")

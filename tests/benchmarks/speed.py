@@ -213,11 +213,11 @@ def differences(name, files):
 def compare_scripts(packages, options):
     """What scripts of tables print with each state of the code."""
     is_off = False
-    for script, arguments in SCRIPTS.items():
+    for script in options.scripts:
         printed = {}
         for state, package in packages.items():
             try:
-                output = run([HERE / script, *arguments], package, 10 * options.limit)
+                output = run([HERE / script, *SCRIPTS[script]], package, 10 * options.limit)
             except RuntimeError as error:
                 output = f"failed: {error}"
             printed[state] = (output or "stopped").splitlines()
@@ -258,12 +258,14 @@ def loop_seconds(package, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--before", metavar="REF", help="a git revision to compare with")
+    parser.add_argument("--now", metavar="REF", help="a git revision in place of the code of this folder")
     parser.add_argument("--rows", nargs="+", default=["table", "elsewhere", "imports"], help="rows or parts of them")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--long", type=float, default=40.0, help="seconds after which no further round begins")
     parser.add_argument("--limit", type=float, default=300.0, help="processor seconds after which a run is stopped")
     parser.add_argument("--quick", action="store_true", help="small works")
     parser.add_argument("--digits", action="store_true", help="differences of the results, and tables of scripts")
+    parser.add_argument("--scripts", nargs="*", default=[*SCRIPTS], choices=[*SCRIPTS], help="tables to compare")
     options = parser.parse_args()
     if options.digits and not options.before:
         parser.error("--digits compares with another revision: expected --before REF")
@@ -271,7 +273,7 @@ def main():
     slower, digits, is_off = [], [], False
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        states = {"before": options.before, "now": None} if options.before else {"now": None}
+        states = {"before": options.before, "now": options.now} if options.before else {"now": options.now}
         packages = {state: copy_of(revision, folder / state) for state, revision in states.items()}
         print(
             f"{'':18} {'before, s':>16} {'now, s':>16} {'faster':>9} {'beside':>8} {'at 37 ms':>10} {'MB':>8} {'MB':>8}"
@@ -291,8 +293,7 @@ def main():
                 is_off |= is_too_far
         if options.digits:
             print("\nLargest relative differences of results", *digits, sep="\n")
-            if not options.quick:
-                is_off |= compare_scripts(packages, options)
+            is_off |= compare_scripts(packages, options)
     if options.before:
         print(f"\nslower by more than 10 %: {', '.join(slower) or 'nothing'}")
     return 1 if slower or is_off else 0
