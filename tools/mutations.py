@@ -63,6 +63,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
     ],
+    ("fem/modal/_condensation.py", "fem/test_condensation.py"): [
+        ("certificate against missed modes", "return positive & (np.triu", "return (np.triu"),
+    ],
     ("fem/_factors.py", "fem/test_factors.py"): [
         ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
         ("order of elimination", "solution[self._order] =", "solution[:] ="),
