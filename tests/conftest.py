@@ -1,4 +1,5 @@
-"""One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen."""
+"""One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen; little time
+for the garbage collector."""
 
 import gc
 import os
@@ -10,13 +11,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+gc.set_threshold(10_000)  # by default 700: a fifth of the time in which tests are collected
 
 
 def pytest_collection_finish(session):
-    """What modules hold stays until the end: the garbage collector leaves it alone, and comes less often."""
+    """What modules hold stays until the end: the garbage collector need not look through it."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(10_000)
 
 
 @pytest.fixture

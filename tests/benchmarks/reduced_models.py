@@ -1,4 +1,4 @@
-"""Large frames, reduced and not, against a loop of scipy.sparse.linalg.eigsh.
+"""Large frames, reduced and not, against a loop of scipy.sparse.linalg.eigsh and against LAPACK on the same basis.
 
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/reduced_models.py
 
@@ -20,7 +20,7 @@ from bridges import frame_bridge
 from measure import median_seconds, peak_megabytes
 
 from skthermo.datasets import make_kw51, make_z24
-from skthermo.fem import AffineModel, sample
+from skthermo.fem import AffineModel, linearise, sample
 
 sys.path.append(str(Path(__file__).parents[1] / "fem"))
 from frames import FRAME
@@ -48,6 +48,20 @@ def central_differences(model, theta, step=1e-4):
     return np.stack(differences, axis=2)
 
 
+def by_lapack(reduced, theta, *, derivatives=False):
+    """Frequencies, or these and derivatives, from all eigenvalues and shapes of every matrix on the basis."""
+    core = reduced._core
+    basis = np.linalg.inv(np.linalg.cholesky(core.mass.assemble(theta[:1])[0])).T
+    standard = core.stiffness.projected(basis)
+    for rows in np.array_split(theta, max(1, len(theta) // 400)):
+        if derivatives:
+            shapes = np.linalg.eigh(standard.assemble(rows))[1]
+            columns = shapes[:, :, : core.n_modes]
+            standard.gradients(rows, columns)
+        else:
+            np.linalg.eigvalsh(standard.assemble(rows))
+
+
 def print_errors(model, reduced, options):
     uniform = draw(model, options.fresh, seed=1)
     corners = np.where(draw(model, options.fresh, seed=4) < 1, 1 - BOUNDS, 1 + BOUNDS)
@@ -64,7 +78,9 @@ def compare_small(model, options):
     ways = {
         "making the basis": lambda: model.reduced(BOUNDS, random_state=0),
         "1000 reduced samples": lambda: reduced.frequencies(theta),
+        "1000 with derivatives": lambda: linearise(reduced, theta),
     }
+    print(f"{100 * (1 - reduced.certified(theta).mean()):.1f} % of rows go to LAPACK")
     for name, seconds in median_seconds(ways, options.rounds, time.process_time).items():
         print(f"{name}: {seconds:.2f} s")
 
@@ -83,6 +99,9 @@ def compare(model, options):
         "full model": lambda: model.frequencies(theta[: options.loop]),
         "making the basis": lambda: model.reduced(BOUNDS, random_state=0),
         "1000 reduced samples": lambda: reduced.frequencies(theta),
+        "1000 by LAPACK": lambda: by_lapack(reduced, theta),
+        "1000 with derivatives": lambda: linearise(reduced, theta),
+        "1000 with derivatives by LAPACK": lambda: by_lapack(reduced, theta, derivatives=True),
         "exact Jacobian": lambda: model.jacobian(inner[:5]),
         "central differences": lambda: central_differences(model, inner[:5]),
         "reduced exact Jacobian": lambda: reduced.jacobian(inner),
@@ -96,6 +115,11 @@ def compare(model, options):
     for n_samples in (1000, 10_000, 100_000):
         ratio = n_samples * loop / (basis + n_samples * solve)
         print(f"{n_samples:6d} samples, basis included: {basis + n_samples * solve:6.2f} s, {ratio:.1f} times the loop")
+    for name, kind in {"1000 reduced samples": "1000", "1000 with derivatives": "1000 with derivatives"}.items():
+        ratio = seconds[f"{kind} by LAPACK"] / seconds[name]
+        print(f"{name}: {seconds[name]:.3f} s, {ratio:.1f} times LAPACK's eigh or eigvalsh of every row")
+    for kind, rows in {"uniform": theta, "corners": np.where(theta < 1, 1 - BOUNDS, 1 + BOUNDS)}.items():
+        print(f"{kind}: {100 * (1 - reduced.certified(rows).mean()):.1f} % of rows go to LAPACK")
     for kind in ("", "reduced "):
         ratio = seconds[f"{kind}central differences"] / seconds[f"{kind}exact Jacobian"]
         print(f"{kind}exact Jacobian, {len(model.parameter_names)} parameters: {ratio:.1f} times central differences")

@@ -61,6 +61,10 @@ class ReducedModel(AffineBase):
     1.3 times the error. Shapes are given at all degrees of freedom. A damaged model is checked anew, and its basis is
     enlarged if necessary.
 
+    On the basis, the few lowest modes are found by iteration from the nominal ones. A bound certifies that none is
+    missed and that the error of iteration is at most a hundredth of ``tol``; LAPACK solves the rows that it does not
+    certify.
+
     References
     ----------
     Machiels, Maday, Oliveira, Patera & Rovas, Output bounds for reduced-basis approximations of symmetric

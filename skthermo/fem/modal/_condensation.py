@@ -21,7 +21,7 @@ SEPARATION = 1.7
 
 GUARD_MASTERS = 2  # fewest masters beyond the wanted modes
 
-STEPS = (4, 3, 4, 5)
+STEPS = (3, 5, 5, 5)
 """Steps of conjugate gradients between one Rayleigh-Ritz step and the next. Rows that need more go to LAPACK."""
 
 TOL_OF_SHAPES = 1e-12
@@ -38,6 +38,12 @@ class Ritz(NamedTuple):
     shapes: Array
     inertia: Array
     residuals: Array
+
+    @classmethod
+    def of(cls, eigenvalues: Array, x: Array, Kx: Array, mu: Array) -> "Ritz":
+        """From Kx and the diagonal of M."""
+        inertia = x * mu
+        return cls(eigenvalues, x, inertia, Kx - eigenvalues[:, :, np.newaxis] * inertia)
 
 
 class CondensationSolver:
@@ -127,8 +133,7 @@ class CondensationSolver:
         bounds = self._lower_bounds(theta)
         rows = np.flatnonzero(bounds > 0)
         bounds, K = bounds[rows], self._stiffness.assemble(theta[rows])
-        masters = np.broadcast_to(np.eye(m, len(mu)), (len(rows), m, len(mu)))
-        ritz = rayleigh_ritz(masters, K[:, :m], mu)
+        ritz = masters_alone(K, mu, m)
         K_ss = K[:, m:, m:].astype(np.float32)
         for n_steps in STEPS:
             solvable = bounds > ritz.eigenvalues[:, n_modes - 1] * mu[m]
@@ -149,8 +154,8 @@ class CondensationSolver:
         """Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors."""
         m = ritz.shapes.shape[1]
         lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes])
-        shift = lowest[:, :, np.newaxis] * self._mu[m:]
-        return conjugate_gradients(K, shift.astype(K.dtype), ritz.residuals[:, :, m:].astype(K.dtype), n_steps)
+        shift = lowest.astype(K.dtype)[:, :, np.newaxis] * self._mu[m:].astype(K.dtype)
+        return conjugate_gradients(K, shift, ritz.residuals[:, :, m:].astype(K.dtype), n_steps)
 
 
 def batch_solver(
@@ -191,14 +196,21 @@ def conjugate_gradients(K: Array, shift: Array, right: Array, n_steps: int) -> A
     return x
 
 
+def masters_alone(K: Array, mu: Array, m: int) -> Ritz:
+    """Rayleigh-Ritz on the masters, with nothing in the slave coordinates."""
+    to_unit = 1 / np.sqrt(mu[:m])
+    eigenvalues, vectors = np.linalg.eigh(to_unit[:, np.newaxis] * K[:, :m, :m] * to_unit)
+    x = np.zeros((len(K), m, len(mu)))
+    x[:, :, :m] = vectors.swapaxes(1, 2) * to_unit
+    return Ritz.of(eigenvalues, x, x[:, :, :m] @ K[:, :m], mu)
+
+
 def rayleigh_ritz(x: Array, Kx: Array, mu: Array) -> Ritz:
     """Ritz values in ascending order and shapes of unit modal mass on the span of some shapes."""
     to_unit = np.linalg.inv(np.linalg.cholesky((x * mu) @ x.swapaxes(1, 2)))
     eigenvalues, vectors = np.linalg.eigh(to_unit @ (Kx @ x.swapaxes(1, 2)) @ to_unit.swapaxes(1, 2))
     turned = vectors.swapaxes(1, 2) @ to_unit
-    x = turned @ x
-    inertia = x * mu
-    return Ritz(eigenvalues, x, inertia, turned @ Kx - eigenvalues[:, :, np.newaxis] * inertia)
+    return Ritz.of(eigenvalues, turned @ x, turned @ Kx, mu)
 
 
 def certificate(ritz: Ritz, mu: Array, bounds: Array, m: int, n_modes: int, tol: float) -> NDArray[np.bool_]:

@@ -162,9 +162,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
 
     For each simulation, a ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes, more with ``dofs``, and for each
-    training record in each set of training records ``8 * (2 n_parameters + n_modes + 1) + n_parameters + 1`` bytes: 46
-    kB for a year of days of the truss. ``joblib.Memory(folder).reduce_size(bytes_limit="1G")`` removes what has not
-    been used for longest.
+    training record in each set of training records ``8 * (2 n_parameters + n_modes + 3) + n_parameters + 1`` bytes: 51
+    kB for a year of days of the truss. With ``reduce`` it also holds the reduced model with the full one, once for the
+    bounds and again for each set of training records that leaves them. ``reduce_size`` of ``joblib.Memory(folder)``
+    removes what has not been used for longest.
 
     References
     ----------
