@@ -157,7 +157,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
     ],
     ("surrogate/refinement/_refinement.py", "surrogate/test_refinement.py"): [
-        ("rows that stall", "np.where(lost, guess, np.exp(found.x))", "np.exp(found.x)"),
+        ("rows that stall", "np.where(lost, guess, np.exp(local.x))", "np.exp(local.x)"),
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
