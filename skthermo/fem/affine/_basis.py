@@ -114,16 +114,16 @@ def without(points: Array, others: Array) -> Array:
 
 
 def snapshots_at(full: AffineCore, theta: Array) -> Array:
-    """Shapes of the lowest modes of the full model and of the modes in its columns, side by side."""
-    if not len(theta):
-        return np.empty((full.stiffness.n_dof, 0))
-    n_snapshots = full.first_candidates
-    lowest = full.solver.modes(theta, n_snapshots)[1]
-    shapes = [*lowest]
-    if full.track:
-        mac = full.nominal_mac(lowest)
-        elsewhere = may_be_missed(mac, pair_modes(mac, full.nominal.repeated), full.nominal.repeated)
-        shapes += [*full.modes(theta[elsewhere])[1]] if elsewhere.any() else []
+    """Shapes of the lowest modes of the full model, and of all modes that its columns are looked for among."""
+    rows, n_candidates, shapes = theta, full.first_candidates, [np.empty((full.stiffness.n_dof, 0))]
+    while len(rows):
+        candidates = full.solver.modes(rows, n_candidates)[1]
+        shapes += [*candidates]
+        if not full.track or n_candidates == full.max_candidates:
+            break
+        mac = full.nominal_mac(candidates)
+        rows = rows[may_be_missed(mac, pair_modes(mac, full.nominal.repeated), full.nominal.repeated)]
+        n_candidates = min(2 * n_candidates, full.max_candidates)
     side_by_side = np.hstack(shapes)
     return side_by_side[:, np.isfinite(side_by_side).all(axis=0)]
 
