@@ -161,6 +161,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
+    ("surrogate/refinement/_refinement.py", "surrogate/test_reduced_refinement.py"): [
+        ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
+    ],
     ("surrogate/chain/_estimates.py", "surrogate/test_sample_weight.py"): [
         ("a user's weights beside those of gaps", "return weights * self.weights", "return weights"),
     ],

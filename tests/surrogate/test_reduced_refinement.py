@@ -1,0 +1,130 @@
+"""Laws of refinement on a reduced model: within its box, beside it, and where there is none."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import Ridge
+
+from skthermo.fem import AffineModel
+from skthermo.fem.affine import ReducedModel, _basis
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.fem.frames import portal
+
+FRAME = portal(4)
+NOISE, BOUNDS = 0.001, 0.1
+
+
+def inverse(**options):
+    settings = {"bounds": BOUNDS, "noise": NOISE, "n_samples": 60, "random_state": 0}
+    return InverseSurrogate(FRAME, Ridge(1e-3), **settings, **options)
+
+
+def records(lowest, highest, n_rows=20):
+    """Air temperatures, and frequencies of a frame that the weather softens from one stiffness to the other."""
+    random, stamps = np.random.default_rng(0), pd.date_range("2025", periods=n_rows, freq="D")
+    share = random.uniform(size=n_rows)
+    theta = (highest - (highest - lowest) * share)[:, np.newaxis] ** random.uniform(0.5, 1.0, 4)
+    F = FRAME.frequencies(theta) * (1 + NOISE * random.standard_normal((n_rows, FRAME.n_modes)))
+    return pd.DataFrame({"T": 30 * share}, stamps), pd.DataFrame(F, stamps).add_prefix("f")
+
+
+def chain():
+    return DataInformedFEM(FRAME, inverse=inverse(), mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
+
+
+def is_same(found, other):
+    """Whether estimates differ by less than a small part of their standard deviations."""
+    return bool((np.abs(found.theta - other.theta) < 0.02 * other.std).to_numpy().all())
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Boxes of the reduced models that are made."""
+    boxes = []
+
+    def noted(cls):
+        reduced = cls.reduced
+
+        def make(self, bounds, **options):
+            boxes.append(bounds)
+            return reduced(self, bounds, **options)
+
+        monkeypatch.setattr(cls, "reduced", make)
+
+    for cls in (AffineModel, ReducedModel):
+        noted(cls)
+    return boxes
+
+
+@pytest.fixture
+def narrow(monkeypatch):
+    """No basis is accurate outside the bounds of the inverse."""
+    estimated_errors = _basis.estimated_errors
+
+    def errors(full, core, vectors, theta, factors):
+        far = (np.abs(theta - 1) > BOUNDS + 1e-9).any()
+        return np.ones(len(theta)) if far else estimated_errors(full, core, vectors, theta, factors)
+
+    monkeypatch.setattr(_basis, "estimated_errors", errors)
+
+
+def test_one_reduced_model_serves_the_inverse_and_predictions(made):
+    T, F = records(0.96, 1.04, 40)
+    fem = chain().fit(T, F)
+    assert fem.inverse_.simulator_.reduced is not None
+    assert fem.simulator_ is fem.inverse_.simulator_
+    assert len(made) == 1
+    np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-5)
+    assert fem.report_.n_full_solves == 0
+
+
+def test_the_box_is_widened_once_to_where_records_are(made):
+    F = records(0.7, 0.95)[1]
+    reduced, full = inverse(reduce=True).fit(F), inverse().fit(F)
+    found, exact = reduced.invert(F), full.invert(F)
+    assert len(made) == 2
+    assert (np.abs(exact.theta.to_numpy() - 1) > BOUNDS).any()
+    assert not reduced.simulator_.outside(exact.theta.to_numpy()).any()
+    assert not found.full_solves.any()
+    assert is_same(found, exact)
+
+
+def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted():
+    F = records(0.96, 1.04, 12)[1]
+    F.iloc[[4, 7, 9]] = FRAME.frequencies(np.full((3, 4), 0.8))
+    reduced, exact = inverse(reduce=True).fit(), inverse().fit().invert(F)
+    found = reduced.invert(F)
+    outside = reduced.simulator_.outside(found.theta.to_numpy())
+    np.testing.assert_array_equal(np.flatnonzero(outside), [4, 7, 9])
+    np.testing.assert_array_equal(found.full_solves > 0, outside)
+    assert (found.solves > found.full_solves).all()
+    assert is_same(found, exact)
+    count = found.full_solves.sum()
+    with pytest.warns(UserWarning, match="12 rows") as said:
+        reduced.transform(F)
+    (told,) = (text for text in map(str, (warning.message for warning in said)) if "reduced model" in text)
+    assert told.startswith("the parameters of 3 of 12 rows, row 4 the first, are outside the box")
+    assert f"the full one was solved {count} times" in told
+
+
+def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
+    T, F = records(0.7, 0.95)
+    with pytest.warns(UserWarning, match="(?s).*") as said:
+        fem = chain().fit(T, F)
+    texts = [str(warning.message) for warning in said]
+    (told,) = (text for text in texts if text.startswith("no reduced model is accurate to 1e-05"))
+    assert "after 4 rounds" in told
+    found = fem.inverse_.invert(F)
+    assert fem.report_.n_by_full_model == np.count_nonzero(found.full_solves) > 0
+    assert fem.report_.n_full_solves == found.full_solves.sum()
+    assert sum(f"solved {fem.report_.n_full_solves} times" in text for text in texts) == 1
+    assert is_same(found, inverse().fit(F).invert(F))
+    np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-9)
+
+
+def test_a_basis_whose_errors_stay_large_is_given_up(monkeypatch):
+    random = np.random.default_rng(0)
+    monkeypatch.setattr(_basis, "estimated_errors", lambda *state: 0.02 + 0.001 * random.random(len(state[3])))
+    with pytest.raises(RuntimeError, match=r"after .* rounds .* expected a larger tol, or narrower bounds") as error:
+        FRAME.reduced(0.01, random_state=0)
+    assert int(str(error.value).split()[1]) < _basis.MAX_ROUNDS
