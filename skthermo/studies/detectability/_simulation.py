@@ -179,31 +179,23 @@ def clean_frequencies(
     fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int, first: int = 0
 ) -> dict[str, list[Array]]:
     """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
-    clean, theta = {}, as_floats(fem.predict_parameters(T))
+    clean = {}
     for scenario in scenarios:
         draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
         changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
-            clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], theta)
+            clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
         else:
-            clean[scenario.name] = [_of_change(fem, change, T, theta) for change in changes]
+            clean[scenario.name] = [as_floats(fem.simulate(T, **change)) for change in changes]
     return clean
 
 
-def _of_change(fem: Any, change: Mapping[str, Any], T: Any, theta: Array) -> Array:
-    """Frequencies of the structure with one change, at the parameters theta that the weather T gives."""
-    damage = change.get("damage") or {}
-    if any(name != "damage" for name in change) or any(np.ndim(severity) for severity in damage.values()):
-        return as_floats(fem.simulate(T, **change))
-    frequencies = fem.simulator_.damaged(damage).frequencies(theta, fem.n_jobs)
-    return as_floats(fem.aligner_.inverse_transform(frequencies))
-
-
-def _of_draws(fem: Any, draws: Sequence[Mapping[str, float]], theta: Array) -> list[Array]:
+def _of_draws(fem: Any, draws: Sequence[Mapping[str, float]], T: Any) -> list[Array]:
     """Frequencies of the structure with one damage after the other, solved together by one model."""
     groups = list(draws[0])
     severities = np.array([[draw[group] for group in groups] for draw in draws])
     simulator = fem.simulator_.with_damage_parameters(groups, severities.min(), severities.max())
+    theta = as_floats(fem.predict_parameters(T))
     factors = np.repeat(1 - severities, len(theta), axis=0)
     frequencies = simulator.frequencies(np.hstack([np.tile(theta, (len(draws), 1)), factors]), fem.n_jobs)
     return np.split(as_floats(fem.aligner_.inverse_transform(frequencies)), len(draws))

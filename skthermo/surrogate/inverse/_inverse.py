@@ -37,6 +37,7 @@ from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
 MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given
+MANY_BY_FULL_MODEL = 0.01  # share of rows that the full model solves beside a reduced one, likewise
 
 
 class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
@@ -399,7 +400,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         return found
 
     def warn_of(self, found: Bunch) -> None:
-        """Warn if many rows have not converged or are far outside the bounds, and of rows that the full model solved.
+        """Warn if many rows have not converged, are solved by the full model or are far outside the bounds.
 
         Parameters
         ----------
@@ -415,7 +416,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 "not converged",
             )
         rows = np.flatnonzero(found.full_solves)
-        if rows.size:
+        if rows.size > MANY_BY_FULL_MODEL * len(theta):
             warn_user(
                 f"the parameters of {rows.size} of {len(theta)} rows, row {rows[0]} the first, are outside the box of "
                 f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "

@@ -9,7 +9,7 @@ from skthermo._arrays import Array
 from skthermo.surrogate.refinement._posterior import Local, Objective, deviations
 
 SMALL_STEP = 1e-6  # a Gauss-Newton step of ln theta that counts as none
-SMALL_SHARE = 0.01
+SMALL_SHARE = 0.001
 """A Gauss-Newton step is the last one if it is smaller than this share of the posterior standard deviations, and if the
 curvature of ln f along it changes no frequency by more than this share of the noise. The noise is what is stated or,
 where the residuals of a row show more, what they show."""
