@@ -255,14 +255,22 @@ class SparseTerms(AffineTerms):
 
     @property
     def each_matrix(self) -> list[Matrix]:
-        terms = (self.entries[:, [t]].tocoo() for t in range(self.entries.shape[1]))
+        ends = self.entries.indptr[1:-1]
+        parts = zip(np.split(self.entries.data, ends), np.split(self.entries.indices, ends), strict=True)
         rows, columns = self.pattern.rows, self.pattern.columns
-        places = ((term.data, (rows[term.row], columns[term.row])) for term in terms)
+        places = ((data, (rows[union], columns[union])) for data, union in parts)
         return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
 
     def projected(self, basis: Array) -> DenseTerms:
-        matrices = np.stack([basis.T @ (matrix @ basis) for matrix in self.each_matrix])
+        matrices = np.stack([_projected(matrix, basis) for matrix in self.each_matrix])
         return DenseTerms(matrices, self.exponents, self.factors)
+
+
+def _projected(matrix: scipy.sparse.csc_array, basis: Array) -> Array:
+    """basis' A basis, from the degrees of freedom that A joins."""
+    used = np.flatnonzero(np.diff(matrix.indptr))
+    product: Array = basis[used].T @ (matrix[:, used] @ basis[used])[used]
+    return product
 
 
 def _freeze(*arrays: NDArray) -> None:

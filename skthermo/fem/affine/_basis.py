@@ -20,7 +20,7 @@ UNGUIDED = 3  # snapshots, beside which all others start from the modes of a bas
 SNAPSHOT_SHARE = 10.0  # largest error of an eigenvalue of a snapshot, as a share of the basis's tolerance
 CHECK_SHARE = 1e-2  # the same at a check point
 SNAPSHOTS_PER_ROUND = 12
-CANDIDATES_PER_ROUND = 96
+CANDIDATES_PER_ROUND = 64
 CHECK_POINTS = 20
 MAX_ROUNDS = 40
 HOPELESS, HOPELESS_ROUNDS = 1000, 3
@@ -155,7 +155,8 @@ def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:
 
     Every vector counts with an energy of one, so none loses more than ``drop`` with any direction.
     """
-    scaled = vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
-    energies, directions = scipy.linalg.eigh(scaled.T @ (stiffness @ scaled))
+    gram = vectors.T @ (stiffness @ vectors)
+    scale = np.sqrt(gram.diagonal())
+    energies, directions = scipy.linalg.eigh(gram / scale / scale[:, np.newaxis])
     kept = energies > max(drop, LEAST_ENERGY * energies[-1])
-    return scaled @ (directions[:, kept] / np.sqrt(energies[kept]))
+    return vectors @ (directions[:, kept] / np.sqrt(energies[kept]) / scale[:, np.newaxis])
