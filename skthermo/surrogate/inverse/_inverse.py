@@ -148,8 +148,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     material property.
 
     The steps of a row start on a response surface, a polynomial fitted to the simulations and to solutions near 200 of
-    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step that is below 1 % of each
-    parameter's posterior standard deviation and whose curvature changes no frequency by more than 1 % of the noise; the
+    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step that is below 0.1 % of each
+    parameter's posterior standard deviation and whose curvature changes no frequency by more than 0.1 % of the noise; the
     noise is what is stated or, where the residuals of the row show more, what they show. What is left is of second
     order in that step. Frequencies that count as exact end below a step of 1e-6.
 
