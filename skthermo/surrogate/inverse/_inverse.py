@@ -149,9 +149,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
 
     The steps of a row start on a response surface, a polynomial fitted to the simulations and to solutions near 200 of
     the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step that is below 0.1 % of each
-    parameter's posterior standard deviation and whose curvature changes no frequency by more than 0.1 % of the noise; the
-    noise is what is stated or, where the residuals of the row show more, what they show. What is left is of second
-    order in that step. Frequencies that count as exact end below a step of 1e-6.
+    parameter's posterior standard deviation and whose curvature changes no frequency by more than 0.1 % of the noise.
+    The noise is what is stated or, where the residuals of the row show more, what they show. Frequencies that count as
+    exact end below a step of 1e-6.
 
     Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
     refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
