@@ -28,6 +28,7 @@ HOPELESS, HOPELESS_ROUNDS = 1000, 3
 the modes that are followed have dissolved among others, far from the nominal state."""
 
 LEAST_ENERGY = 1e-13  # share of strain energy below which a direction is rounding error
+LEAST_SHARE = 1e-3  # of the tolerance, the energy below which a direction is forgotten in further rounds
 
 
 class Basis(NamedTuple):
@@ -38,6 +39,13 @@ class Basis(NamedTuple):
     error: float
     check_points: Array
     snapshot_points: Array
+
+
+class Directions(NamedTuple):
+    """Directions (n_dof, n), orthonormal in a stiffness, and the energies (n,) that vectors have along them."""
+
+    vectors: Array
+    energies: Array
 
 
 def grow_basis(
@@ -53,12 +61,16 @@ def grow_basis(
         used, snapshots, points = [points], snapshots_at(full, points[:UNGUIDED]), points[UNGUIDED:]
     else:
         used, snapshots, points = [nominal[:0]], start, nominal[:0]
-    vectors, core = enlarged(full, snapshots, stiffness, tol)
+    directions = principal_directions(of_unit_energy(snapshots, stiffness), stiffness, LEAST_SHARE * tol)
+    vectors, core = basis_of(directions, full, tol)
     largest: list[float] = []
     for _ in range(MAX_ROUNDS):
         if len(points):
-            snapshots = np.hstack([snapshots, snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points)])
-            vectors, core = enlarged(full, snapshots, stiffness, tol)
+            snapshots = snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points)
+            known = directions.vectors * np.sqrt(directions.energies)
+            known_and_new = np.hstack([known, of_unit_energy(snapshots, stiffness)])
+            directions = principal_directions(known_and_new, stiffness, LEAST_SHARE * tol)
+            vectors, core = basis_of(directions, full, tol)
         for candidates in drawn(bounds, random, CANDIDATES_PER_ROUND)[::-1]:  # errors are largest at corners
             errors = estimated_errors(full, core, vectors, candidates, factors)
             if errors.max() >= tol / 2:
@@ -80,9 +92,12 @@ def grow_basis(
     )
 
 
-def enlarged(full: AffineCore, snapshots: Array, stiffness: csc_array, tol: float) -> tuple[Array, AffineCore]:
-    """A basis of the space that snapshots span, and the core on it."""
-    vectors = orthonormal(snapshots, stiffness, drop=tol)
+def basis_of(directions: Directions, full: AffineCore, tol: float) -> tuple[Array, AffineCore]:
+    """Basis vectors, the directions that hold ``tol`` or more of the strain energy of a snapshot, and the core on them.
+
+    No snapshot loses more than ``tol`` with any direction.
+    """
+    vectors = directions.vectors[:, directions.energies > tol]
     return vectors, full.projected(vectors, tol)
 
 
@@ -150,13 +165,16 @@ def true_errors(full: AffineCore, core: AffineCore, theta: Array) -> Array:
     return np.nan_to_num(errors, nan=np.inf).max(axis=1)
 
 
-def orthonormal(vectors: Array, stiffness: csc_array, *, drop: float) -> Array:
-    """Directions orthonormal in a stiffness, without those that hold less than ``drop`` of the strain energy.
+def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
+    """Vectors x scaled to x' K x = 1."""
+    return vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
 
-    Every vector counts with an energy of one, so none loses more than ``drop`` with any direction.
+
+def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
+    """Principal directions of vectors in the inner product of a stiffness, without those of less than some energy.
+
+    The directions times the roots of their energies stand for the vectors where further ones are added.
     """
-    gram = vectors.T @ (stiffness @ vectors)
-    scale = np.sqrt(gram.diagonal())
-    energies, directions = scipy.linalg.eigh(gram / scale / scale[:, np.newaxis])
-    kept = energies > max(drop, LEAST_ENERGY * energies[-1])
-    return vectors @ (directions[:, kept] / np.sqrt(energies[kept]) / scale[:, np.newaxis])
+    energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
+    kept = energies > max(least, LEAST_ENERGY * energies[-1])
+    return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])
