@@ -118,11 +118,12 @@ def test_without_refining_shapes_help_too():
 
 def test_rows_do_not_depend_on_other_rows_nor_on_scale_and_sign():
     X = columns(*MEASURED)[:20]
-    whole = INVERSE.predict(X)
-    np.testing.assert_allclose(np.vstack([INVERSE.predict(row[np.newaxis]) for row in X]), whole, rtol=1e-7)
+    whole, deviations = INVERSE.predict(X, return_std=True)
+    single = np.vstack([INVERSE.predict(row[np.newaxis]) for row in X])
+    assert (np.abs(single - whole) < 1e-3 * deviations).all()  # the share of the deviation at which steps end
     factors = np.random.default_rng(0).choice([-3.0, 0.2, 50.0], (20, 6))
     turned = np.hstack([X[:, :6], X[:, 6:] * np.repeat(factors, len(DOFS), axis=1)])
-    np.testing.assert_allclose(INVERSE.predict(turned), whole, rtol=1e-7)
+    assert (np.abs(INVERSE.predict(turned) - whole) < 1e-3 * deviations).all()
 
 
 def test_modes_that_exchange_their_shapes_are_found():
