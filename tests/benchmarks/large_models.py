@@ -206,7 +206,7 @@ def main():
     print(f"{reduced.basis_size_} vectors, {len(reduced.snapshot_points_)} snapshots, error {reduced.error_:.1e}")
     if options.days:
         T, F = records(reduced, options.days)
-        inverse = InverseSurrogate(bounds=BOUNDS, n_samples=500, random_state=0)
+        inverse = InverseSurrogate(bounds=BOUNDS, n_samples=500, noise=0.001, random_state=0)
         chain = DataInformedFEM(model, inverse=inverse, reduce=True, random_state=0)
         timed(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
         timed("predict", lambda: chain.predict(T))
