@@ -47,6 +47,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fem.external": {"fem.affine"},
     "preprocessing.checks": set(),
     "preprocessing.tracking": set(),
+    "datasets.fleet": set(),
     "detection.compensation": set(),
     "detection.windows": set(),
     "surrogate.refinement": set(),
