@@ -1,0 +1,3 @@
+"""Many bridges: fitted side by side, learning together."""
+
+__all__: list[str] = []
