@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_jobs, check_model, check_theta
 from skthermo._arrays import Array
-from skthermo._progress import with_progress
+from skthermo._io import with_progress
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 
