@@ -1,4 +1,4 @@
-"""Many bridges: what a fleet knows of a bridge that has few records."""
+"""Many bridges: fitted side by side, learning together."""
 
 from skthermo.fleet.prior import FleetMapper, FleetPrior
 
