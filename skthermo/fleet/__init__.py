@@ -1,3 +1,5 @@
 """Many bridges: fitted side by side, learning together."""
 
-__all__: list[str] = []
+from skthermo.fleet.prior import FleetMapper, FleetPrior
+
+__all__ = ["FleetMapper", "FleetPrior"]
