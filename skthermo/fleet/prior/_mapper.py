@@ -13,11 +13,11 @@ from sklearn.base import RegressorMixin, clone
 from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, row_weights
-from skthermo._validation import Estimator, _fit_context, check_array, check_is_fitted, validate_data
+from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
 from skthermo._weather import TrainingRange, parts
+from skthermo.fleet.prior._bridges import families_by_name
 from skthermo.fleet.prior._families import Member
 from skthermo.fleet.prior._posterior import alone, mixture
-from skthermo.fleet.prior._prior import FleetPrior, families_by_name
 from skthermo.fleet.prior._records import BridgeRecords, Information
 from skthermo.metrics import complete_r2
 from skthermo.surrogate import FrequencyCoordinates
@@ -73,7 +73,7 @@ class FleetMapper(RegressorMixin, Estimator):
     """
 
     _parameter_constraints: dict = {
-        "prior": [FleetPrior],
+        "prior": [HasMethods(["mapper"])],
         "covariates": [Mapping, pd.Series, None],
         "families": [Mapping, None],
         "coordinates": [FrequencyCoordinates, None],
@@ -81,7 +81,7 @@ class FleetMapper(RegressorMixin, Estimator):
 
     def __init__(
         self,
-        prior: FleetPrior,
+        prior: Any,
         *,
         covariates: Mapping[Hashable, Any] | None = None,
         families: Mapping[Hashable, Any] | None = None,
