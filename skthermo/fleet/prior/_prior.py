@@ -15,6 +15,7 @@ from skthermo.fleet.prior._bridges import bridges_of, common_inputs, families_by
 from skthermo.fleet.prior._comparison import compare
 from skthermo.fleet.prior._covariates import Covariates
 from skthermo.fleet.prior._families import Member
+from skthermo.fleet.prior._mapper import FleetMapper
 from skthermo.fleet.prior._posterior import alone
 from skthermo.fleet.prior._records import BridgeRecords, FleetNoise, Information
 
