@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -99,7 +99,7 @@ class FitReport(SavesFrames):
     fleet : DataFrame or None
         With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
-    follows : Series or None
+    follows : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
 
     Examples
@@ -132,7 +132,7 @@ class FitReport(SavesFrames):
     scatter: pd.Series | None = None
     findings: RecordFindings | None = None
     fleet: pd.DataFrame | None = None
-    follows: pd.Series | None = None
+    follows: Mapping[Any, float] | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
