@@ -130,6 +130,11 @@ def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
 
 
+def broken_lines(values: Array, knots: Array) -> Array:
+    """Columns, then max(column - knot, 0) of all columns for each row of knots."""
+    return np.hstack([values, *(np.maximum(values - row, 0.0) for row in knots)])
+
+
 def median(values: Array) -> Array:
     """Median of each column, NaN ignored; NaN for a column without a value.
 

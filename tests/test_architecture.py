@@ -37,6 +37,7 @@ MAY_IMPORT["monitoring"] = {
     "datasets",
     "studies",
 }
+MAY_IMPORT["fleet"] = {"fem", "preprocessing", "surrogate", "detection", "metrics", "studies", "monitoring"}
 MAY_IMPORT["reporting"] = set(MAY_IMPORT)  # on top of all
 WITHIN = {  # what a package within a package may import, beside what its parent may
     "fem.elements": set(),
@@ -55,11 +56,14 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.chain": {"surrogate.inverse", "surrogate.refinement"},
     "plotting.comparison": set(),
     "plotting.structures": set(),
+    "fleet": {"fleet.prior"},
+    "fleet.prior": set(),
     "monitoring": {"monitoring.drift", "monitoring.retraining", "monitoring.sensors"},  # the monitor joins them
     "monitoring.drift": set(),
     "monitoring.retraining": set(),
     "monitoring.sensors": set(),
-    "reporting": {"reporting.service"},
+    "reporting": {"reporting.fleet", "reporting.service"},
+    "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),
     "studies.scenarios": set(),
     "studies.worlds": set(),

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._arrays import broken_lines
 from skthermo._frames import frame_like, row_weights
 from skthermo._validation import (
     Estimator,
@@ -128,8 +129,7 @@ class HingeFeatures(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-        hinges = [np.maximum(values - knots, 0.0) for knots in self.knots_]
-        return frame_like(X, np.hstack([values, *hinges]), self.get_feature_names_out())
+        return frame_like(X, broken_lines(values, self.knots_), self.get_feature_names_out())
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the columns.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats, median, spread_evenly
+from skthermo._arrays import Array, as_floats, broken_lines, median, spread_evenly
 
 MOST_COORDINATES = 3  # principal components of the weather
 EXPLAINED = 0.99  # share of its variance that is enough
@@ -67,8 +67,7 @@ class WeatherBasis:
 
     def lines(self, places: Array) -> Array:
         """Broken lines in the coordinates, with a constant first."""
-        hinges = [np.maximum(places - knots, 0.0) for knots in self.knots]
-        return np.hstack([np.ones((len(places), 1)), places, *hinges])
+        return np.hstack([np.ones((len(places), 1)), broken_lines(places, self.knots)])
 
 
 class Grams(NamedTuple):

@@ -14,9 +14,9 @@ import joblib
 import numpy as np
 import pytest
 
+from skthermo._io._progress import bar
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
-from skthermo.fem.sampling._progress import bar
 
 TRUSS = make_truss()
 
@@ -44,7 +44,7 @@ def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_while(monkeypatch, 
         (Terminal(), 0.0, False, False),
         (Terminal(), 3600.0, None, False),
     ):
-        monkeypatch.setattr("skthermo.fem.sampling._progress.SILENT_SECONDS", silence)
+        monkeypatch.setattr("skthermo._io._progress.SILENT_SECONDS", silence)
         monkeypatch.setattr(sys, "stderr", stderr)
         sample(TRUSS, 0.2, 300, n_jobs=n_jobs, progress=progress, random_state=0)
         assert bool(stderr.getvalue()) == seen

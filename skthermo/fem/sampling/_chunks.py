@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_jobs, check_model, check_theta
 from skthermo._arrays import Array
+from skthermo._io import with_progress
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
-from skthermo.fem.sampling._progress import with_progress
 
 Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
 
@@ -44,7 +44,8 @@ def solve_rows(
     size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
     places = [known[i : i + size] for i in range(0, len(known), size)]
     with closing(_solved(model, solve, [rows[place] for place in places], n_jobs)) as parts:
-        for place, part in zip(places, with_progress(parts, len(known), progress), strict=True):
+        shown = with_progress(parts, len(known), progress, count=lambda part: len(part[0]))
+        for place, part in zip(places, shown, strict=True):
             for result, array, what in zip(results, part, shapes, strict=True):
                 expected = (len(place), *shapes[what])
                 if np.shape(array) != expected:

@@ -11,12 +11,12 @@ from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names, frame_like
+from skthermo._regressors import inputs_of_last_step
 from skthermo._validation import last_step
 from skthermo._warnings import warn_user
 from skthermo.fem import linearise, shape_components
-from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._standardiser import FrequencyCoordinates
-from skthermo.surrogate.chain._parts import inputs_of_last_step, surrogates_in
+from skthermo.surrogate.chain._parts import surrogates_in
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
@@ -101,12 +101,14 @@ def refining_step(inverse: Any) -> InverseSurrogate | None:
 
 
 def learn_in_frequencies(mapper: Any, inverse: InverseSurrogate, n_rows: int) -> FrequencyCoordinates | None:
-    """Let every `TemperatureMapper` that a mapper is or holds learn in coordinates of frequencies, and return these.
+    """Let every part of a mapper with ``coordinates``, as `TemperatureMapper`, learn in those of frequencies.
 
-    The derivatives are those at the nominal state, in standard deviations of the frequencies; the prior does the
-    damping. None if there is no such mapper, if it is fitted to one parameter at a time, or has coordinates already.
+    These are returned. The derivatives are those at the nominal state, in standard deviations of the frequencies; the
+    prior does the damping. None if there is no such part, if it is fitted to one parameter at a time, or has
+    coordinates already.
     """
-    mappers = [part for part in (mapper, *mapper.get_params().values()) if isinstance(part, TemperatureMapper)]
+    parts = (mapper, *mapper.get_params().values())
+    mappers = [part for part in parts if "coordinates" in getattr(part, "get_params", dict)()]
     is_free = all(part.coordinates is None for part in mappers)
     if not mappers or not is_free or isinstance(last_step(mapper), MultiOutputRegressor):
         return None

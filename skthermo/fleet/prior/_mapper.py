@@ -1,0 +1,311 @@
+"""A regressor whose prior a fleet gives."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import RegressorMixin, clone
+
+from skthermo._arguments import check_flag
+from skthermo._arrays import Array, as_columns
+from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, row_weights
+from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
+from skthermo._weather import TrainingRange, parts
+from skthermo.fleet.prior._bridges import families_by_name
+from skthermo.fleet.prior._families import Member
+from skthermo.fleet.prior._posterior import alone, mixture
+from skthermo.fleet.prior._records import BridgeRecords, Information
+from skthermo.metrics import complete_r2
+from skthermo.surrogate import FrequencyCoordinates
+
+
+class FleetMapper(RegressorMixin, Estimator):
+    """Positive quantities of a bridge from the weather, with a prior that a fleet gives.
+
+    Parameters
+    ----------
+    prior : FleetPrior
+        Fitted.
+    covariates : mapping of str to value, optional
+        Covariates of this bridge; what is not given counts as unknown.
+    families : mapping of str to str, optional
+        Family of each parameter or mode by name; by default as for the fleet. None is never pooled.
+    coordinates : FrequencyCoordinates, optional
+        Set by `DataInformedFEM` where its inverse refines: what the frequencies see of the parameters.
+
+    Attributes
+    ----------
+    follows_ : dict
+        By family: probability that this bridge behaves as the fleet does.
+    reach_ : TrainingRange
+        Lowest and highest value of each input in the fleet and in the bridge's own records.
+    own_range_ : TrainingRange
+        The same of its own records.
+    coefficients_ : ndarray of shape (n_outputs, 1 + n_functions)
+        Posterior mean of the level and of the coefficients of the fleet's basis, of ln y.
+    covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
+        Their posterior covariance.
+    centre_ : ndarray of shape (n_functions,)
+        Mean of the basis in the bridge's own records, to which the level belongs.
+    parameter_names_ : list or None
+        Names of the outputs, where `fit` saw them.
+    y_is_vector_ : bool
+        Whether `fit` saw one output as a vector.
+    n_features_in_ : int
+        Number of inputs.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.fleet import FleetMapper, FleetPrior
+    >>> T = np.linspace(-10, 30, 200)[:, np.newaxis]
+    >>> bridges = [(T, np.exp(-0.004 * (1 + 0.1 * i) * T)) for i in range(5)]
+    >>> prior = FleetPrior().fit(bridges)
+    >>> mapper = FleetMapper(prior).fit(T[:40], 2 * np.exp(-0.0044 * T[:40]))
+    >>> mapper.predict([[30.0]]).shape
+    (1, 1)
+    """
+
+    _parameter_constraints: dict = {
+        "prior": [HasMethods(["mapper"])],
+        "covariates": [Mapping, pd.Series, None],
+        "families": [Mapping, None],
+        "coordinates": [FrequencyCoordinates, None],
+    }
+
+    def __init__(
+        self,
+        prior: Any,
+        *,
+        covariates: Mapping[Hashable, Any] | None = None,
+        families: Mapping[Hashable, Any] | None = None,
+        coordinates: FrequencyCoordinates | None = None,
+    ):
+        self.prior = prior
+        self.covariates = covariates
+        self.families = families
+        self.coordinates = coordinates
+
+    def __sklearn_clone__(self) -> FleetMapper:
+        # The prior stays fitted: it is what the mapper knows, not a part that the mapper fits.
+        others = {name: value for name, value in self.get_params(deep=False).items() if name != "prior"}
+        return type(self)(self.prior, **{name: clone(value, safe=False) for name, value in others.items()})
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> FleetMapper:
+        """Learn what the bridge's own records tell, beside the fleet.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_inputs)
+            Temperatures in degrees Celsius, lagged as those of the fleet.
+        y : array-like, Series or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
+            Positive quantities; NaN is allowed.
+        sample_weight : array-like of shape (n_samples,), optional
+            Relative precision of each row; a row of weight 0 counts as left out.
+
+        Returns
+        -------
+        FleetMapper
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If the prior is not fitted, inputs are not those of the fleet, or no row can be used.
+        """
+        check_is_fitted(self.prior)
+        inputs, values = self._read(X, y)
+        weights = row_weights(sample_weight, X)
+        if self.coordinates is not None:
+            self.coordinates.check(values)
+        prior = self.prior
+        names = self._names_of(y, values.shape[1])
+        families = list(families_by_name(self._families(), names).values())
+        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates)
+        if not len(records.inputs):
+            raise ValueError(f"none of {len(inputs)} rows has all inputs and an output; expected at least one")
+        typical_of_all = float(np.median(list(prior.typical_.values())))
+        typical = np.array([prior.typical_.get(family, typical_of_all) for family in families])
+        found = Information.of(prior.basis_, records, prior.noise_, families, typical)
+        z, unknown = prior.covariates_.row(self.covariates)
+        plain = alone(found.J, found.h, found.n_outputs, typical)
+        pooled = {name: prior.families_[name] for name, row in prior.comparison_.iterrows() if row["is_pooled"]}
+        member = Member(found, families, z, unknown, plain)
+        chances = {name: prior.follows_[name] for name in pooled}
+        state = mixture(found.J, found.h, families, member.prior(pooled, predictive=True), plain, chances)
+        self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
+        self._keep(found, state.mean, state.covariance)
+        self.own_range_ = TrainingRange.of(frame_like(X, inputs), self._trained(inputs, values, weights))
+        own, fleet = self.own_range_, prior.reach_
+        lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)
+        self.reach_ = TrainingRange(lowest, highest, own.names)
+        return self
+
+    def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
+        """Quantities at the posterior mean of their logarithms.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_inputs)
+            Inputs; rows with NaN are NaN.
+        return_std : bool, default=False
+            Whether to return standard deviations, too.
+
+        Returns
+        -------
+        y : ndarray or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
+            exp of the posterior mean, the median of the posterior.
+        std : ndarray or DataFrame of the same shape
+            Only with ``return_std``: what the records and the fleet leave open, without the noise of a measurement.
+        """
+        values, covariance = self._posterior_at(X, check_flag(return_std, "return_std"))
+        if not return_std:
+            return self._as_targets(X, values)
+        std = np.sqrt(np.einsum("tii->ti", covariance))
+        return self._as_targets(X, values), self._as_targets(X, std)
+
+    def predict_covariance(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Covariance of the quantities, because their coefficients are uncertain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_inputs)
+            Inputs; rows with NaN are NaN.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_outputs, n_outputs)
+            In the units of `predict`, to first order, without the noise of a measurement.
+        """
+        return self._posterior_at(X, True)[1]
+
+    def from_fleet(self, X: ArrayLike) -> NDArray[np.bool_]:
+        """Rows of weather that the bridge's own records have not seen, but those of the fleet have.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_inputs)
+            Inputs.
+
+        Returns
+        -------
+        ndarray of bool of shape (n_samples,)
+            False in rows with NaN.
+        """
+        inputs = self._inputs(X)
+        outside = (self.own_range_.excess(inputs) > 0).any(axis=1)
+        return outside & (self.reach_.excess(inputs) == 0).all(axis=1)
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over outputs.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_inputs)
+            Inputs.
+        y : array-like or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
+            Quantities.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete.
+        """
+        return complete_r2(as_columns(y), as_columns(self.predict(X)), row_weights(sample_weight, X))
+
+    def _read(self, X: Any, y: Any) -> tuple[Array, Array]:
+        if y is None:
+            raise ValueError("This FleetMapper estimator requires y to be passed, but the target y is None")
+        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
+        values = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
+        plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
+        check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
+        check_temperatures(frame_like(X, inputs))
+        self._check_inputs(X)
+        self.y_is_vector_ = values.ndim == 1
+        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
+        return inputs, as_columns(values)
+
+    def _check_inputs(self, X: Any) -> None:
+        basis = self.prior.basis_
+        if self.n_features_in_ != basis.n_inputs:
+            raise ValueError(f"X has {self.n_features_in_} inputs; expected the {basis.n_inputs} of the fleet")
+        names = getattr(X, "columns", None)
+        if names is None or basis.names is None or basis.n_inputs == 1 or list(names) == list(basis.names):
+            return
+        raise ValueError(f"X has the inputs {list(names)[:20]}; expected those of the fleet, {list(basis.names)[:20]}")
+
+    def _families(self) -> Mapping[Hashable, Any] | None:
+        return self.prior.families if self.families is None else self.families
+
+    def _names_of(self, y: Any, n_outputs: int) -> list[Any]:
+        """Names of the outputs, or those of the fleet in their order."""
+        if isinstance(y, pd.DataFrame):
+            return list(y.columns)
+        if isinstance(y, pd.Series) and y.name is not None:
+            return [y.name]
+        names = list(self.families) if self.families is not None else self.prior.parameter_names_
+        if len(names) != n_outputs:
+            raise ValueError(
+                f"y has {n_outputs} columns without names; expected names, or the {len(names)} {names[:20]}"
+            )
+        return list(names)
+
+    @staticmethod
+    def _trained(inputs: Array, values: Array, weights: Array | None) -> NDArray[np.bool_]:
+        usable = ~np.isnan(inputs).any(axis=1) & ~np.isnan(values).all(axis=1)
+        return usable if weights is None else usable & (weights > 0)
+
+    def _keep(self, found: Information, b: Array, covariance: Array) -> None:
+        """Coefficients with levels, and their covariance."""
+        n_outputs, size = found.n_outputs, len(b)
+        n_functions = size // n_outputs
+        self.coefficients_ = np.column_stack([found.level - found.gain @ b, b.reshape(n_outputs, n_functions)])
+        whole = np.zeros((n_outputs, 1 + n_functions, n_outputs, 1 + n_functions))
+        cross = -found.gain @ covariance
+        whole[:, 0, :, 0] = found.level_covariance - cross @ found.gain.T
+        whole[:, 0, :, 1:] = cross.reshape(n_outputs, n_outputs, n_functions)
+        whole[:, 1:, :, 0] = cross.T.reshape(n_outputs, n_functions, n_outputs)
+        whole[:, 1:, :, 1:] = covariance.reshape(n_outputs, n_functions, n_outputs, n_functions)
+        self.covariance_, self.centre_ = whole, found.centre
+
+    def _inputs(self, X: Any) -> Array:
+        check_is_fitted(self)
+        return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+
+    def _posterior_at(self, X: Any, with_covariance: bool) -> tuple[Array, Array]:
+        """exp of the posterior mean, and its covariance; NaN where an input is missing."""
+        inputs = self._inputs(X)
+        n_outputs = len(self.coefficients_)
+        known = np.flatnonzero(~np.isnan(inputs).any(axis=1))
+        values = np.full((len(inputs), n_outputs), np.nan)
+        covariance = np.full((len(inputs) if with_covariance else 0, n_outputs, n_outputs), np.nan)
+        for part in parts(len(known), self.coefficients_.size * n_outputs):
+            rows = known[part]
+            x = np.column_stack([np.ones(len(rows)), self.prior.basis_(inputs[rows]) - self.centre_])
+            values[rows] = np.exp(x @ self.coefficients_.T)
+            if with_covariance:
+                half = np.einsum("ti,aibj->tabj", x, self.covariance_)
+                logs = np.einsum("tabj,tj->tab", half, x)
+                covariance[rows] = values[rows][:, :, np.newaxis] * values[rows][:, np.newaxis] * logs
+        return values, covariance
+
+    def _as_targets(self, X: Any, values: Array) -> Any:
+        if self.y_is_vector_:
+            return values[:, 0]
+        return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        tags.target_tags.positive_only = True
+        return tags
