@@ -5,8 +5,8 @@ A new bridge learns from a fleet
 A monitoring system was switched on in June. What its bridge does in frost, nobody has measured yet; what other bridges
 do in frost, the owner knows. Twelve trusses and girders with a year of records each are fitted, a prior is learned from
 them, and four new bridges with 30 days of June predict their next year, with the fleet and without. The fleet is
-synthetic, so that the truth is known: every bridge has its own span, material, climate and thermometers, and an FE model
-that is a little wrong.
+synthetic, so that the truth is known: every bridge has its own span, material, climate and thermometers, and an FE
+model that is a little wrong.
 
 Run it with ``python examples/plot_fleet.py``; the figures go to the folder ``figures``. It needs
 :download:`page_recipes.py` beside it. The guide is :doc:`/guide/many_bridges`.
