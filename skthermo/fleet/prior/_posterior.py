@@ -17,6 +17,8 @@ STEPS = 25  # to the deviation of a bridge on its own
 TYPICAL_COUNT = 2.0  # coefficients as which a typical deviation counts
 START = 0.1  # deviation of coefficients of ln y where nothing else is known
 SMALLEST = 1e-8
+SETTLED = 0.03  # relative change of tau^2 that ends the iteration
+JITTER = 1e-9
 MOST_COMBINED = 6  # families of which all combinations are weighed
 
 
@@ -70,9 +72,11 @@ def alone(J: Array, h: Array, n_outputs: int, typical: Array | None = None) -> C
     start = variances
     for _ in range(STEPS):
         found = posterior(J, h, zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * eye)
-        second = (found.mean**2 + np.diag(found.covariance)).reshape(n_outputs, n_functions).sum(axis=1)
-        updated = np.maximum((second + count * start) / (n_functions + count), SMALLEST**2)
-        settled = np.abs(np.log(updated / variances)).max() < 0.01
+        squares = (found.mean**2).reshape(n_outputs, n_functions).sum(axis=1)
+        left_open = np.diag(found.covariance).reshape(n_outputs, n_functions).sum(axis=1) / variances
+        known = n_functions - left_open  # MacKay: number of coefficients that the records determine
+        updated = np.maximum((squares + count * start) / (np.maximum(known, JITTER) + count), SMALLEST**2)
+        settled = np.abs(np.log(updated / variances)).max() < SETTLED
         variances = updated
         if settled:
             break

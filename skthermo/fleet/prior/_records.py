@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from skthermo._arrays import Array, rows_by_pattern, spread_evenly
 from skthermo._gaussian import Gaussian
@@ -16,9 +17,8 @@ from skthermo.fleet.prior._posterior import alone, posterior
 
 MOST_ROWS = 20_000
 ROUNDS = 4  # of noise and coefficients in turn
-FREEDOM = 5.0  # of Student's distribution that outliers are weighed by
+USUAL = 0.99  # share of the records, if normal, that count in full; others by how far beyond they are
 PSEUDO_ROWS = 20.0  # independent records as which the noise of the fleet counts beside those of a new bridge
-PSEUDO_MEMORY = 100.0  # records as which the memory of the fleet's residuals counts
 LEAST_LEFT = 0.25  # share of the records that regression leaves to the noise, at least
 JITTER = 1e-9
 ROWS_PER_EFFECTIVE_ROW = 10.0  # by which a chain's damping is less than the precision of the inverse's prior
@@ -157,7 +157,7 @@ class Information:
             gaussian = Gaussian(np.zeros(n_seen), scatter)
             distances = gaussian.distances(residuals * root_weights)
             n_known = (~np.isnan(residuals)).sum(axis=1)
-            robust = (FREEDOM + n_known) / (FREEDOM + np.nan_to_num(distances) ** 2)
+            robust = np.minimum(1.0, chi2.ppf(USUAL, n_known) / np.maximum(np.nan_to_num(distances) ** 2, 1e-300))
             moments = gaussian.second_moments(residuals * root_weights)
             products = np.einsum("t,tij->ij", robust, moments)
             left = max(n_rows - memory * dof, LEAST_LEFT * n_rows)
@@ -169,10 +169,9 @@ class Information:
                 expected_now = expected
             scatter = (inflated + pseudo * expected_now) / (n_rows + pseudo)
             scatter = scatter + JITTER * np.diag(np.diag(scatter)) + 1e-18 * np.eye(n_seen)
-            own = np.mean([correlation_time(column) for column in (residuals * np.sqrt(robust)[:, None]).T])
-            start = 1.0 if noise is None else noise.memory
-            count = 0.0 if noise is None else PSEUDO_MEMORY
-            memory = float(max((n_rows * own + count * start) / (n_rows + count), 1.0))
+            own = np.mean([correlation_time(column) for column in (residuals * np.sqrt(robust)[:, np.newaxis]).T])
+            count = 0.0 if noise is None else PSEUDO_ROWS * noise.memory
+            memory = max((n_rows * own + count * (1.0 if noise is None else noise.memory)) / (n_rows + count), 1.0)
         raise AssertionError
 
     @classmethod
