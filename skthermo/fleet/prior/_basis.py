@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import Array, broken_lines, spread_evenly
+from skthermo._arrays import Array, broken_lines, real_array, spread_evenly
 from skthermo._weather import TrainingRange
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
@@ -21,7 +21,8 @@ class FleetBasis:
     """Principal components of the standardised inputs, and broken lines in the largest; of zero mean in the fleet.
 
     The lines break at quantiles of the weather of all bridges and have unit variance there. Beyond the weather of the
-    fleet they go on straight. ``names`` are those of the inputs, None where they have none.
+    fleet they go on straight. ``covariance`` is that of the functions in the fleet. ``names`` are those of the inputs,
+    None where they have none.
     """
 
     names: Sequence[Any] | None
@@ -30,6 +31,7 @@ class FleetBasis:
     knots: Array
     centre: Array
     scale: Array
+    covariance: Array
     reach: TrainingRange
 
     @classmethod
@@ -49,10 +51,20 @@ class FleetBasis:
         ends = [end(table, axis=0) for table in tables for end in (np.min, np.max)]
         shown = [f"T{i + 1}" for i in range(pooled.shape[1])] if names is None else names
         reach = TrainingRange(np.min(ends, axis=0), np.max(ends, axis=0), shown)
-        plain = cls(names, middle, components, knots, np.zeros(1), np.ones(1), reach)
+        plain = cls(names, middle, components, knots, np.zeros(1), np.ones(1), np.empty((0, 0)), reach)
         lines = plain(pooled)
         scale = np.where(np.arange(lines.shape[1]) < places.shape[1], 1.0, np.maximum(lines.std(axis=0), 1e-12))
-        return replace(plain, centre=lines.mean(axis=0), scale=scale)
+        covariance = np.atleast_2d(np.cov(lines / scale, rowvar=False))
+        return replace(plain, centre=lines.mean(axis=0), scale=scale, covariance=covariance)
+
+    @property
+    def n_functions(self) -> int:
+        """Number of functions."""
+        return len(self.scale)
+
+    def steady(self, temperatures: Array) -> Array:
+        """The functions where all inputs have been at one temperature for long."""
+        return self(np.repeat(temperatures[:, np.newaxis], self.n_inputs, axis=1))
 
     @property
     def n_inputs(self) -> int:
@@ -65,3 +77,12 @@ class FleetBasis:
         n_breaking = self.knots.shape[1]
         lines = broken_lines(places[:, :n_breaking], self.knots)[:, n_breaking:]
         return (np.hstack([places, lines]) - self.centre) / self.scale
+
+
+def steady_changes(
+    basis: FleetBasis, temperatures: Any, reference: float | None, reach: TrainingRange
+) -> tuple[Array, Array]:
+    """Temperatures, and the functions there less those at a reference, by default the middle of some weather."""
+    values = np.ravel(real_array(temperatures, "temperatures"))
+    middle = float(np.mean([reach.lowest, reach.highest])) if reference is None else float(reference)
+    return values, basis.steady(values) - basis.steady(np.array([middle]))
