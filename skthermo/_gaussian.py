@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, patterns
+from skthermo._arrays import Array, patterns, spread_evenly
 from skthermo._warnings import warn_user
 
 Mask = NDArray[np.bool_]
 MOST_STEPS = 100  # of expectation maximisation
+MOST_WITH_ERRORS = 5000  # rows, each with an error of its own, that are learned from
+PSEUDO_ROWS = 5  # of which their errors are not taken away
 TOLERANCE = 1e-9  # it ends when no mean or covariance of standardised modes moves by more
 SETTLED = 0.01  # size of the last of the most steps, beside the sampling error, above which it warns
 GAPS_TOLERANCE = 1e-7  # variance below which a combination of standardised modes with gaps counts as constant
@@ -29,14 +31,22 @@ class Gaussian:
     covariance: Array
 
     @classmethod
-    def of(cls, rows: Array) -> Gaussian:
-        """The most likely one, by expectation maximisation where modes are missing."""
+    def of(cls, rows: Array, errors: Array | None = None) -> Gaussian:
+        """The most likely one, by expectation maximisation where modes are missing.
+
+        With the covariance of an ``error`` that each row holds besides, (n_rows, n_modes, n_modes), it is that of rows
+        without it.
+        """
         present = ~np.isnan(rows)
         centre = np.nanmean(rows, axis=0)
         deviations = np.nanstd(rows, axis=0)
         scale = np.where(deviations > 0, deviations, 1.0)
         standard = np.where(present, (rows - centre) / scale, 0.0)
-        mean, covariance = _expectation_maximisation(standard, present)
+        mean, covariance = (
+            _expectation_maximisation(standard, present)
+            if errors is None
+            else _maximisation_with_errors(standard, present, errors / np.outer(scale, scale))
+        )
         return cls(centre + scale * mean, covariance * np.outer(scale, scale))
 
     def centred(self, rows: Array) -> Array:
@@ -174,7 +184,23 @@ def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]
     for pattern in range(len(masks)):
         group = rows[of_row == pattern]
         sums[pattern], products[pattern] = group.sum(axis=0), group.T @ group
-    step = partial(_em_step, masks, counts, sums, products)
+    return _settled(partial(_em_step, masks, counts, sums, products), len(rows), n_modes)
+
+
+def _maximisation_with_errors(rows: Array, present: Mask, errors: Array) -> tuple[Array, Array]:
+    """The same where each row holds an error of known covariance besides; evenly spaced rows stand for very many.
+
+    A few pseudo-rows with the covariance of rows and errors together keep it from vanishing where errors are said to be
+    larger than they are.
+    """
+    chosen = spread_evenly(np.flatnonzero(present.any(axis=1)), MOST_WITH_ERRORS)
+    whole = _expectation_maximisation(rows, present)[1]
+    step = partial(_em_step_with_errors, rows[chosen], present[chosen], errors[chosen], whole)
+    return _settled(step, len(chosen), rows.shape[1])
+
+
+def _settled(step: Callable[[Array], Array], n_rows: int, n_modes: int) -> tuple[Array, Array]:
+    """Mean and covariance that a step of expectation maximisation of standardised rows leaves as they are."""
     state = np.concatenate([np.zeros((1, n_modes)), np.eye(n_modes)])
     for _ in range(MOST_STEPS):
         once = step(state)
@@ -190,13 +216,25 @@ def _expectation_maximisation(rows: Array, present: Mask) -> tuple[Array, Array]
             beyond = step(far)
             state = beyond if np.abs(beyond - far).max() <= np.abs(first).max() else twice
     is_singular = np.linalg.eigvalsh(state[1:])[0] < GAPS_TOLERANCE  # which `check_invertible` refuses
-    if np.abs(second).max() > SETTLED / np.sqrt(len(rows)) and not is_singular:
+    if np.abs(second).max() > SETTLED / np.sqrt(n_rows) and not is_singular:
         warn_user(
-            f"the covariance of {len(rows)} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
+            f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
             "part of it nearly undetermined",
             "covariance with gaps",
         )
     return state[0], state[1:]
+
+
+def _em_step_with_errors(rows: Array, present: Mask, errors: Array, whole: Array, state: Array) -> Array:
+    """The next mean and covariance S of what rows are without their errors C: each row has S + C."""
+    mean, covariance = state[0], state[1:] + JITTER * np.eye(rows.shape[1])
+    fill = covariance @ precisions(covariance + errors, present)
+    expected = np.einsum("ijk,ik->ij", fill, np.where(present, rows - mean, 0.0))
+    rest = covariance - np.mean(fill, axis=0) @ covariance
+    step = expected.mean(axis=0)
+    own = expected.T @ expected / len(rows) + rest - np.outer(step, step)
+    updated = (len(rows) * own + PSEUDO_ROWS * whole) / (len(rows) + PSEUDO_ROWS)
+    return np.concatenate([[mean + step], (updated + updated.T) / 2])
 
 
 def _em_step(masks: Mask, counts: Array, sums: Array, products: Array, state: Array) -> Array:

@@ -198,27 +198,35 @@ class SensorRegression:
 
 
 @dataclass(frozen=True)
-class FillError:
-    """Covariance of the error that filled temperatures bring into predictions, (n_rows, n_modes, n_modes).
+class PredictionError:
+    """Covariance of the error of predictions that is known of each row, (n_rows, n_modes, n_modes).
 
-    ``rows`` are those whose predictions depend on a filled temperature.
+    ``rows`` are those with such an error.
     """
 
     rows: NDArray[np.intp]
     covariances: Array
 
     @classmethod
-    def of(
+    def of_rows(cls, covariances: Array) -> PredictionError:
+        """That of rows with a covariance each; zero where it is unknown."""
+        known = np.nan_to_num(covariances)
+        rows = np.flatnonzero(known.any(axis=(1, 2)))
+        return cls(rows, known[rows])
+
+    @classmethod
+    def of_fills(
         cls,
         sensors: SensorRegression,
         raw: Any,
         filled: Any,
         predict: Callable[[Any], Array],
         outcome: Callable[[Array], Array] = np.asarray,
-    ) -> FillError:
-        """Move what was filled by one standard deviation up and down, sensor by sensor, and predict again.
+    ) -> PredictionError:
+        """What filled temperatures bring into predictions.
 
-        The error is that of the ``outcome`` of each prediction.
+        What was filled is moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
+        is that of the ``outcome`` of each prediction.
         """
         with without_warnings():
             middle = np.empty(0)
@@ -232,6 +240,22 @@ class FillError:
             start = outcome(middle[rows])
             changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
         return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
+
+    def of_all(self, n_rows: int, n_modes: int) -> Array:
+        """The covariance of each row of a table, zero where nothing is known."""
+        covariances = np.zeros((n_rows, n_modes, n_modes))
+        if len(self.rows):
+            covariances[self.rows] = self.covariances
+        return covariances
+
+    def plus(self, other: PredictionError, n_rows: int) -> PredictionError:
+        """The error of two independent causes in a table of so many rows."""
+        if not len(other.rows):
+            return self
+        if not len(self.rows):
+            return other
+        n_modes = other.covariances.shape[1]
+        return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
 
 
 def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str:

@@ -31,7 +31,15 @@ from skthermo.detection import (
     WindowedAlarm,
 )
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import BiasAligner, HampelFilter, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
+from skthermo.preprocessing import (
+    BiasAligner,
+    HampelFilter,
+    HingeFeatures,
+    KNNGapImputer,
+    LagFeatures,
+    ModeTracker,
+    SensorMeans,
+)
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater
@@ -86,6 +94,7 @@ ESTIMATORS = [
     HampelFilter(),
     HampelFilter(targets=[0]),
     HingeFeatures(),
+    SensorMeans(),
     KNNGapImputer(),
     BiasAligner(),
     BiasAligner(method="scale"),
@@ -145,6 +154,7 @@ TRANSFORMERS_AND_DETECTORS = [
     LagFeatures(),
     HampelFilter(),
     HingeFeatures(),
+    SensorMeans(),
     KNNGapImputer(),
     BiasAligner(),
     MahalanobisDetector(),

@@ -6,12 +6,16 @@ from skthermo.datasets._kw51_model import kw51_sensors, kw51_structure, make_kw5
 from skthermo.datasets._truss import make_truss, make_truss_campaign, steel_modulus, truss_structure
 from skthermo.datasets._z24 import load_z24
 from skthermo.datasets._z24_model import make_z24
+from skthermo.datasets.fleet import BridgeFleet, FleetBridge, make_fleet
 
 __all__ = [
+    "BridgeFleet",
+    "FleetBridge",
     "kw51_sensors",
     "kw51_structure",
     "load_kw51",
     "load_z24",
+    "make_fleet",
     "make_kw51",
     "make_kw51_campaign",
     "make_truss",

@@ -53,3 +53,10 @@ class KW51Campaign(Campaign):
     sensors: list[str]
     state: pd.Series
     retrofit: dict[str, Any]
+
+
+class FleetRecords(Monitoring):
+    """What ``records`` of a `~skthermo.datasets.make_fleet` bridge returns."""
+
+    clean_frequencies: pd.DataFrame
+    theta: pd.DataFrame

@@ -2,6 +2,7 @@
 
 from skthermo.plotting._damage_index import DamageIndexDisplay
 from skthermo.plotting._fit_report import FitReportDisplay
+from skthermo.plotting._fleet_prior import FleetPriorDisplay
 from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
 from skthermo.plotting._history import HistoryDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
@@ -17,6 +18,7 @@ __all__ = [
     "AgreementDisplay",
     "DamageIndexDisplay",
     "FitReportDisplay",
+    "FleetPriorDisplay",
     "FrequencyTemperatureDisplay",
     "HistoryDisplay",
     "IdentifiedDamageDisplay",

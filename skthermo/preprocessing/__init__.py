@@ -6,6 +6,7 @@ from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._hinges import HingeFeatures
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._lags import LagFeatures
+from skthermo.preprocessing._sensors import SensorMeans
 from skthermo.preprocessing.checks import RecordFindings, check_records, residual_trend
 from skthermo.preprocessing.tracking import ModeTracker
 
@@ -18,6 +19,7 @@ __all__ = [
     "LagFeatures",
     "ModeTracker",
     "RecordFindings",
+    "SensorMeans",
     "check_records",
     "residual_trend",
 ]

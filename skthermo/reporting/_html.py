@@ -57,6 +57,13 @@ tbody th { font-weight: 600; min-width: 7rem; }
   stroke-linecap: round; stroke-linejoin: round; }
 .state circle { fill: var(--state); stroke: none; }
 .state p { margin: 0.35rem 0; }
+.badge { display: inline-flex; gap: 0.4rem; align-items: center; color: var(--state, var(--unjudged)); font-weight: 600;
+  white-space: nowrap; }
+.badge.healthy { --state: var(--healthy); }
+.badge.alarm { --state: var(--alarm); }
+.badge svg { flex: none; width: 1.15rem; fill: none; stroke: var(--card); stroke-width: 2.6; stroke-linecap: round;
+  stroke-linejoin: round; }
+.badge circle { fill: var(--state, var(--unjudged)); stroke: none; }
 .state .headline { color: var(--state); font-size: clamp(1.4rem, 5.5vw, 2.1rem); font-weight: 700; line-height: 1.2;
   margin: 0; }
 figure { margin: 1.25rem 0; }
@@ -64,6 +71,16 @@ figure { margin: 1.25rem 0; }
 img { display: block; width: 100%; max-width: 34rem; height: auto; background: var(--drawing); border-radius: 0.35rem;
   border: 1px solid var(--line); padding: 0.25rem; }
 figcaption { font-size: 0.92rem; margin-top: 0.5rem; max-width: 46rem; }
+.chart { display: block; width: 100%; max-width: 46rem; }
+.chart text { fill: var(--soft); font-size: 12px; }
+.spark { display: block; width: 8.25rem; }
+.chart path, .spark path { fill: none; stroke: var(--soft); stroke-linecap: round; stroke-linejoin: round; }
+.chart .event { fill: var(--alarm); opacity: 0.18; }
+.chart .threshold, .spark .threshold { stroke: var(--text); stroke-dasharray: 5 4; }
+.chart .dots { stroke: var(--accent); stroke-width: 4; }
+.chart .above { stroke: var(--alarm); stroke-width: 6; }
+.spark .course { stroke: var(--accent); stroke-width: 1.5; }
+.spark .above { stroke: var(--alarm); stroke-width: 5; }
 code { font-size: 0.88em; overflow-wrap: anywhere; }
 .cards th, .cards td { min-width: 3.5rem; }
 @media screen and (max-width: 40rem) {

@@ -54,12 +54,22 @@ def monitored(study: Any, structure: Any, families: list[str]) -> Html:
 
 def quality(study: Any) -> Html:
     """Errors by mode, doubtful data, predicted and measured frequencies, and agreement with reference records."""
-    report = study.fem.report_
     T, F = training_tables(study.fem)
-    error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
     measured, predicted, temperature = _over_temperature(study.fem, T, F)
-    sensor = temperature.name
-    parts = [
+    over_temperature = figure(
+        f"Frequencies over the temperature {temperature.name}, which goes most closely with them: measured, and "
+        "predicted by the model.",
+        draw_over_temperature(temperature, measured, predicted),
+    )
+    report = study.fem.report_
+    parts = [*learned(report), over_temperature, *stiffnesses(report), *_agreement(study.results_)]
+    return section("model", "How good the model is", *parts)
+
+
+def learned(report: Any) -> list[Html]:
+    """From how many records a model has learned, and how well it predicts them."""
+    error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
+    return [
         paragraphs(
             f"The model predicts the frequencies of these records with a mean error of {error} %. Whoever ignored "
             f"temperature and always expected the mean frequency would err by {mean} %. Errors are of records that the "
@@ -71,11 +81,12 @@ def quality(study: Any) -> Html:
             ["Mode", "Mean error", "Error of the mean frequency", "Measured mean against the model"],
             _modes(report),
         ),
-        figure(
-            f"Frequencies over the temperature {sensor}, which goes most closely with them: measured, and predicted by "
-            "the model.",
-            draw_over_temperature(temperature, measured, predicted),
-        ),
+    ]
+
+
+def stiffnesses(report: Any) -> list[Html]:
+    """How well each stiffness is determined, and what is doubtful."""
+    return [
         paragraphs(
             "Temperature changes the stiffness of parts of the model. The next table says how accurately one record "
             "determines each of these stiffnesses at best, and how many records gave a stiffness outside the range "
@@ -88,9 +99,7 @@ def quality(study: Any) -> Html:
         ),
         element("h3", "What is doubtful"),
         bullets(_doubts(report)) or paragraphs("Nothing is doubtful about the records, the modes or the stiffnesses."),
-        *_agreement(study.results_),
     ]
-    return section("model", "How good the model is", *parts)
 
 
 def _modes(report: Any) -> list[list[str]]:

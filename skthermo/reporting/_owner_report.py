@@ -20,10 +20,29 @@ from skthermo.reporting._html import Html, page, paragraphs
 from skthermo.reporting._identified import identified_damage
 from skthermo.reporting._model import monitored, quality
 from skthermo.reporting._settings import parameters, settings
-from skthermo.reporting.service import monitor_page
+from skthermo.reporting.fleet import fleet_page
+from skthermo.reporting.service import Standing, monitor_page
 from skthermo.studies import IdentifiedDamage
 
-STUDY_TITLE, MONITOR_TITLE = "Which damage the monitoring would find", "The structure today"
+KINDS = {
+    "Fleet": ("chains", "monitors", "discoveries"),
+    "Monitor": ("update", "acknowledge"),
+    "DetectabilityStudy": ("scenarios",),
+}
+"""Subjects, and what tells them from each other."""
+
+TITLES = {
+    "Fleet": "The bridges today",
+    "Monitor": "The structure today",
+    "DetectabilityStudy": "Which damage the monitoring would find",
+}
+ONLY_FOR = {
+    "identified": ("DetectabilityStudy", "Monitor"),
+    "structure": ("DetectabilityStudy",),
+    "detector": ("DetectabilityStudy",),
+    "now": ("Monitor", "Fleet"),
+}
+"""Arguments that are not for every subject."""
 
 
 def owner_report(
@@ -36,9 +55,10 @@ def owner_report(
     detector: str | None = None,
     max_false_alarms: float = 0.02,
     drift_limit: float = 0.1,
+    false_share: float = 0.1,
     now: Any = None,
 ) -> Path:
-    """Write a report for the owner of a structure: one HTML file, with all drawings in it.
+    """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
     Of a study, it says in plain sentences which damage the monitoring would find, what was monitored, how good the
     model is, which damage was identified, and with which settings and warnings all this was computed. If the study has
@@ -49,11 +69,16 @@ def owner_report(
     promise of few false alarms means. A monitor that has had no record for two days more than usual is not called
     healthy.
 
+    Of a fleet, it says how many bridges are in alarm, not judged, not fitted and healthy, and how many of the alarms
+    chance explains; a table has a row for each bridge, the worst first. Each row opens that bridge's own page, in a
+    folder beside the file: ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced; those of bridges
+    that are no longer in the fleet stay.
+
     Parameters
     ----------
-    subject : DetectabilityStudy or Monitor
-        A study with the results of `~skthermo.studies.DetectabilityStudy.run`, or a fitted
-        `~skthermo.monitoring.Monitor`.
+    subject : DetectabilityStudy, Monitor or Fleet
+        A study with the results of `~skthermo.studies.DetectabilityStudy.run`, a fitted
+        `~skthermo.monitoring.Monitor`, or what `~skthermo.fleet.fit_fleet` gives.
     path : str or path
         The file; an older one is replaced when the new one is complete.
     identified : IdentifiedDamage, optional
@@ -69,8 +94,10 @@ def owner_report(
         Limit of the share of false alarms, by which several detectors are ranked.
     drift_limit : float, default=0.1
         Loss of stiffness of which the page on a monitor says when slow drift reaches it.
+    false_share : float, default=0.1
+        Share of false ones among the events of all bridges that the page on a fleet singles out, on average.
     now : time, optional
-        When the page on a monitor is written, in the time zone of its records; by default the clock's time.
+        When the page on a monitor or a fleet is written, in the time zone of the records; by default the clock's time.
 
     Returns
     -------
@@ -85,7 +112,7 @@ def owner_report(
         If the folder does not exist, the path is a folder, an argument is something else or does not belong to this
         subject, the detector has no results, or several cannot be ranked, as no scenario is healthy or none is damaged.
     ImportError
-        If matplotlib is not installed.
+        If matplotlib is not installed; the pages on a fleet do without.
 
     Notes
     -----
@@ -109,25 +136,22 @@ def owner_report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
-    is_monitor = hasattr(subject, "update") and hasattr(subject, "acknowledge")
-    if not is_monitor and not hasattr(subject, "scenarios"):
-        raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy or a Monitor")
+    kind = next((kind for kind, methods in KINDS.items() if all(hasattr(subject, name) for name in methods)), None)
+    if kind is None:
+        raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
     if identified is not None and not isinstance(identified, IdentifiedDamage):
         raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
-    if not hasattr(subject, "events_" if is_monitor else "results_"):
-        text = "the monitor is not fitted" if is_monitor else "the study has no results"
-        raise NotFittedError(f"{text} yet; expected a call of {'fit' if is_monitor else 'run'} before")
+    if not hasattr(subject, {"DetectabilityStudy": "results_", "Monitor": "events_", "Fleet": "table"}[kind]):
+        text = "the monitor is not fitted" if kind == "Monitor" else "the study has no results"
+        raise NotFittedError(f"{text} yet; expected a call of {'fit' if kind == 'Monitor' else 'run'} before")
     if title is not None and not isinstance(title, str):
         raise ValueError(f"title is {title!r:.100}; expected a text")
     if structure is not None and not isinstance(structure, Structure):
         raise ValueError(f"structure is {structure!r:.200}; expected a Structure")
-    others = {"structure": structure, "detector": detector} if is_monitor else {"now": now}
-    wrong = [name for name, value in others.items() if value is not None]
-    if wrong:
-        raise ValueError(
-            f"{' and '.join(wrong)} given for a {type(subject).__name__}; expected only for a "
-            f"{'DetectabilityStudy' if is_monitor else 'Monitor'}"
-        )
+    given = {"identified": identified, "structure": structure, "detector": detector, "now": now}
+    for name, kinds in ONLY_FOR.items():
+        if given[name] is not None and kind not in kinds:
+            raise ValueError(f"{name} given for a {type(subject).__name__}; expected only for a {' or a '.join(kinds)}")
     file = check_path(path)
     if not file.parent.is_dir():
         raise ValueError(
@@ -135,15 +159,19 @@ def owner_report(
         )
     if file.is_dir():
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
-    if is_monitor:
+    heading = TITLES[kind] if title is None else title
+    if kind != "DetectabilityStudy":
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
-        introduction, sections = monitor_page(subject, now, limit)
+    if kind == "Fleet":
+        check_size(false_share, "false_share", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
+        introduction, sections = fleet_page(subject, file, heading, now, limit, false_share)
+    elif kind == "Monitor":
+        introduction, sections = monitor_page(Standing.of(subject, now, limit))
         if identified is not None:
             sections["identified"] = ("Identified damage", identified_damage(identified))
             sections["settings"] = sections.pop("settings")
     else:
         introduction, sections = _study_page(subject, identified, structure, detector, max_false_alarms)
-    heading = title if title is not None else MONITOR_TITLE if is_monitor else STUDY_TITLE
     written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
     ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
     write_when_complete(file, page(heading, introduction, sections, ending))

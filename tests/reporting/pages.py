@@ -52,6 +52,7 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.open, self.tags, self.text, self.cells, self.heads, self.paragraphs = [], [], "", [], [], []
+        self.link_texts = []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -68,7 +69,7 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] not in ("style", "title"):
             self.text += data
-            texts = {"td": self.cells, "th": self.heads, "p": self.paragraphs}.get(self.open[-1])
+            texts = {"td": self.cells, "th": self.heads, "p": self.paragraphs, "a": self.link_texts}.get(self.open[-1])
             if texts is not None:
                 texts.append(data)
 

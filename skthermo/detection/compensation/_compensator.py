@@ -22,6 +22,7 @@ from skthermo._frames import (
     warn_of_disorder,
     warn_of_markers,
 )
+from skthermo._regressors import warn_of_fleet
 from skthermo._times import has_stamps
 from skthermo._validation import (
     Estimator,
@@ -35,7 +36,14 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo._warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
-from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted, warn_of_unseen
+from skthermo._weather import (
+    PredictionError,
+    SensorRegression,
+    TrainingRange,
+    told_fills,
+    told_unpredicted,
+    warn_of_unseen,
+)
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._local_covariance import rows_near_in_time
@@ -123,6 +131,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     that no sensor tells, from all records. Where its temperatures lie outside the baseline's by e ranges of their
     columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the
     regression says there is less certain.
+
+    An estimator that states how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
+    n_targets, n_targets) in Hz squared, such as `~skthermo.fleet.FleetMapper` or a ``DataInformedFEM`` with one, has
+    residuals r with the covariance S + C: S, which the baseline's out-of-fold residuals teach once what C explains of
+    them is taken away, is the scatter of the measurement, and C that of each row. Scaled residuals are divided by the
+    root of S + C; residuals in Hz are shrunk towards their mean by the root of S over that of S + C, so that a detector
+    behind keeps its rate of false alarms. "local" then adds nothing for temperatures beyond the baseline's. What is not
+    known yet of a structure stays the same for a season: alarms that it causes come in runs, and damage that is smaller
+    than C cannot be seen there. Where each target has a clone of its own, C is diagonal. Weather that a fleet has seen
+    (``reach_`` and ``from_fleet`` of the estimator) counts as known.
 
     Missing values:
 
@@ -286,9 +304,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
-        outside = self.training_range_.warning(weather)
+        reach, inputs = self._reach(filled)
+        outside = reach.warning(inputs)
         if outside:
             warn_user(outside, "weather outside the training range")
+        warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
         apart = self.sensors_.warning(temperatures)
         if apart:
             warn_user(apart, "sensor apart from others")
@@ -296,11 +316,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
         residuals = as_floats(frequencies) - predicted
-        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
+        errors = self.regression_.errors(filled).plus(fills, len(residuals))
         scaled = (
-            self.spread_.shrunk(residuals, fills)
+            self.spread_.shrunk(residuals, errors)
             if self.scale is None
-            else self.spread_.whiten(weather, residuals, fills)
+            else self.spread_.whiten(weather, residuals, errors)
         )
         return explain_rows(frame_like(frequencies, scaled), unknown)
 
@@ -362,37 +383,43 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         with warnings_once():
             self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
-            predicted = self.regression_.out_of_fold(filled, frequencies, folds)
+            predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
             longer = folds.longer(filled, measured - predicted)
             if longer is not None:
                 folds = longer
-                predicted = self.regression_.out_of_fold(filled, frequencies, folds)
+                predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
-        warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
+        if not self.regression_.tells_errors:
+            warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
         length = None if folds.blocks is None else folds.blocks.length(filled)
         self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
         predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
         warn_of_unpredicted(predicted[self.folds_ >= 0], as_floats(filled)[self.folds_ >= 0])
         residuals = measured - predicted
-        fills = FillError.of(self.sensors_, temperatures, filled, self.regression_.predict)
+        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
+        errors = told.plus(fills, len(residuals))
         taught = residuals.copy()
         if len(fills.rows) < len(residuals) / 2:
             taught[fills.rows] = np.nan
         if self.scale is None:
-            self.spread_ = Spread.of_all(taught)
-            return self.spread_.shrunk(residuals, fills)
+            self.spread_ = Spread.of_all(taught, told)
+            return self.spread_.shrunk(residuals, errors)
         empty = np.isnan(taught).all(axis=0)
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        near = rows_near_in_time(filled)
-        self.spread_, white = Spread.of(weather, taught, size, local=self.scale == "local", near=near)
+        local, widens, near = self.scale == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
+        self.spread_, white = Spread.of(weather, taught, size, told, local=local, widens=widens, near=near)
         if not len(fills.rows):
             return white
         untaught = np.isnan(taught).all(axis=1)
-        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, fills), white)
+        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white)
+
+    def _reach(self, temperatures: Any) -> tuple[TrainingRange, Any]:
+        """The weather that the regression stands on, that of a fleet included, and the inputs that it is of."""
+        return self.regression_.reach(temperatures) or (self.training_range_, as_floats(temperatures))
 
     def _wanted_folds(self, temperatures: Any) -> Any:
         """The folds that are asked for; rows without stamps stay together where lags need them to."""

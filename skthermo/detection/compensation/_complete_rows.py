@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -18,9 +19,10 @@ from sklearn.utils import get_tags
 from skthermo._arguments import is_model
 from skthermo._arrays import as_columns, as_floats
 from skthermo._frames import column_names
-from skthermo._regressors import fit_outputs
+from skthermo._regressors import fit_outputs, offers, predicted_covariance, reach_of, told_by_fleet
 from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
-from skthermo._warnings import explain_rows, explained_rows, told_around
+from skthermo._warnings import explain_rows, explained_rows, told_around, without_warnings
+from skthermo._weather import PredictionError, TrainingRange
 from skthermo.detection.compensation._folds import Folds
 from skthermo.preprocessing import LagFeatures, RecordFindings
 
@@ -29,16 +31,25 @@ TOLD = (
     "rows that cannot be predicted",
     "weather outside the training range",
     "sensor apart from others",
+    "rows that stand on the fleet",
 )  # kinds of warnings that the compensator gives
 
 
 @dataclass(frozen=True)
 class Regression:
-    """A fitted estimator, of which the first transformers got all rows and the rest those that it accepts."""
+    """A fitted estimator, of which the first transformers got all rows and the rest those that it accepts.
+
+    One that offers ``predict_covariance`` tells the errors of its predictions.
+    """
 
     estimator: BaseEstimator
     head: Pipeline | None
     rest: CompleteRowsRegressor
+
+    @property
+    def tells_errors(self) -> bool:
+        """Whether the estimator says how uncertain its predictions are."""
+        return offers(self.rest.regressor_, "predict_covariance")
 
     @classmethod
     def of(cls, estimator: BaseEstimator, X: Any, y: Any, findings: RecordFindings) -> Regression:
@@ -54,27 +65,57 @@ class Regression:
         inputs = self._inputs(X)
         return explain_rows(self.rest.predict(inputs), explained_rows(inputs))
 
-    def out_of_fold(self, X: Any, y: Any, folds: Folds) -> Any:
-        """Predictions by clones of the rest that are fitted on other rows; the first transformers know all rows."""
+    def errors(self, X: Any) -> PredictionError:
+        """Errors of the predictions that the estimator tells; none where it does not."""
+        if not self.tells_errors:
+            return PredictionError.of_rows(np.zeros((0, 1, 1)))
+        return PredictionError.of_rows(self.rest.predict_covariance(self._quiet_inputs(X)))
+
+    def out_of_fold(self, X: Any, y: Any, folds: Folds) -> tuple[Any, PredictionError]:
+        """Predictions by clones of the rest that are fitted on other rows, and their errors.
+
+        The first transformers know all rows.
+        """
         partition = [*folds.splits, (folds.untested, folds.untested)] if folds.untested.size else folds.splits
+        learner, n_targets = clone(self.rest).set_params(tells_errors=self.tells_errors), y.shape[1]
         # With metadata routing, scikit-learn 1.6 fails where params are None.
-        predicted = cross_val_predict(clone(self.rest), self._inputs(X), y, cv=partition, params={})
+        found = cross_val_predict(learner, self._inputs(X), y, cv=partition, params={})
+        predicted, covariances = found[:, :n_targets], found[:, n_targets:]
         predicted[folds.untested] = np.nan
-        return predicted
+        if not self.tells_errors:
+            return predicted, self.errors(X)
+        return predicted, PredictionError.of_rows(covariances.reshape(-1, n_targets, n_targets))
+
+    def reach(self, X: Any) -> tuple[TrainingRange, Any] | None:
+        """The weather that the estimator stands on, and X as it is given to its last step; None without ``reach_``."""
+        known = offers(self.rest.regressor_, "reach_")
+        return reach_of(self.rest.regressor_, self._quiet_inputs(X)) if known else None
+
+    def from_fleet(self, X: Any) -> NDArray[np.bool_]:
+        """Rows in weather that only a fleet has shown."""
+        if not offers(self.rest.regressor_, "from_fleet"):
+            return np.zeros(len(X), dtype=bool)
+        return self.rest.from_fleet(self._quiet_inputs(X))
 
     def _inputs(self, X: Any) -> Any:
         return X if self.head is None else self.head.transform(X)
+
+    def _quiet_inputs(self, X: Any) -> Any:
+        with without_warnings():  # which predictions have given
+            return self._inputs(X)
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
 
-    The compensator around has checked the records with some findings, and warns of what it hands on.
+    The compensator around has checked the records with some findings, and warns of what it hands on. With
+    ``tells_errors``, the covariance of each row's prediction follows in the columns behind it.
     """
 
-    def __init__(self, estimator: BaseEstimator, findings: RecordFindings):
+    def __init__(self, estimator: BaseEstimator, findings: RecordFindings, tells_errors: bool = False):
         self.estimator = estimator
         self.findings = findings
+        self.tells_errors = tells_errors
 
     def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
         with told_around(TOLD, self.findings):  # also in a worker process
@@ -82,7 +123,24 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
 
     def predict(self, X: Any) -> NDArray[np.float64]:
         with told_around(TOLD):
-            return self._predict(X)
+            predicted = self._predict(X)
+        if not self.tells_errors:
+            return predicted
+        return np.hstack([predicted, self.predict_covariance(X).reshape(len(predicted), -1)])
+
+    def predict_covariance(self, X: Any) -> NDArray[np.float64]:
+        usable = self._predictable(X)
+        covariances = np.full((X.shape[0], self.n_targets_, self.n_targets_), np.nan)
+        if usable.any():
+            with told_around(TOLD):
+                covariances[usable] = predicted_covariance(self.regressor_, X[usable])
+        return covariances
+
+    def from_fleet(self, X: Any) -> NDArray[np.bool_]:
+        rows = self._predictable(X)
+        if rows.any():
+            rows[rows] = told_by_fleet(self.regressor_, X[rows])
+        return rows
 
     def _fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
         self.takes_nan_ = takes_nan(self.estimator)
@@ -102,7 +160,8 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
             self.regressor_ = fit_outputs(self.estimator, X[usable], as_target(self.estimator, y[usable]))
         else:
             self.regressor_ = MultiOutputRegressor(self.estimator)
-            targets = as_floats(y).T
+            # Named, so that a regressor may know which target it learns.
+            targets = [column for _, column in y.items()] if isinstance(y, pd.DataFrame) else as_floats(y).T
             self.regressor_.estimators_ = [
                 clone(self.estimator).fit(X[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
             ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, patterns, spread_evenly
 from skthermo._gaussian import Gaussian, check_invertible, whiten_by, whitenings
-from skthermo._weather import FillError, TrainingRange, nearest, weather_coordinates
+from skthermo._weather import PredictionError, TrainingRange, nearest, parts, weather_coordinates
 from skthermo.detection.compensation._local_covariance import (
     CANDIDATES,
     NEAR_IN_TIME,
@@ -42,23 +43,35 @@ class Spread:
     places: Array | None = None
 
     @classmethod
-    def of_all(cls, residuals: Array) -> Spread:
+    def of_all(cls, residuals: Array, errors: PredictionError) -> Spread:
         """That of residuals which are not scaled; a mode without any has no spread."""
-        overall = Gaussian.of(np.where(np.isnan(residuals).all(axis=0), 0.0, residuals))
+        empty = np.isnan(residuals).all(axis=0)
+        overall = without_errors(np.where(empty, 0.0, residuals), errors)
+        overall.covariance[empty], overall.covariance[:, empty] = 0.0, 0.0
         return cls(overall, overall.covariance[np.newaxis], None)
 
     @classmethod
     def of(
-        cls, weather: Array, residuals: Array, size: Array, *, local: bool, near: int = NEAR_IN_TIME
+        cls,
+        weather: Array,
+        residuals: Array,
+        size: Array,
+        errors: PredictionError,
+        *,
+        local: bool,
+        widens: bool,
+        near: int = NEAR_IN_TIME,
     ) -> tuple[Spread, Array]:
         """Learn from a baseline in order of time; whiten each of its records by others, which are not near in time.
 
-        ``size`` holds magnitudes of the frequencies.
+        ``size`` holds magnitudes of the frequencies, ``errors`` what is known of those of predictions. With ``widens``,
+        a local spread is wider beyond the baseline's temperatures.
         """
-        overall, learned = Gaussian.of(residuals), ~np.isnan(residuals).all(axis=1)
+        overall, learned = without_errors(residuals, errors), ~np.isnan(residuals).all(axis=1)
         check_invertible(overall.covariance, residuals, size)
-        reach = TrainingRange.of(weather, learned) if local else None
+        reach = TrainingRange.of(weather, learned) if local and widens else None
         plain = cls(overall, overall.covariance[np.newaxis], reach)
+        residuals = plain.shrunk(residuals, errors)
         white = plain.whiten(weather, residuals)
         usable = np.flatnonzero(learned & ~np.isnan(weather).any(axis=1))
         if not local or len(usable) < 2 * CANDIDATES[0].n_neighbors:
@@ -82,35 +95,39 @@ class Spread:
         variances = np.einsum("ijj->ij", self.covariances)[self._place(np.asarray(weather, dtype=float))]
         return np.sqrt(variances) * self._widening(weather)[:, np.newaxis]
 
-    def whiten(self, weather: Array, residuals: Array, fills: FillError | None = None) -> Array:
-        """Residuals of new records in standard deviations and uncorrelated, wider where temperatures were filled."""
+    def whiten(self, weather: Array, residuals: Array, errors: PredictionError | None = None) -> Array:
+        """Residuals of new records in standard deviations and uncorrelated, wider where predictions have errors."""
         white = np.empty_like(residuals)
-        step = max(NUMBERS_AT_ONCE // residuals.shape[1] ** 2, 1)
-        for first in range(0, len(residuals), step):
-            rows = slice(first, first + step)
+        for rows in parts(len(residuals), residuals.shape[1] ** 2):
             by_place = whiten_by(self.covariances, self._place(weather[rows]), residuals[rows] - self.overall.mean)
             white[rows] = by_place / self._widening(weather[rows])[:, np.newaxis]
-        if fills is not None and len(fills.rows):
-            weather, residuals = weather[fills.rows], residuals[fills.rows]
-            wider = self.covariances[self._place(weather)] + fills.covariances
-            by_row = whitened(residuals, self.overall, wider)[0]
-            white[fills.rows] = by_row / self._widening(weather)[:, np.newaxis]
+        if errors is None:
+            return white
+        for rows, covariances in self._in_error(errors):
+            wider = self.covariances[self._place(weather[rows])] + covariances
+            by_row = whitened(residuals[rows], self.overall, wider)[0]
+            white[rows] = by_row / self._widening(weather[rows])[:, np.newaxis]
         return white
 
-    def shrunk(self, residuals: Array, fills: FillError) -> Array:
-        """Residuals with the overall covariance also where filled temperatures have widened it; NaN without any."""
-        few, covariance = residuals[fills.rows], self.overall.covariance
+    def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
+        """Residuals with the overall covariance also where errors of predictions add to it; NaN without any."""
+        covariance, again = self.overall.covariance, residuals.copy()
         varied = np.diag(covariance) > 0
-        few = np.where(varied, few, np.nan)
         covariance = covariance + np.diag(np.where(varied, JITTER * np.diag(covariance), 1.0))
-        white = whitened(few, self.overall, covariance + fills.covariances)[0]
-        masks, of_row = patterns(~np.isnan(few))
-        present = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
-        roots = np.linalg.inv(whitenings(covariance, masks)[0] + np.eye(len(varied)) * ~masks[:, np.newaxis, :])
-        back = np.einsum("ij,ijk->ik", np.nan_to_num(white), np.where(present, roots, 0.0)[of_row])
-        again = residuals.copy()
-        again[fills.rows] = np.where(np.isnan(few), np.nan, back + self.overall.mean)
+        for rows, covariances in self._in_error(errors):
+            few = np.where(varied, residuals[rows], np.nan)
+            white = whitened(few, self.overall, covariance + covariances)[0]
+            masks, of_row = patterns(~np.isnan(few))
+            present = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
+            roots = np.linalg.inv(whitenings(covariance, masks)[0] + np.eye(len(varied)) * ~masks[:, np.newaxis, :])
+            back = np.einsum("ij,ijk->ik", np.nan_to_num(white), np.where(present, roots, 0.0)[of_row])
+            again[rows] = np.where(np.isnan(few), np.nan, back + self.overall.mean)
         return again
+
+    def _in_error(self, errors: PredictionError) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Rows whose predictions have errors, and the covariances of these, some after others: memory is bounded."""
+        for part in parts(len(errors.rows), len(self.overall.mean) ** 2):
+            yield errors.rows[part], errors.covariances[part]
 
     def _widening(self, weather: Array) -> Array:
         """Factor of the deviations where weather is beyond that of the baseline."""
@@ -127,3 +144,8 @@ class Spread:
         if self.places is not None and known.any():
             place[known] = nearest(self.places, self.coordinates.transform(weather[known]), 1)[1][:, 0]
         return place
+
+
+def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:
+    """Distribution of what residuals are without the errors of predictions that are known of each row."""
+    return Gaussian.of(residuals, errors.of_all(*residuals.shape) if len(errors.rows) else None)

@@ -78,8 +78,8 @@ def _year(last: pd.Timestamp, years: float) -> str:
     return f"{last + years * YEAR:%Y}"
 
 
-def drift(standing: Standing) -> Html:
-    """Drift by group: in words, as a drawing and in numbers."""
+def drift(standing: Standing, *, is_drawn: bool = True) -> Html:
+    """Drift by group: in words, perhaps as a drawing, and in numbers."""
     title, found = "Slow change of the structure", standing.monitor.drift_
     parts = [bullets(drift_sentences(standing))]
     if found is not None:
@@ -88,7 +88,7 @@ def drift(standing: Standing) -> Html:
             "and takes it out before it judges, so that slow ageing raises no false alarm. Errors are two standard "
             "errors. A drift counts as certain only where it is well beyond its error."
         )
-        drawn = draw_drift(standing)
+        drawn = draw_drift(standing) if is_drawn else None
         caption = "Change of the stiffness of each group since the baseline, with two standard errors at its end."
         rows = [
             [

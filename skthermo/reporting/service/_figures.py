@@ -8,6 +8,7 @@ import pandas as pd
 
 from skthermo._formatting import counted, significant
 from skthermo.plotting import MonitorDisplay
+from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
 from skthermo.reporting.service._standing import MONTH, NOT_JUDGED, YEAR, Standing
@@ -43,6 +44,24 @@ def draw_days(standing: Standing) -> list[Html]:
         )
         drawn.append(_drawn(standing, alt, title, start=start, parts=["index"]))
     return drawn
+
+
+def chart_year(standing: Standing) -> Html:
+    """Highest damage index of each day in the last year, without matplotlib, for a page among many."""
+    days = standing.days_until(standing.last)
+    damage = standing.events[standing.events["kind"] == "damage"]
+    ends = damage["end"].fillna(standing.last)
+    spans = [
+        (start.tz_localize(None), end.tz_localize(None))
+        for start, end in zip(damage["start"], ends, strict=True)
+        if end.tz_localize(None) >= days.index[0]
+    ]
+    alarms = int((days["n_alarms"] > 0).sum())
+    alt = (
+        f"Damage index of {counted(len(days), 'day')}: {alarms:,} with an alarm, "
+        f"{int(days['index_max'].isna().sum()):,} without a judged record. {_highest(days['index_max'])}"
+    )
+    return chart(days["index_max"], days["n_alarms"] > 0, standing.monitor.threshold_, alt, spans)
 
 
 def draw_drift(standing: Standing) -> Html | None:

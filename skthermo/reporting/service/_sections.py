@@ -11,25 +11,24 @@ from skthermo.reporting._html import Html, element, figure, paragraphs, section,
 from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.service._changes import drift, sensors
 from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._figures import draw_days, draw_month
+from skthermo.reporting.service._figures import chart_year, draw_days, draw_month
 from skthermo.reporting.service._standing import NOT_JUDGED, Standing, moment
 from skthermo.reporting.service._today import today
 
 MOST_REASONS = 12  # largest number of reasons in a table
 
 
-def monitor_page(monitor: Any, now: Any, limit: float) -> tuple[Html, dict[str, tuple[str, Html]]]:
-    """What stands above the sections, and these with their titles."""
-    standing = Standing.of(monitor, now, limit)
-    return paragraphs(*introduction(monitor)), {
+def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[Html, dict[str, tuple[str, Html]]]:
+    """What stands above the sections, and these with their titles; one of many has smaller drawings."""
+    return paragraphs(*introduction(standing.monitor)), {
         "today": ("Today", today(standing)),
         "events": ("Events", events(standing)),
-        "index": ("Damage index", _index(standing)),
-        "drift": ("Slow change", drift(standing)),
+        "index": ("Damage index", _index(standing, is_one_of_many)),
+        "drift": ("Slow change", drift(standing, is_drawn=not is_one_of_many)),
         "sensors": ("Sensors", sensors(standing)),
         "unjudged": ("What was not judged", unjudged(standing)),
         "promise": ("The promise", promise(standing)),
-        "settings": ("Settings", _settings(monitor)),
+        "settings": ("Settings", _settings(standing.monitor)),
     }
 
 
@@ -49,11 +48,18 @@ def introduction(monitor: Any) -> list[str]:
     return sentences
 
 
-def _index(standing: Standing) -> Html:
-    """Damage indices of the last month and of the last year."""
+def _index(standing: Standing, is_small: bool) -> Html:
+    """Damage indices of the last month and of the last year; a small drawing shows the days of the year only."""
     title = "Damage index"
     if not standing.has_records:
         return section("index", title, paragraphs("No record has come since the baseline."))
+    if is_small:
+        caption = (
+            "Highest damage index of each day in the year up to the newest record, of "
+            f"{moment(standing.last)}. Dots below the dashed line are as the healthy structure; an event begins above "
+            "it, and is shaded. Ticks at the bottom are days without a judged record: nothing is known of them."
+        )
+        return section("index", title, element("figure", chart_year(standing), element("figcaption", caption)))
     text = (
         f"The drawings end with the newest record, of {moment(standing.last)}. Points below the dashed line are as the "
         "healthy structure; an event begins above it. Grey ticks at the bottom are records or days that were not "

@@ -172,6 +172,13 @@ class Standing:
         """Years in service, up to the newest record."""
         return (self.last - self.monitor.days_.index[0]) / YEAR if self.has_records else 0.0
 
+    def days_until(self, end: pd.Timestamp) -> pd.DataFrame:
+        """Days in service within the year up to a time, those without a record included, without a time zone."""
+        days = self.monitor.days_.tz_localize(None)
+        last = end.tz_localize(None).normalize()
+        first = max(last - YEAR, days.index[0]).normalize() if len(days) else last
+        return days.reindex(pd.date_range(first, max(first, last), freq="D"))
+
     def recent(self) -> str:
         """How many records of the last month were judged."""
         days = self.monitor.days_

@@ -33,15 +33,19 @@ def today(standing: Standing) -> Html:
 
 def _banner(standing: Standing) -> Html:
     """The state as a symbol, a word and a sentence, in its colour."""
-    path = element("path", d=SYMBOLS[standing.state])
-    symbol = element("svg", element("circle", cx=12, cy=12, r=11), path, viewBox="0 0 24 24", aria_hidden="true")
     written = (
         f"As of {moment(standing.now)}, when this page was written. A page that is older than it should be says "
         "nothing of today."
     )
     lines = [element("p", standing.headline(), class_="headline"), element("p", standing.explanation())]
     words = element("div", joined([*lines, element("p", written, class_="soft")]))
-    return element("div", symbol, words, class_=f"state {standing.state.replace(' ', '-')}")
+    return element("div", symbol(standing.state), words, class_=f"state {standing.state.replace(' ', '-')}")
+
+
+def symbol(state: str) -> Html:
+    """A state as a drawing within a circle, in the colour that stands around it."""
+    path = element("path", d=SYMBOLS[state])
+    return element("svg", element("circle", cx=12, cy=12, r=11), path, viewBox="0 0 24 24", aria_hidden="true")
 
 
 def _newest(standing: Standing) -> list[str]:

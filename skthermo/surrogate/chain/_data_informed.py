@@ -19,7 +19,16 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from skthermo._arguments import as_mapping, check_flag, check_noise, integer_row
 from skthermo._arrays import HUGE, Array, MatrixLike, as_columns, as_floats, as_random_state, is_real, real_array
 from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
-from skthermo._regressors import check_takes_weights, fit_weighted
+from skthermo._regressors import (
+    check_takes_weights,
+    fit_weighted,
+    inputs_of_last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+    warn_of_fleet,
+)
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
 from skthermo._validation import (
@@ -32,10 +41,11 @@ from skthermo._validation import (
     _fit_context,
     check_array,
     check_is_fitted,
+    last_step,
     validate_data,
 )
 from skthermo._warnings import findings_of, warn_each, warn_user
-from skthermo._weather import FillError, SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo._weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._box import Box
@@ -46,7 +56,6 @@ from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._parts import (
     clone_parts,
     default_part,
-    inputs_of_last_step,
     known_findings,
     read_records,
     simulator_of,
@@ -57,6 +66,7 @@ from skthermo.surrogate.chain._records import TrainingRecords, WeatherResiduals
 from skthermo.surrogate.chain._service import ServiceRecords, places_of
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
+ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
@@ -120,7 +130,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     sensors_ : SensorRegression
         What each temperature sensor shows, given the others: fills missing temperatures.
     training_range_ : TrainingRange
-        Lowest and highest value of each input of M2, lags included.
+        Lowest and highest value of each input of M2, lags included; with a mapper that has learned from a fleet, in its
+        records or in those of the fleet.
     box_ : Box or None
         Bounds of the inverse.
     simulator_ : Simulator
@@ -142,6 +153,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
     among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
     5000. Time and memory then grow in proportion to the rows.
+    A mapper that states its own uncertainty by a method ``predict_covariance(X)``, (n_samples, n_parameters,
+    n_parameters), such as one that has learned from a fleet, makes standard deviations and intervals as wide as it is
+    uncertain. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, it says where it stands on
+    records of others.
     A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in the
     training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as one
     without any temperature, is NaN; no row is dropped.
@@ -269,13 +284,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.sensors_ = SensorRegression.of(T)
         filled = frame_like(T, self.sensors_.fill(T)[0])
         with stages.stage("temperature mapper", self.mapper_):
-            fit_weighted(self.mapper_, filled, frame_like(T, targets, self.parameter_names_), weights)
+            fit_weighted(self.mapper_, filled, self._named(T, targets), weights)
         with stages.stage("report"):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-            self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights)
-            self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
+            self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights, self.parameter_names_)
+            own = TrainingRange.of(inputs, self.records_.trained)
+            self.training_range_ = (reach_of(self.mapper_, filled) or (own,))[0]
             self.simulator_ = simulator_of(self, learned)
-            self.report_ = report_of(self, estimates, findings)
+            self.report_ = report_of(self, estimates, findings, own)
         stages.end()
         warn_each(self.report_.warnings())
         return self
@@ -374,11 +390,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         chain, random = copy(self), as_random_state(random_state)
         records = self.records_.resampled(self.residuals_, self._frequencies, random)
         filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
-        targets = frame_like(filled, records.targets, self.parameter_names_)
-        chain.mapper_ = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
+        named = self._named(filled, records.targets)
+        chain.mapper_ = fit_weighted(clone(self.mapper_), filled, named, records.weights)
         learned = possible(chain.mapper_.predict(filled))[0]
-        service = self.service_records()
-        chain.records_, chain.parameters_ = replace(records, learned=learned, service=service), targets
+        chain.records_ = replace(records, learned=learned, service=self.service_records())
+        chain.parameters_ = frame_like(filled, records.targets, self.parameter_names_)
         return chain
 
     @overload
@@ -466,16 +482,65 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             In Hz, in the measured domain.
         std : ndarray or DataFrame of shape (n_samples, n_modes)
             Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
-            weather, out of fold, in Hz. They contain the scatter of the measurement, and what a missing temperature
-            costs.
+            weather, out of fold, in Hz. They contain the scatter of the measurement, what a missing temperature
+            costs, and what `predict_covariance` says where the mapper knows it.
         """
         check_flag(return_std, "return_std")
         frequencies = self._simulate(X)
         predicted = frame_like(X, frequencies, self.mode_names_)
         if not return_std:
             return predicted
-        std = np.hypot(self.residuals_.spread(self._weather(X)), self._cost_of_gaps(X))
+        std = np.hypot(self.residuals_.spread(self._weather(X)), np.hypot(self._cost_of_gaps(X), self._uncertainty(X)))
         return predicted, frame_like(X, frequencies * std, self.mode_names_)
+
+    def predict_covariance(self, X: ArrayLike) -> Array:
+        """Covariance of predicted frequencies, because the temperature mapper is uncertain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray of shape (n_samples, n_modes, n_modes)
+            In Hz squared, in the measured domain: G C G' with the covariance C of the parameters that the mapper states
+            and the exact derivatives G = d f / d theta of the model (of its reduced model within its box). Without the
+            scatter of the measurement. NaN where nothing is predicted.
+
+        Raises
+        ------
+        ValueError
+            If the mapper does not state how uncertain it is.
+
+        See Also
+        --------
+        skthermo.fleet.FleetMapper : A mapper that does.
+
+        Notes
+        -----
+        To first order. The uncertainty is that of the coefficients of the mapper: the same draw of them moves all
+        records of a season together, so that the errors of records in similar weather do not average out.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year = make_truss_campaign(random_state=0)
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> fem.predict_covariance(year.temperatures)
+        Traceback (most recent call last):
+        ...
+        ValueError: TemperatureMapper does not state how uncertain it is; expected a mapper with predict_covariance...
+        """
+        check_is_fitted(self)
+        if not offers(self.mapper_, "predict_covariance"):
+            raise ValueError(
+                f"{type(last_step(self.mapper_)).__name__} does not state how uncertain it is; expected a mapper with "
+                "predict_covariance, such as FleetPrior().fit(bridges).mapper()"
+            )
+        T = self._temperatures(X)[0]
+        return self._propagated(self._mapped(T), predicted_covariance(self.mapper_, T))
 
     @overload
     def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
@@ -515,6 +580,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         temperature was filled, it is widened by the change of the prediction when that temperature is wrong by its
         standard deviation, sensor by sensor in quadrature.
 
+        A mapper that knows how uncertain it is (`predict_covariance`) says so in place of that distance: its standard
+        deviation is added in quadrature, and the residuals count without what it explains of them. Only beyond the
+        weather that such a mapper stands on, its ``reach_``, is the interval widened by the distance as well. What a
+        mapper does not know stays the same for a season: its errors there are one draw, not noise, and the share that
+        is held differs more from one structure to the next than from one year to the next.
+
         References
         ----------
         Lei, G'Sell, Rinaldo, Tibshirani & Wasserman, Distribution-free predictive inference for regression, Journal of
@@ -536,7 +607,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         frequencies = self._simulate(X)
         margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
-        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self._cost_of_gaps(X))
+        known = np.hypot(self._cost_of_gaps(X), self._uncertainty(X))
+        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * known)
         bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
         lowest, highest = (frame_like(X, bound, self.mode_names_) for bound in bounds)
         return lowest, highest
@@ -878,7 +950,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """Out-of-fold residuals of the training records by weather, computed on first use."""
         check_is_fitted(self)
         if self.records_.residuals is None:
-            self.records_.residuals = self.records_.out_of_fold(self.mapper_, self._frequencies)
+            self.records_.residuals = self.records_.out_of_fold(
+                self.mapper_, self._frequencies, propagated=self._propagated
+            )
         return self.records_.residuals
 
     def applicability(self, X: ArrayLike) -> pd.DataFrame:
@@ -893,8 +967,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         DataFrame
             With X's index. One column for each input of M2, lags included: its distance outside the range of the
-            training rows, divided by that range (0 inside). The last column, ``outside_bounds``, says whether a
-            parameter is outside the bounds of the inverse.
+            training rows, divided by that range (0 inside). The column ``outside_bounds`` says whether a
+            parameter is outside the bounds of the inverse. Where the mapper has learned from a fleet, the range is that
+            of the fleet and of the training rows together, and a last column, ``from_fleet``, is True in weather that
+            only the fleet has seen.
         """
         T = self._temperatures(X)[0]
         inputs = inputs_of_last_step(self.mapper_, T)
@@ -902,7 +978,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
         theta = self._mapped(T)
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
-        return excess.assign(outside_bounds=outside)
+        excess = excess.assign(outside_bounds=outside)
+        return excess.assign(from_fleet=self._from_fleet(T)) if offers(self.mapper_, "from_fleet") else excess
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -973,10 +1050,36 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         T = self._temperatures(X)[0]
         std = np.zeros((len(T), len(self.mode_names_)))
-        cost = FillError.of(self.sensors_, X, T, self._mapped, lambda theta: np.log(self._frequencies(theta)))
+        cost = PredictionError.of_fills(
+            self.sensors_, X, T, self._mapped, lambda theta: np.log(self._frequencies(theta))
+        )
         if len(cost.rows):
             std[cost.rows] = np.sqrt(np.einsum("ijj->ij", cost.covariances))
         return std
+
+    def _from_fleet(self, T: Any) -> NDArray[np.bool_]:
+        """Rows of filled temperatures in weather that only a fleet has seen."""
+        return told_by_fleet(self.mapper_, T)
+
+    def _named(self, T: Any, theta: Array) -> pd.DataFrame:
+        """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
+        return pd.DataFrame(theta, index=getattr(T, "index", None), columns=self.parameter_names_, copy=False)
+
+    def _uncertainty(self, X: ArrayLike) -> Array:
+        """Relative standard deviations of predictions as the mapper knows them; zero where it does not."""
+        if not offers(self.mapper_, "predict_covariance"):
+            return np.zeros((len(self._temperatures(X)[0]), len(self.mode_names_)))
+        T = self._temperatures(X)[0]
+        variances = np.einsum("ijj->ij", self.predict_covariance(X))
+        return np.sqrt(variances) / self._frequencies(self._mapped(T))
+
+    def _propagated(self, theta: Array, covariances: Array) -> Array:
+        """Covariances of frequencies in the measured domain, G C G' with G = d f / d theta, (n, n_modes, n_modes)."""
+        frequencies, jacobian = self.simulator_.linearise(possible(theta)[0], self.n_jobs)
+        sides = [as_floats(self.aligner_.inverse_transform(frequencies * (1 + side))) for side in (-ALIGNED, ALIGNED)]
+        slopes = (sides[1] - sides[0]) / (2 * ALIGNED * frequencies)
+        effects = slopes[:, :, np.newaxis] * jacobian
+        return effects @ covariances @ effects.swapaxes(1, 2)
 
     def _mapped(self, T: Any) -> Array:
         return as_columns(self.mapper_.predict(T))
@@ -989,6 +1092,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         outside = self.training_range_.warning(inputs)
         if outside:
             warn_user(outside, "weather outside the training range")
+        warn_of_fleet(self._from_fleet(T), "standard deviations and intervals say how uncertain that is")
         apart = self.sensors_.warning(X)
         if apart:
             warn_user(apart, "sensor apart from others")

@@ -11,11 +11,12 @@ from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names, frame_like
+from skthermo._regressors import inputs_of_last_step
 from skthermo._validation import last_step
 from skthermo._warnings import warn_user
 from skthermo.fem import linearise, shape_components
 from skthermo.surrogate._standardiser import FrequencyCoordinates
-from skthermo.surrogate.chain._parts import inputs_of_last_step, surrogates_in
+from skthermo.surrogate.chain._parts import surrogates_in
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
 

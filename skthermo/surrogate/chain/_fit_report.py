@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names, columns_by_sensor
+from skthermo._regressors import offers
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
-from skthermo._weather import SensorRegression
+from skthermo._weather import SensorRegression, TrainingRange
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
@@ -27,6 +28,7 @@ from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
+MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is told
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
@@ -94,6 +96,11 @@ class FitReport(SavesFrames):
         Standard deviation of measured over predicted frequencies, by mode, in percent.
     findings : RecordFindings or None
         What `~skthermo.preprocessing.check_records` has found in the records.
+    fleet : DataFrame or None
+        With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
+        records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
+    follows : mapping or None
+        Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
 
     Examples
     --------
@@ -124,6 +131,8 @@ class FitReport(SavesFrames):
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
     findings: RecordFindings | None = None
+    fleet: pd.DataFrame | None = None
+    follows: Mapping[Any, float] | None = None
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -161,6 +170,13 @@ class FitReport(SavesFrames):
                 f"The parameters of {self.n_by_full_model} rows are outside the box of the reduced model: the full one "
                 f"was solved {self.n_full_solves} times."
             )
+        if self.fleet is not None:
+            lines.append(
+                f"In weather that these records have not seen, predictions stand on a fleet: {self._listed_weather()}."
+            )
+        if self.follows is not None:
+            listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
+            lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
         if self.findings is not None and len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
@@ -173,6 +189,16 @@ class FitReport(SavesFrames):
     def _listed_offsets(self) -> str:
         large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
         return ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+
+    def _listed_weather(self) -> str:
+        """The inputs that the fleet has seen farthest beyond these records."""
+        own = self.fleet["highest"] - self.fleet["lowest"]
+        farther = (self.fleet["fleet highest"] - self.fleet["fleet lowest"]) / own.where(own > 0, 1.0)
+        told = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:MOST_INPUTS]]
+        return ", ".join(
+            f"{name!r} from {lowest:.3g} to {highest:.3g}, here {own_lowest:.3g} to {own_highest:.3g}"
+            for name, own_lowest, own_highest, lowest, highest in told.itertuples()
+        )
 
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
@@ -244,8 +270,8 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> FitReport:
-    """The report of a chain that is fitted otherwise."""
+def report_of(chain: Any, estimates: Estimates, findings: RecordFindings, own: TrainingRange) -> FitReport:
+    """The report of a chain that is fitted otherwise, to records in some weather of their own."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
@@ -279,7 +305,23 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
         findings=findings,
+        fleet=weather_of_fleet(chain, own),
+        follows=getattr(last_step(chain.mapper_), "follows_", None),
     )
+
+
+def weather_of_fleet(chain: Any, own: TrainingRange) -> pd.DataFrame | None:
+    """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
+    if not offers(chain.mapper_, "from_fleet"):
+        return None
+    known = chain.training_range_
+    columns = {
+        "lowest": own.lowest,
+        "highest": own.highest,
+        "fleet lowest": known.lowest,
+        "fleet highest": known.highest,
+    }
+    return pd.DataFrame(columns, index=list(own.names))
 
 
 def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:

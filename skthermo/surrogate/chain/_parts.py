@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
-from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._arguments import check_model
@@ -114,9 +113,3 @@ def simulator_of(chain: Any, theta: Array) -> Simulator:
     """What a fitted chain simulates with; with ``reduce``, M1's reduced model if it covers what M2 gives."""
     inverse = next(surrogates_in(chain.inverse_), None)
     return Simulator.around(chain.model, theta, chain.reduce, getattr(inverse, "simulator_", None))
-
-
-def inputs_of_last_step(estimator: Any, X: Any) -> Any:
-    """What the last step of a fitted pipeline, or of a search over pipelines, is given, such as lagged temperatures."""
-    estimator = getattr(estimator, "best_estimator_", estimator)
-    return estimator[:-1].transform(X) if isinstance(estimator, Pipeline) and len(estimator) > 1 else X

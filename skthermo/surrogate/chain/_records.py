@@ -1,6 +1,6 @@
 """The records that a chain was fitted to, and its residuals by weather: their spread, intervals, realistic noise."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,7 +16,7 @@ from sklearn.pipeline import Pipeline
 from skthermo._arrays import Array, as_columns, as_floats, patterns
 from skthermo._frames import frame_like
 from skthermo._gaussian import Gaussian
-from skthermo._regressors import fit_weighted
+from skthermo._regressors import fit_weighted, offers, predicted_covariance, reach_of
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import correlation_time, row_times
 from skthermo._validation import last_step
@@ -53,7 +53,9 @@ class WeatherResiduals:
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
     of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
-    out-of-fold predictions.
+    out-of-fold predictions. ``errors``, (n_records, n_modes), are the relative standard deviations of out-of-fold
+    predictions as a mapper states them, None if it does not; ``reach`` is the weather within which they hold, all by
+    default, and ``beyond``, (n_records,), how far each record was outside that of the mapper that predicted it.
     """
 
     weather: Array
@@ -62,6 +64,9 @@ class WeatherResiduals:
     folds: NDArray[np.intp]
     rows: NDArray[np.intp] | None = None
     ratios: Array | None = None
+    errors: Array | None = None
+    reach: TrainingRange | None = None
+    beyond: Array | None = None
 
     @cached_property
     def coordinates(self) -> Pipeline:
@@ -79,8 +84,18 @@ class WeatherResiduals:
         return self.values.shape[1]
 
     def spread(self, weather: Array) -> Array:
-        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
-        return self._where_known(weather, lambda known: self._spread(known, self._all))
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown.
+
+        Without what the mapper states of the errors of its predictions.
+        """
+
+        def of_known(known: Array) -> Array:
+            if self.errors is not None and self.reach is None:
+                return self._spread(known, self._all, np.zeros(len(known)))
+            reach = self.reach or TrainingRange.of(self.weather, self._all)
+            return self._spread(known, self._all, reach.excess(known).mean(axis=1))
+
+        return self._where_known(weather, of_known)
 
     def expected(self, weather: Array) -> Array:
         """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
@@ -246,11 +261,19 @@ class WeatherResiduals:
             if known.size:
                 yield np.flatnonzero(of_mode == pattern), known[one_in_each_part(len(known), most)]
 
-    def _spread(self, weather: Array, rows: NDArray[np.bool_]) -> Array:
-        """The spread that some of the records give, the wider the farther weather is beyond their range."""
-        squares = self._local_mean(self.values**2, weather, rows, SPREAD_OF, MOST_PLACES)
-        excess = TrainingRange.of(self.weather, rows).excess(weather).mean(axis=1)
-        return np.sqrt(np.where(np.isnan(squares), np.inf, squares)) * (1 + excess)[:, np.newaxis]
+    def _spread(self, weather: Array, rows: NDArray[np.bool_], beyond: Array) -> Array:
+        """The spread that some of the records give, the wider the farther weather is beyond what was learned from."""
+        squares = self._local_mean(self._scattered**2, weather, rows, SPREAD_OF, MOST_PLACES)
+        return np.sqrt(np.where(np.isnan(squares), np.inf, squares)) * (1 + beyond)[:, np.newaxis]
+
+    @cached_property
+    def _scattered(self) -> Array:
+        """The residuals, less the share of each that is as a rule an error that the mapper states."""
+        if self.errors is None or not self.errors.any():
+            return self.values
+        variances = self.errors[:, :, np.newaxis] ** 2 * np.eye(self.n_modes)
+        own = np.diag(Gaussian.of(self.values, variances).covariance)
+        return self.values * np.sqrt(own / (own + self.errors**2))
 
     @cached_property
     def _scores(self) -> Array:
@@ -258,7 +281,10 @@ class WeatherResiduals:
         scores = np.empty_like(self.values)
         for fold in np.unique(self.folds):
             test = self.folds == fold
-            scores[test] = np.abs(self.values[test]) / self._spread(self.weather[test], ~test)
+            weather = self.weather[test]
+            others = TrainingRange.of(self.weather, ~test).excess(weather).mean(axis=1)
+            beyond = others if self.beyond is None else self.beyond[test]
+            scores[test] = np.abs(self._scattered[test]) / self._spread(weather, ~test, beyond)
         return scores
 
 
@@ -267,7 +293,8 @@ class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
     ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
-    gives for the inputs, and ``weights`` those of the rows, or None. ``residuals`` are out of fold; they and the
+    gives for the inputs, ``weights`` those of the rows, or None, and ``parameter_names`` the columns of the targets.
+    ``residuals`` are out of fold; they and the
     ``service``, gaps and outliers, are None until they have been computed.
     """
 
@@ -277,6 +304,7 @@ class TrainingRecords(SavesFrames):
     targets: Array
     learned: Array
     weights: Array | None
+    parameter_names: Sequence[str]
     residuals: WeatherResiduals | None = None
     service: ServiceRecords | None = None
 
@@ -323,11 +351,16 @@ class TrainingRecords(SavesFrames):
         )
 
     def out_of_fold(
-        self, mapper: Any, frequencies_of: Callable[[Array], Array], folds: BaseCrossValidator | None = None
+        self,
+        mapper: Any,
+        frequencies_of: Callable[[Array], Array],
+        folds: BaseCrossValidator | None = None,
+        propagated: Callable[[Array, Array], Array] | None = None,
     ) -> WeatherResiduals:
         """Relative residuals of the records, each predicted by a mapper fitted to the other folds.
 
-        Given are the fitted mapper, and the function from parameters to frequencies as they would be measured. By
+        Given are the fitted mapper, the function from parameters to frequencies as they would be measured and, for a
+        mapper that states its errors, that from parameters and their covariances to covariances of frequencies. By
         default, a fold holds every fifth of blocks of a week, or longer if the residuals remember for longer.
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
@@ -345,16 +378,30 @@ class TrainingRecords(SavesFrames):
             in_sample = WeatherResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
             folds = BlockedKFold(N_FOLDS).remembering(records, CORRELATION_TIMES * in_sample.correlation_time)
         learner, predicted, fold_of = last_step(mapper), np.full_like(theta, np.nan), np.zeros(len(order), dtype=int)
+        named, states = pd.DataFrame(theta, columns=list(self.parameter_names)), offers(mapper, "predict_covariance")
+        covariances, beyond = np.zeros((*theta.shape, theta.shape[1])) if states else None, np.zeros(len(order))
         for fold, (train, test) in enumerate(folds.split(records)):
             train = train[usable[train]]
             weights = None if self.weights is None else self.weights[order][train]
-            fitted = fit_weighted(clone(learner), inputs[train], theta[train], weights)
+            fitted = fit_weighted(clone(learner), inputs[train], named.iloc[train], weights)
             predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
-        warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
-        values = measured / frequencies_of(predicted) - 1
+            if covariances is not None:
+                covariances[test] = predicted_covariance(fitted, inputs[test])
+                found = reach_of(fitted, inputs[test])
+                beyond[test] = 0.0 if found is None else found[0].excess(found[1]).mean(axis=1)
+        if not states:
+            warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
+        expected = frequencies_of(predicted)
+        values = measured / expected - 1
         known = ~np.isnan(values).all(axis=1)
-        ratios = (theta / predicted)[known]
-        return WeatherResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios)
+        residuals = WeatherResiduals(
+            inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
+        )
+        if covariances is None or propagated is None:
+            return residuals
+        errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances))) / expected
+        reach = (reach_of(learner, inputs) or (None,))[0]
+        return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
 
 
 def as_frame(table: Any) -> pd.DataFrame:

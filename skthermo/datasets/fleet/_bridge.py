@@ -1,0 +1,292 @@
+"""One bridge of a synthetic fleet: what its owner knows, how it really behaves, and its records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._arguments import check_noise
+from skthermo._arrays import Array, as_random_state, is_real, positive_integer
+from skthermo.datasets._results import FleetRecords
+from skthermo.datasets.fleet._climate import Climate, drawn_by_hour, stream
+from skthermo.datasets.fleet._laws import Law, draw_law
+from skthermo.datasets.fleet._measuring import Thermometer, columns_for, draw_thermometers, measured, readings
+from skthermo.datasets.fleet._structures import KINDS, Design, Kind
+from skthermo.fem import AffineModel
+
+DRAWN = ("who", "design", "error", "laws", "zones", "climate", "thermometers", "noise")
+WEATHER, FREQUENCIES, TEMPERATURES = 100, 101, 102  # streams that depend on the seed of the records, too
+APART, ATTEMPTS = 0.07, 100  # of neighbouring frequencies, so that modes keep their order; tries until they are
+STIFFNESS_ERROR, MASS_ERROR = (0.02, 0.05), 0.01
+MOST = 0.5  # share of records that are missing or wrong
+ZONE_OFFSET = 0.8  # C
+NOISE, NOISE_LIMITS = 0.004, (0.002, 0.01)
+TEMPERATURE_GAPS = 0.2  # share of missing temperatures over that of frequencies
+HOURS_A_DAY = 24
+
+
+@dataclass(frozen=True)
+class FleetBridge:
+    """One bridge of `make_fleet`, drawn from its seed. It pickles in a few hundred bytes.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    kind : {"truss", "girder", "arch"}
+        Its kind.
+    seed : tuple of int
+        What everything about it is drawn from.
+    alien : {"reversed", "doubled", "knee elsewhere"}, optional
+        How its thermal laws differ from those of its family.
+
+    See Also
+    --------
+    make_fleet : Many of them, with a description of what is drawn.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_fleet
+    >>> bridge = make_fleet(3, random_state=0)["bridge 001"]
+    >>> bridge.kind, bridge.model.parameter_names, bridge.groups
+    ('girder', ('deck', 'torsion', 'bearings', 'soil'), ('girder', 'first span', 'bearings', 'soil'))
+    >>> records = bridge.records(60)
+    >>> records.frequencies.shape
+    (60, 5)
+
+    The same weeks with a damaged pier:
+
+    >>> damaged = bridge.records(60, damage={"soil": 0.2})
+    >>> bool((damaged.clean_frequencies <= records.clean_frequencies).all(axis=None))
+    True
+    """
+
+    name: str
+    kind: str
+    seed: tuple[int, ...]
+    alien: str | None = None
+
+    def __reduce__(self):
+        """Leave out what can be built again."""
+        return FleetBridge, (self.name, self.kind, self.seed, self.alien)
+
+    @property
+    def is_alien(self) -> bool:
+        """Whether its thermal laws are not those of its family."""
+        return self.alien is not None
+
+    @cached_property
+    def covariates(self) -> dict[str, Any]:
+        """What its owner knows: "kind", "material", "span" in m, "latitude" in degrees."""
+        random, kind = self._random("who"), KINDS[self.kind]
+        return {
+            "kind": self.kind,
+            "material": kind.materials[random.randint(len(kind.materials))],
+            "span": round(random.uniform(*kind.spans), 1),
+            "latitude": round(self.climate.latitude, 2),
+        }
+
+    @cached_property
+    def climate(self) -> Climate:
+        """Climate of its place: latitude, mean, seasonal and daily cycle in C, and how its weather varies."""
+        return Climate.draw(self._random("climate"))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What damage can hit, by the names of ``model.groups``."""
+        return KINDS[self.kind].groups
+
+    @cached_property
+    def roles(self) -> dict[str, str]:
+        """Name of each thermometer's column and its role, "air" or "deck"."""
+        return {thermometer.name: thermometer.role for thermometer in self._thermometers}
+
+    @cached_property
+    def noise(self) -> Array:
+        """Relative standard deviation of the noise of each frequency, of shape (n_modes,)."""
+        random = self._random("noise")
+        of_modes = 0.2 * random.standard_normal(KINDS[self.kind].n_modes)
+        return np.clip(NOISE * np.exp(0.3 * random.standard_normal() + of_modes), *NOISE_LIMITS)
+
+    @cached_property
+    def model(self) -> AffineModel:
+        """The user's FE model: a coarser mesh, stiffnesses 2 to 5 % off, parameters across the thermal zones."""
+        random, kind = self._random("error"), KINDS[self.kind]
+        off = random.uniform(*STIFFNESS_ERROR)
+        wrong = {
+            name: value * np.exp(relative_error(name, off) * random.standard_normal())
+            for name, value in self._design.items()
+        }
+        structure = kind.build(wrong, False)
+        return structure.assemble(kind.parameters, groups=kind.groups, n_modes=kind.n_modes)
+
+    @cached_property
+    def truth(self) -> AffineModel:
+        """How the bridge behaves: its thermal zones are the parameters; damage groups as in ``model``."""
+        return assemble_truth(KINDS[self.kind], self._design)
+
+    @cached_property
+    def laws(self) -> dict[str, Law]:
+        """Thermal law of each zone of ``truth``. Zones of one material share the law, but not the temperature."""
+        zones = {
+            zone: self.covariates["material"] if what == "own" else what
+            for zone, what in KINDS[self.kind].zones.items()
+        }
+        random = self._random("laws")
+        by_material = {what: draw_law(what, self.alien, random) for what in dict.fromkeys(zones.values())}
+        return {zone: by_material[what] for zone, what in zones.items()}
+
+    def records(
+        self,
+        days: int,
+        start: Any = "2025-01-01",
+        *,
+        samples_per_day: int = 1,
+        damage: Mapping[str, float] | None = None,
+        noise: ArrayLike | None = None,
+        gaps: float = 0.05,
+        outliers: float = 0.002,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> FleetRecords:
+        """Temperatures and frequencies from a date on.
+
+        Weather, noise, gaps and outliers of a record depend on its date and the seeds alone: a longer campaign begins
+        with a shorter one, one that begins later goes on with its weather, and damaged records have the weather of
+        healthy ones.
+
+        Parameters
+        ----------
+        days : int
+            Number of days.
+        start : str, Timestamp or datetime, default="2025-01-01"
+            First record, at a full hour.
+        samples_per_day : int, default=1
+            Records a day, a divisor of 24. Temperatures are means of the time from a record to the next one, and so are
+            the temperatures inside the bridge, which follow with thermal inertia.
+        damage : mapping of str to float, optional
+            Severity by damage group, as in ``model.damaged``: 0.2 takes 20 % of its stiffness.
+        noise : float or array-like of shape (n_modes,), optional
+            Relative standard deviation of the noise of frequencies, by default the bridge's own ``noise``. Of its
+            variance 40 % lasts for two days.
+        gaps : float, default=0.05
+            Share of frequencies that are missing, for most of a day at a time; a fifth of that share of temperatures is
+            missing, too.
+        outliers : float, default=0.002
+            Share of frequencies that are wrong by 3 to 10 %.
+        random_state : int, RandomState or None, default=None
+            Seed of another history of the same bridge. None is its own history: every call gives the same records.
+
+        Returns
+        -------
+        Bunch
+            With these attributes:
+
+            temperatures : DataFrame of shape (n_records, n_thermometers)
+                In degrees Celsius, with offsets, noise and gaps; the columns are those of ``roles``.
+            frequencies : DataFrame of shape (n_records, n_modes)
+                ``f1``, ``f2``, ... in Hz, with noise, gaps and outliers.
+            clean_frequencies : DataFrame of shape (n_records, n_modes)
+                Without these.
+            theta : DataFrame of shape (n_records, n_zones)
+                What the weather does: multipliers of the stiffness of the zones of ``truth``.
+
+        Raises
+        ------
+        ValueError
+            If a count is not a positive integer or does not divide 24, the start is no full hour or has a time zone, a
+            share is not between 0 and 0.5, or noise or damage are wrong.
+        """
+        index = record_times(start, days, samples_per_day)
+        gaps, outliers = check_share(gaps, "gaps"), check_share(outliers, "outliers")
+        modes = [f"f{i + 1}" for i in range(KINDS[self.kind].n_modes)]
+        level = self.noise if noise is None else check_noise(noise, len(modes))
+        model = self.truth.damaged({} if damage is None else damage)
+        own = 0 if random_state is None else 1 + as_random_state(random_state).randint(2**31 - 1)
+
+        def key(what: int) -> tuple[int, ...]:
+            return (*self.seed, what, own)
+
+        hours = HOURS_A_DAY // samples_per_day
+        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), key(WEATHER))
+        years, rows = weather.index.year.unique(), weather.index.get_indexer(index)
+
+        def means(hourly: Array) -> Array:
+            return hourly[rows[0] : rows[-1] + hours].reshape(len(index), hours).mean(axis=1)
+
+        offsets = ZONE_OFFSET * self._random("zones").standard_normal(len(self.laws))
+        theta = {
+            zone: np.exp(law.log_multiplier(means(law.temperature(weather)) + offset))
+            for (zone, law), offset in zip(self.laws.items(), offsets, strict=True)
+        }
+        clean = model.frequencies(np.column_stack(list(theta.values())))
+        disturbed = measured(
+            clean, level, gaps, outliers, rows, drawn_by_hour(years, columns_for(len(modes)), key(FREQUENCIES))
+        )
+        reader = drawn_by_hour(years, 2 * len(self.roles), key(TEMPERATURES))
+        read = readings(self._thermometers, weather, means, TEMPERATURE_GAPS * gaps, rows, reader)
+        return FleetRecords(
+            temperatures=pd.DataFrame(read, index),
+            frequencies=pd.DataFrame(disturbed, index, modes),
+            clean_frequencies=pd.DataFrame(clean, index, modes),
+            theta=pd.DataFrame(theta, index),
+        )
+
+    @cached_property
+    def _thermometers(self) -> list[Thermometer]:
+        return draw_thermometers(self._random("thermometers"))
+
+    @cached_property
+    def _design(self) -> Design:
+        """Stiffnesses and masses, drawn until the frequencies are so far apart that modes keep their order."""
+        random, kind = self._random("design"), KINDS[self.kind]
+        for _ in range(ATTEMPTS):
+            design = kind.design(self.covariates["span"], self.covariates["material"], random)
+            nominal = assemble_truth(kind, design, further_modes=1).frequencies(np.ones((1, len(kind.zones))))[0]
+            if (np.diff(nominal) > APART * nominal[:-1]).all():
+                break
+        return design
+
+    def _random(self, what: str) -> np.random.RandomState:
+        """Random numbers for one thing that is drawn, whatever else is drawn."""
+        return stream(*self.seed, DRAWN.index(what))
+
+
+def assemble_truth(kind: Kind, design: Design, further_modes: int = 0) -> AffineModel:
+    """The model whose parameters are the thermal zones."""
+    zones, n_modes = list(kind.zones), kind.n_modes + further_modes
+    return kind.build(design, True).assemble(zones, groups=kind.groups, n_modes=n_modes)
+
+
+def relative_error(name: str, of_stiffness: float) -> float:
+    """Standard deviation of the logarithm of a quantity of the design in the user's model."""
+    if name.startswith(("EI", "EA", "GJ", "k_")):
+        return of_stiffness
+    return MASS_ERROR if name.startswith("mass") else 0.0
+
+
+def record_times(start: Any, days: int, samples_per_day: int) -> pd.DatetimeIndex:
+    """Times of the records."""
+    days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
+    if HOURS_A_DAY % samples_per_day:
+        raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
+    try:
+        first = pd.Timestamp(start)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"start is {start!r}; expected a time such as '2025-01-01' ({error})") from error
+    if first is pd.NaT or first.tz is not None or first != first.floor("h"):
+        raise ValueError(f"start is {start!r}; expected a full hour without time zone, such as '2025-01-01'")
+    step = pd.Timedelta(hours=HOURS_A_DAY // samples_per_day)
+    return pd.date_range(first, periods=days * samples_per_day, freq=step, name="time")
+
+
+def check_share(value: Any, what: str) -> float:
+    """A share of records."""
+    if not is_real(value) or not 0 <= value <= MOST:
+        raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")
+    return float(value)

@@ -1,0 +1,176 @@
+"""How one of many bridges stands, and where that places it among the others."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from skthermo._formatting import counted, duration_text, listed, percent
+from skthermo.reporting._chart import line
+from skthermo.reporting._html import Html
+from skthermo.reporting.service import ALARM, ATTENTION, NOT_JUDGED, Standing, moment
+
+FAILED, UNWATCHED = "not fitted", "no monitor"
+UNKNOWN_STATES = (NOT_JUDGED, FAILED, UNWATCHED)
+STANDS_OUT, MAY_BE_CHANCE = "Stands out among all bridges.", "Chance among so many bridges may explain it."
+MONTH = 31  # days whose share that was judged is told
+
+CALLED, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
+"""Places of a bridge, the worst first: an open event that stands out among all bridges; an open event; an event that
+stood out, has ended and was not explained; much stiffness lost; not judged; not fitted; without a monitor; a drift
+beyond its error; healthy."""
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """State of a bridge in the table of a fleet, and what its page is about."""
+
+    name: Hashable
+    state: str
+    place: int
+    size: float = 0.0  # among those in the same place: the larger, the worse
+    since: pd.Timestamp = pd.NaT
+    why: str = ""
+    index: str = ""
+    course: Html = field(default_factory=Html)
+    drift: str = ""
+    days: str = ""
+    n_warnings: int = 0
+    n_events: int = 0
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """By which bridges are sorted, the worst first."""
+        return self.place, -self.size
+
+    @classmethod
+    def failed(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
+        """A bridge whose records or model could not be used."""
+        return cls(name, FAILED, BROKEN, why=error or "no reason is given", n_warnings=n_warnings)
+
+    @classmethod
+    def unwatched(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
+        """A bridge whose model was fitted, and whose new records nobody judges."""
+        return cls(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings)
+
+    @classmethod
+    def unread(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
+        """A bridge whose monitor cannot be read or asked."""
+        return cls(name, NOT_JUDGED, SILENT, np.inf, why=error, n_warnings=n_warnings)
+
+    @classmethod
+    def watched(cls, name: Hashable, standing: Standing, called: set[int], n_warnings: int = 0) -> Bridge:
+        """A bridge as its monitor sees it; ``called`` are the numbers of its events that stand out among all."""
+        opened = standing.opened("damage")
+        ended = standing.events[standing.events["end"].notna() & ~standing.events["acknowledged"].astype(bool)]
+        unexplained = [number for number in ended.index if number in called]
+        threshold = float(standing.monitor.threshold_)
+        highest = float(opened["peak"].max()) / threshold if len(opened) else np.nan
+        change, drift = _drift(standing)
+        place, size = WELL, change
+        if standing.state == ALARM:
+            place, size = CALLED if called & set(opened.index) else OPEN, highest
+        elif unexplained:
+            place, size = UNEXPLAINED, float(ended.loc[unexplained, "peak"].max()) / threshold
+        elif standing.state == ATTENTION:
+            place = WORN
+        elif standing.state == NOT_JUDGED:
+            place, size = SILENT, (standing.now - _silent_since(standing)) / pd.Timedelta("1D")
+        elif change > 0:
+            place = DRIFTING
+        days = standing.days_until(standing.now)
+        month = days.iloc[-MONTH:]
+        n_judged = int((month["n_judged"] > 0).sum())
+        return cls(
+            name,
+            standing.state,
+            place,
+            size,
+            _since(standing, opened),
+            _why(standing, place, opened, unexplained),
+            _index(standing, threshold, highest),
+            line(days["index_max"], threshold),
+            drift,
+            f"{n_judged} of {counted(len(month), 'day')}" if standing.has_records else "none",
+            n_warnings,
+            len(standing.events),
+        )
+
+
+def _silent_since(standing: Standing) -> pd.Timestamp:
+    """Since when nothing is known of a bridge that is not judged."""
+    if not standing.has_records or standing.is_silent or standing.is_ahead:
+        return standing.last
+    return standing.unjudged_since
+
+
+def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
+    """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
+    if len(opened):
+        return opened["start"].min()
+    if standing.state == NOT_JUDGED:
+        return _silent_since(standing)
+    ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
+    return ends.max() if len(ends) else standing.monitor.days_.index[0]
+
+
+def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list[int]) -> str:
+    """What an owner should know beside the state."""
+    texts = []
+    if standing.state == ALARM:
+        modes = listed(sorted({mode for text in opened["modes"] if text for mode in str(text).split(", ")}))
+        texts.append(STANDS_OUT if place == CALLED else MAY_BE_CHANCE)
+        texts.append(f"Modes that drive it: {modes}." if modes else "")
+        if standing.is_silent:
+            texts.append(f"No record since {moment(standing.last, is_short=True)}.")
+    elif standing.state == NOT_JUDGED:
+        texts.append(_reason(standing))
+    elif standing.state == ATTENTION:
+        texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
+    if unexplained:
+        number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(unexplained)}"
+        verb = "stood out among all bridges, has" if len(unexplained) == 1 else "stood out among all bridges, have"
+        texts.append(f"{number} {verb} ended, and nobody has said yet what it was.")
+    if len(standing.failed):
+        texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
+    return " ".join(text for text in texts if text)
+
+
+def _more(failed: pd.DataFrame) -> str:
+    return f" and {len(failed) - 3} more" if len(failed) > 3 else ""
+
+
+def _reason(standing: Standing) -> str:
+    if not standing.has_records:
+        return "No record has come since the baseline."
+    if standing.is_ahead:
+        return "The dates of its records are wrong."
+    if standing.is_silent:
+        return f"No record for {duration_text(standing.now - standing.last)}."
+    reason = str(standing.judged["reason"].iloc[-1]) if len(standing.judged) else ""
+    return f"{reason[:1].upper()}{reason[1:]}." if reason else "No reason is given."
+
+
+def _drift(standing: Standing) -> tuple[float, str]:
+    """Largest loss of stiffness beyond its error, and how the table tells of it."""
+    found = standing.monitor.drift_
+    if found is None:
+        return 0.0, "not followed"
+    certain = found[found["significant"].astype(bool)]
+    if not len(certain):
+        return 0.0, "none beyond its error"
+    group = certain["change"].abs().idxmax()
+    change = float(certain.at[group, "change"])
+    return max(-float(certain["change"].min()), 0.0), f"{group}: {percent(change, '+.1f')}"
+
+
+def _index(standing: Standing, threshold: float, highest: float) -> str:
+    """Newest judged damage index over the threshold, and the highest of an event that is open."""
+    known = standing.judged["index"].dropna()
+    if not len(known):
+        return "none judged"
+    text = f"{known.iloc[-1] / threshold:.2f}"
+    return f"{text}, highest {highest:.2f}" if highest == highest else text

@@ -1,0 +1,171 @@
+"""The page for the owner of many bridges, and the pages of the single ones beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from skthermo._formatting import counted, percent
+from skthermo._io import write_when_complete
+from skthermo.reporting._html import Html, bullets, element, joined, page, paragraphs, section, table
+from skthermo.reporting._settings import settings
+from skthermo.reporting.fleet._answer import answer, warnings_of_all
+from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo.reporting.fleet._files import folder_of, link, page_names
+from skthermo.reporting.fleet._fit import fit_page
+from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol
+
+COLUMNS = [
+    "Bridge",
+    "State",
+    "Since",
+    "Damage index over threshold",
+    "Slow change",
+    "Days judged in the last month",
+    "Warnings",
+]
+
+
+def fleet_page(
+    fleet: Any, file: Path, title: str, now: Any, limit: float, share: float
+) -> tuple[Html, dict[str, tuple[str, Html]]]:
+    """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
+    folder = folder_of(file)
+    folder.mkdir(exist_ok=True)
+    names = list(fleet.table.index)
+    files = page_names(names)
+    links = {name: link(folder.name, files[name]) for name in names}
+    found = fleet.discoveries(share) if len(fleet.monitors) else None
+    writer = PageWriter(fleet, found, folder, files, element("a", title, href=link("..", file.name)), now, limit)
+    bridges = sorted((writer.write(name) for name in names), key=lambda bridge: bridge.order)
+    written = moment(pd.Timestamp.now().floor("min") if now is None else pd.Timestamp(now))
+    sections = {
+        "today": ("Today", answer(bridges, links, found, written)),
+        "bridges": ("All bridges", _all_bridges(bridges, links)),
+        "promise": ("False alarms", _promise(found)),
+        "warnings": ("Warnings", warnings_of_all(fleet.warnings, fleet.errors)),
+        "settings": ("Settings", _settings(fleet, limit, share)),
+    }
+    introduction = paragraphs(f"One row for each of {counted(len(bridges), 'bridge')}, the worst first.")
+    return introduction, sections
+
+
+class PageWriter:
+    """Writes the page of one bridge after the other, and keeps only what the page of all says of it."""
+
+    def __init__(
+        self, fleet: Any, found: Any, folder: Path, files: Mapping[Any, str], back: Html, now: Any, limit: float
+    ):
+        self.fleet, self.folder, self.files, self.back, self.now, self.limit = fleet, folder, files, back, now, limit
+        called = None if found is None else found.table[found.table["is_called"].astype(bool)]
+        self.called = {} if called is None else {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
+        self.warned = dict(list(fleet.warnings.groupby("bridge")))
+
+    def write(self, name: Any) -> Bridge:
+        """Write a bridge's page, and tell how it stands."""
+        warned = self.warned.get(name, self.fleet.warnings.iloc[:0])
+        messages = list(dict.fromkeys(warned["message"]))
+        monitor, error = _opened(self.fleet.monitors, name)
+        standing = None if monitor is None else Standing.of(monitor, self.now, self.limit)
+        listed = section("warnings", "Warnings of its fit", bullets(messages) or paragraphs("There was no warning."))
+        if standing is not None:
+            bridge = Bridge.watched(name, standing, self.called.get(name, set()), len(messages))
+            introduction, sections = monitor_page(standing, is_one_of_many=True)
+            sections["warnings"] = ("Warnings", listed)
+            sections["settings"] = sections.pop("settings")
+        else:
+            bridge, chain = self._without_monitor(name, error, len(messages))
+            written = moment(pd.Timestamp.now().floor("min") if self.now is None else pd.Timestamp(self.now))
+            introduction, sections = fit_page(bridge, chain, listed, written)
+        back = element("p", "One of the bridges of ", self.back, ".")
+        text = page(str(name), joined([back, introduction]), sections, paragraphs("Written by skthermo."))
+        write_when_complete(self.folder / self.files[name], text)
+        return bridge
+
+    def _without_monitor(self, name: Any, error: str, n_warnings: int) -> tuple[Bridge, Any]:
+        """A bridge that nobody watches, and its chain, if it has one."""
+        errors = self.fleet.errors
+        known = "; ".join(errors.loc[errors["bridge"] == name, "error"].astype(str))
+        chain, unread = _opened(self.fleet.chains, name)
+        if error:
+            return Bridge.unread(name, error, n_warnings), chain
+        if chain is None:
+            return Bridge.failed(name, unread or known, n_warnings), None
+        return Bridge.unwatched(name, known, n_warnings), chain
+
+
+def _opened(mapping: Mapping[Any, Any], name: Any) -> tuple[Any, str]:
+    """What a mapping has under a name, read from its file perhaps; nothing, and why, where it cannot be read."""
+    if name not in mapping:
+        return None, ""
+    try:
+        return mapping[name], ""
+    except Exception as error:  # one damaged file does not hide the other bridges
+        return None, f"{type(error).__name__}: {error}"
+
+
+def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Any, str]) -> Html:
+    """The table, the worst first."""
+    rows = [
+        [
+            element("a", bridge.name, href=links[bridge.name]),
+            _state(bridge),
+            moment(bridge.since, is_short=True),
+            element("span", bridge.course, element("span", bridge.index)) if bridge.index else "",
+            bridge.drift,
+            bridge.days,
+            f"{bridge.n_warnings:,}" if bridge.n_warnings else "",
+        ]
+        for bridge in bridges
+    ]
+    text = (
+        "The number behind the small line is the newest damage index over its threshold: an event opens above 1. The "
+        "line shows the highest index of each week of the last year, and the dashed line the threshold."
+    )
+    caption = "All bridges, the worst first: alarms, lost stiffness, bridges of which nothing is known, healthy ones."
+    return section("bridges", "All bridges", paragraphs(text), table(caption, COLUMNS, rows, is_cards=True))
+
+
+def _state(bridge: Bridge) -> Html:
+    """Symbol and word of a state, and what else an owner should know."""
+    drawn = symbol(NOT_JUDGED if bridge.state in UNKNOWN_STATES else bridge.state)
+    word = "stiffness lost" if bridge.state == ATTENTION else bridge.state
+    name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_JUDGED
+    badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
+    return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
+
+
+def _promise(found: Any) -> Html:
+    """What few false alarms mean where there are many bridges."""
+    title = "What false alarms mean for many bridges"
+    if found is None:
+        return section("promise", title, paragraphs("No bridge has a monitor, so that there are no alarms."))
+    meaning = (
+        "A monitor that raises one false alarm a year is a good one for one bridge. Two hundred such monitors raise "
+        "one on more than every second day, and who follows each of them soon follows none. So the events of all "
+        "bridges are compared with what chance gives: an event whose index is so high that a healthy bridge reaches it "
+        "once in a hundred years stands out, one that comes once a year does not."
+    )
+    limit = percent(found.share)
+    rule = (
+        "Events are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
+        f"most {limit} are expected to be false. An event that is not singled out is not proved to be false: it only "
+        "cannot be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
+    )
+    return section("promise", title, paragraphs(meaning, rule))
+
+
+def _settings(fleet: Any, limit: float, share: float) -> Html:
+    """What this page was made with."""
+    monitors, chains = (f"{len(mapping):,}" for mapping in (fleet.monitors, fleet.chains))
+    rows = [
+        ["bridges", f"{len(fleet.table):,}"],
+        ["of these fitted", chains],
+        ["of these with a monitor", monitors],
+        ["loss of stiffness that is told", percent(limit)],
+        ["share of false ones among events that are singled out", percent(share)],
+    ]
+    return settings("For the engineer who looks after the monitors.", "Settings of this page.", rows)

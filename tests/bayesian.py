@@ -1,0 +1,69 @@
+"""A small regressor that knows how uncertain it is, as those that learn from a fleet do."""
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator, RegressorMixin
+
+from skthermo._weather import TrainingRange
+
+
+def basis(X, knots=(5.0, 15.0)):
+    """A constant and broken lines of the mean temperature, in units of ten degrees."""
+    mean = np.asarray(X, dtype=float).mean(axis=1)
+    return np.column_stack([np.ones(len(mean)), mean / 10, *(np.maximum(mean - knot, 0) / 10 for knot in knots)])
+
+
+class Logs(RegressorMixin, BaseEstimator):
+    """ln y = basis(X) beta + noise with beta ~ N(mean, diag(width^2)): posterior mean, and no word of the rest."""
+
+    def __init__(self, mean=0.0, width=1.0, noise=0.01, reach=None, share=1.0):
+        self.mean = mean
+        self.width = width
+        self.noise = noise
+        self.reach = reach
+        self.share = share
+
+    def fit(self, X, y, sample_weight=None):
+        B, logs = basis(X), np.log(np.asarray(y, dtype=float))
+        self.is_single_ = logs.ndim == 1
+        logs = logs.reshape(len(B), -1)
+        start = np.reshape(self.mean, (-1, 1)) * np.ones((B.shape[1], 1))
+        prior = np.diag(np.broadcast_to(np.asarray(self.width, dtype=float) ** -2.0, (B.shape[1],)))
+        self.covariance_ = np.linalg.inv(B.T @ B / self.noise**2 + prior)
+        self.coef_ = start + self.covariance_ @ B.T @ (logs - B @ start) / self.noise**2
+        self.own_ = TrainingRange.of(X, np.ones(len(B), dtype=bool))
+        return self
+
+    def predict(self, X):
+        values = np.exp(basis(X) @ self.coef_)
+        return values[:, 0] if self.is_single_ else values
+
+
+class BayesianLogs(Logs):
+    """The same that tells a share of its covariance, and where it stands on the fleet: within ``reach``."""
+
+    def predict_covariance(self, X):
+        B = basis(X)
+        variances = self.share * np.einsum("ij,jk,ik->i", B, self.covariance_, B)
+        values = np.exp(B @ self.coef_)
+        return (variances[:, np.newaxis] * values**2)[:, :, np.newaxis] * np.eye(values.shape[1])
+
+    @property
+    def reach_(self):
+        own = self.own_
+        lowest, highest = (own.lowest, own.highest) if self.reach is None else self.reach
+        return TrainingRange(np.minimum(own.lowest, lowest), np.maximum(own.highest, highest), own.names)
+
+    def from_fleet(self, X):
+        return (self.own_.excess(X) > 0).any(axis=1) & (self.reach_.excess(X) == 0).all(axis=1)
+
+
+def weather(days, seed=0, start="2025-01-01"):
+    """Daily temperatures of two sensors on stamps: seasons and weather that lasts for days."""
+    rng, stamps = np.random.default_rng(seed), pd.date_range(start, periods=days, freq="D")
+    season = 10 - 12 * np.cos(2 * np.pi * (stamps.day_of_year.to_numpy() - 20) / 365.25)
+    spells = np.zeros(days)
+    for day in range(1, days):
+        spells[day] = 0.8 * spells[day - 1] + 2.0 * rng.standard_normal()
+    both = season + spells
+    return pd.DataFrame({"T1": both, "T2": both + rng.standard_normal(days)}, index=stamps)

@@ -1,0 +1,226 @@
+"""Laws of synthetic fleets: reproducible, weather by date, damage, climates, thermal laws."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from pandas.testing import assert_frame_equal
+
+from skthermo.datasets import make_fleet
+from skthermo.datasets.fleet._climate import Climate, memory, persistent
+from skthermo.datasets.fleet._laws import LAWS, draw_law, estranged
+from skthermo.preprocessing import SensorMeans
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    return make_fleet(6, random_state=0)
+
+
+@pytest.fixture(scope="module", params=["bridge 000", "bridge 001", "bridge 002"])
+def bridge(request, fleet):
+    return fleet[request.param]
+
+
+def test_a_bridge_is_the_same_in_a_larger_fleet_and_after_pickling(fleet):
+    larger = make_fleet(40, random_state=0)
+    sent = pickle.loads(pickle.dumps(fleet))
+    for name in fleet:
+        assert fleet[name] == larger[name] == sent[name]
+        for other in (larger[name], sent[name]):
+            assert_frame_equal(fleet[name].records(30).frequencies, other.records(30).frequencies)
+            nominal = np.ones((1, len(other.model.parameter_names)))
+            np.testing.assert_array_equal(fleet[name].model.frequencies(nominal), other.model.frequencies(nominal))
+    assert_frame_equal(larger.covariates.head(6), fleet.covariates)
+
+
+def test_a_bridge_stays_small_however_it_was_used(bridge):
+    bridge.records(5), bridge.model
+    assert len(pickle.dumps(bridge)) < 500
+
+
+def test_seeds_give_other_bridges(fleet):
+    assert set(fleet) == set(make_fleet(6, random_state=1))
+    assert not fleet.covariates.equals(make_fleet(6, random_state=1).covariates)
+    assert make_fleet(2, random_state=None)["bridge 000"] != make_fleet(2, random_state=None)["bridge 000"]
+
+
+@pytest.mark.parametrize("aliens", [0.0, 0.05, 0.3, 1.0])
+def test_the_share_of_aliens_holds_in_every_kind(aliens):
+    fleet = make_fleet(300, aliens=aliens, random_state=3)
+    shares = pd.Series({name: bridge.is_alien for name, bridge in fleet.items()}).groupby(fleet.covariates["kind"])
+    assert (shares.sum() - 100 * aliens).abs().max() <= 1
+    if aliens:
+        assert {bridge.alien for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
+
+
+def test_records_depend_on_their_date_alone(bridge):
+    year = bridge.records(365)
+    for part, days in ((bridge.records(20), slice(0, 20)), (bridge.records(9, "2025-11-03"), slice(306, 315))):
+        for what in ("temperatures", "frequencies", "clean_frequencies", "theta"):
+            assert_frame_equal(part[what], year[what].iloc[days], check_freq=False)
+    across = bridge.records(20, "2025-12-22")
+    assert_frame_equal(across.temperatures.iloc[:10], year.temperatures.iloc[-10:], check_freq=False)
+    # the next year's weather is another one
+    new_year = bridge.records(10, "2026-01-01")
+    assert_frame_equal(across.clean_frequencies.iloc[10:], new_year.clean_frequencies, check_freq=False, rtol=1e-9)
+    assert np.nanmax(np.abs(new_year.temperatures.to_numpy() - year.temperatures.iloc[:10].to_numpy())) > 1
+
+
+def test_another_seed_of_records_is_another_history_of_the_same_bridge(bridge):
+    first, same, other = (bridge.records(40, random_state=seed) for seed in (1, 1, 2))
+    assert_frame_equal(first.frequencies, same.frequencies)
+    assert (first.temperatures - other.temperatures).std().min() > 1
+    assert list(first.temperatures) == list(bridge.roles)
+
+
+def test_damage_lowers_frequencies_and_leaves_the_weather(bridge):
+    healthy = bridge.records(60)
+    for group in bridge.groups:
+        damaged, worse = (bridge.records(60, damage={group: severity}) for severity in (0.1, 0.3))
+        assert_frame_equal(damaged.temperatures, healthy.temperatures)
+        assert_frame_equal(damaged.frequencies.isna(), healthy.frequencies.isna())
+        ratios = (damaged.clean_frequencies / healthy.clean_frequencies).to_numpy()
+        assert (ratios <= 1 + 1e-9).all()
+        assert ratios.min() < 0.999
+        assert (worse.clean_frequencies <= damaged.clean_frequencies * (1 + 1e-9)).all(axis=None)
+        # disturbances are relative and the same
+        disturbed = (damaged.frequencies / healthy.frequencies).to_numpy()
+        np.testing.assert_allclose(disturbed[~np.isnan(disturbed)], ratios[~np.isnan(disturbed)])
+        assert group in bridge.model.groups
+
+
+def test_truth_is_the_model_of_the_zones_at_the_weather(bridge):
+    records = bridge.records(10)
+    np.testing.assert_allclose(records.clean_frequencies, bridge.truth.frequencies(records.theta), rtol=1e-12)
+    assert list(records.theta) == list(bridge.truth.parameter_names)
+
+
+def test_the_users_model_is_a_little_wrong():
+    for bridge in make_fleet(12, random_state=1).values():
+        nominal = bridge.truth.frequencies(np.ones((1, len(bridge.truth.parameter_names))))
+        ratio = bridge.model.frequencies(np.ones((1, len(bridge.model.parameter_names)))) / nominal
+        assert 1e-4 < np.abs(ratio - 1).max() < 0.1
+        assert set(bridge.model.parameter_names).isdisjoint(set(bridge.truth.parameter_names) - {"bearings", "soil"})
+        assert (np.diff(nominal) > 0.05 * nominal[:, :-1]).all()  # modes keep their order
+
+
+def test_noise_is_as_strong_and_lasts_as_long_as_said(bridge):
+    records = bridge.records(3 * 365, gaps=0, outliers=0, noise=0.005)
+    noise = (records.frequencies / records.clean_frequencies - 1).to_numpy()
+    np.testing.assert_allclose(noise.std(axis=0), 0.005, rtol=0.1)
+    correlation = (noise[1:] * noise[:-1]).mean() / (noise**2).mean()
+    assert correlation == pytest.approx(0.4 * np.exp(-0.5), abs=0.05)
+    quiet = bridge.records(30, gaps=0, outliers=0, noise=0)
+    assert_frame_equal(quiet.frequencies, quiet.clean_frequencies)
+
+
+@pytest.mark.parametrize("gaps", [0.0, 0.05, 0.3])
+def test_gaps_and_outliers_have_their_shares(bridge, gaps):
+    records = bridge.records(4 * 365, gaps=gaps, outliers=0.01, noise=0.001)
+    assert records.frequencies.isna().mean().mean() == pytest.approx(gaps, rel=0.25, abs=1e-12)
+    assert records.temperatures.isna().mean().mean() == pytest.approx(0.2 * gaps, rel=0.5, abs=1e-12)
+    off = (records.frequencies / records.clean_frequencies - 1).abs().stack()
+    assert (off > 0.02).mean() == pytest.approx(0.01, abs=0.004)
+
+
+def test_means_of_hours_are_those_of_days(bridge):
+    daily, hourly = (bridge.records(20, samples_per_day=n, gaps=0, noise=0) for n in (1, 24))
+    days = hourly.clean_frequencies.resample("D").mean()
+    np.testing.assert_allclose(days, daily.clean_frequencies, rtol=2e-3)
+    assert len(hourly.temperatures) == 480
+    swing = hourly.temperatures.mean(axis=1).groupby(hourly.temperatures.index.hour).mean()
+    assert 11 <= swing.idxmax() <= 18
+
+
+def test_weather_has_the_climate_of_its_place():
+    climate = Climate(latitude=50.0, mean=9.0, season=8.0, swing=3.0, scatter=3.0, memory_hours=72.0)
+    weather = climate.weather(pd.Timestamp("2000-01-01"), pd.Timestamp("2039-12-31"), (1,))
+    assert weather["air"].mean() == pytest.approx(9.0, abs=0.3)
+    months = weather["air"].groupby(weather.index.month).mean()
+    assert months.idxmin() == 1
+    assert months.idxmax() == 7
+    assert (months.max() - months.min()) / 2 == pytest.approx(8.0, rel=0.1)
+    daily = weather["air"].resample("D").mean()
+    anomaly = daily - daily.groupby(daily.index.day_of_year).transform("mean")
+    assert anomaly.std() == pytest.approx(3.0, rel=0.1)
+    assert anomaly.autocorr(3) == pytest.approx(np.exp(-1), abs=0.06)
+    hours = weather["air"].groupby(weather.index.hour).mean()
+    assert (hours.max() - hours.min()) / 2 == pytest.approx(3.0, rel=0.05)
+    assert hours.idxmax() == 15
+    assert weather["sun"].between(0, 1).all()
+    assert (weather["sun"][weather.index.hour == 0] == 0).all()
+    assert weather["sun"]["2001-06"].mean() > 3 * weather["sun"]["2001-12"].mean()
+
+
+def test_filters_have_their_closed_forms():
+    step = memory(np.r_[0.0, np.ones(50)], 5.0)
+    np.testing.assert_allclose(step, 1 - np.exp(-np.arange(51) / 5))
+    noise = persistent(np.random.RandomState(0).standard_normal((200_000, 1)), 4.0)[:, 0]
+    assert noise.var() == pytest.approx(1, rel=0.05)
+    assert (noise[4:] * noise[:-4]).mean() == pytest.approx(np.exp(-1), abs=0.03)
+
+
+@pytest.mark.parametrize("material", LAWS)
+def test_laws_are_lines_above_the_knee_and_level_off_in_frost(material):
+    law = LAWS[material]
+    warm, frozen = np.array([60.0, 61.0]), np.array([-400.0, -401.0])
+    assert np.diff(law.log_multiplier(warm))[0] == pytest.approx(law.slope, abs=1e-9)
+    rise = law.log_multiplier(frozen) - law.slope * (frozen - 10)
+    np.testing.assert_allclose(rise, law.limit if law.gain else 0.0, rtol=1e-3)
+
+
+def test_coefficients_scatter_about_the_family_and_aliens_do_not():
+    laws = [draw_law("bearings", None, np.random.RandomState(seed)) for seed in range(400)]
+    slopes = np.log([law.slope / LAWS["bearings"].slope for law in laws])
+    assert slopes.mean() == pytest.approx(0, abs=0.05)
+    assert slopes.std() == pytest.approx(0.3, rel=0.1)
+    T = np.linspace(-20, 30, 11)
+    normal = LAWS["concrete"]
+    np.testing.assert_allclose(estranged(normal, "reversed").log_multiplier(T), -normal.log_multiplier(T))
+    np.testing.assert_allclose(estranged(normal, "doubled").log_multiplier(T), 2 * normal.log_multiplier(T))
+    assert estranged(normal, "knee elsewhere").knee == normal.knee + 14
+
+
+def test_bridges_with_other_thermometers_have_the_same_inputs(fleet):
+    tables = [SensorMeans(b.roles).fit_transform(b.records(10).temperatures) for b in fleet.values()]
+    assert len({tuple(b.roles) for b in fleet.values()}) > 2
+    assert all(list(table) == ["air", "deck"] for table in tables)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"n_bridges": 0}, "n_bridges is 0; expected a positive integer"),
+        ({"kinds": ("truss", "tunnel")}, "expected some of"),
+        ({"kinds": "truss"}, "expected some of"),
+        ({"kinds": ()}, "expected some of"),
+        ({"aliens": 1.2}, "expected a share from 0 to 1"),
+        ({"random_state": "x"}, "random_state is"),
+    ],
+)
+def test_wrong_fleets_are_refused(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        make_fleet(**({"n_bridges": 2, "random_state": 0} | wrong))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"days": 1.5}, "days is 1.5; expected a positive integer"),
+        ({"samples_per_day": 7}, "expected a divisor of 24"),
+        ({"start": "2025-01-01 00:30"}, "expected a full hour"),
+        ({"start": "2025-01-01T00:00Z"}, "without time zone"),
+        ({"start": "soon"}, "expected a time"),
+        ({"start": None}, "expected a full hour"),
+        ({"gaps": 0.9}, "gaps is 0.9; expected a share from 0 to 0.5"),
+        ({"outliers": True}, "outliers is True"),
+        ({"noise": -0.1}, "noise is"),
+        ({"damage": {"roof": 0.1}}, "roof"),
+        ({"random_state": -1}, "random_state is"),
+    ],
+)
+def test_wrong_records_are_refused(fleet, wrong, message):
+    with pytest.raises(ValueError, match=message):
+        fleet["bridge 001"].records(**({"days": 3} | wrong))

@@ -1,0 +1,217 @@
+"""The page for the owner of many bridges: the worst first, and no bridge healthy of which nothing is known."""
+
+import re
+from urllib.parse import unquote
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.reporting import owner_report
+from skthermo.reporting._chart import HEIGHT, HIGHEST, chart, line
+from skthermo.reporting.fleet._bridge import Bridge
+from skthermo.reporting.fleet._files import page_names
+from skthermo.reporting.service import Standing
+from tests.reporting.fleets import FakeFleet
+from tests.reporting.monitors import FakeMonitor, event_row
+from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
+
+LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True}
+ENDED = event_row("2025-03-02", "2025-03-20")
+
+
+def drift_of(change):
+    return pd.DataFrame({"change": [change], **LOST}, ["deck"])
+
+
+class Unreadable(dict):
+    """Monitors of which one cannot be read from its file."""
+
+    def __getitem__(self, name):
+        if name == "broken file":
+            raise OSError("checksum <wrong>")
+        return super().__getitem__(name)
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """A bridge for each place in the table, in no order."""
+    chain = fitted_chain()[0]
+    monitors = {
+        "healthy": FakeMonitor(),
+        "silent": FakeMonitor(n_days=60),
+        "blind": FakeMonitor(n_unjudged=20, reason="no mode has a value"),
+        "drifting": FakeMonitor(drift=drift_of(-0.02)),
+        "worn": FakeMonitor(drift=drift_of(-0.2)),
+        "explained": FakeMonitor(events=[{**ENDED, "acknowledged": True, "harmless": True}]),
+        "unexplained": FakeMonitor(events=[ENDED]),
+        "by chance": FakeMonitor(events=[{**event_row("2025-06-01", None), "peak": 70.0}]),
+        HOSTILE: FakeMonitor(events=[event_row("2025-06-01", None)]),
+        "broken file": None,
+    }
+    errors = {"failed": f"ValueError: {QUOTED}"}
+    warned = [(HOSTILE, "offset", HOSTILE), ("only fitted", "gaps", QUOTED)]
+    kept = {(HOSTILE, 1), ("unexplained", 1), ("explained", 1)}
+    made = FakeFleet(monitors, {"only fitted": chain}, errors, warned, kept)
+    made.monitors = Unreadable(made.monitors)
+    return made
+
+
+ORDER = [
+    HOSTILE,
+    "by chance",
+    "unexplained",
+    "worn",
+    "broken file",
+    "silent",
+    "blind",
+    "failed",
+    "only fitted",
+    "drifting",
+]
+NOW = pd.Timestamp("2025-06-29 05:00")
+
+
+@pytest.fixture(scope="module")
+def file(fleet, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "all of #1.html"
+    assert owner_report(fleet, path, title=QUOTED, now=NOW) == path
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(file):
+    return Page(file.read_text(encoding="utf-8"))
+
+
+def test_worst_bridges_come_first(page):
+    links = [(name, link) for name, link in zip(page.link_texts, page.values("href"), strict=True) if "_pages/" in link]
+    in_table = [name for name, _ in links[-12:]]
+    assert in_table[: len(ORDER)] == ORDER
+    assert sorted(in_table[len(ORDER) :]) == ["explained", "healthy"]
+
+
+def test_every_bridge_has_a_page_that_links_back(page, file, fleet):
+    links = {unquote(link) for link in page.values("href") if not link.startswith("#")}
+    assert {path.relative_to(file.parent).as_posix() for path in file.parent.glob("*/*")} == links
+    assert len(links) == len(fleet.table)
+    for link in links:
+        one = Page((file.parent / link).read_text(encoding="utf-8"))
+        (back,) = [target for target in one.values("href") if not target.startswith("#")]
+        assert ((file.parent / link).parent / unquote(back)).resolve() == file.resolve()
+        assert not [tag for tag, _ in one.tags if tag in ("script", "link", "iframe", "object", "form")]
+
+
+def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
+    assert "2 of 12 bridges are in alarm" in page.text
+    counts = "2 in alarm; 1 without an alarm, but with much stiffness lost slowly; 3 not judged by the monitor"
+    assert f"Of 12\xa0bridges: {counts}; 1 that could not be fitted; 1 without a monitor; 4 healthy." in page.text
+    assert "Nothing is known of 5\xa0bridges" in page.text
+    for name in ("broken_file", "silent", "blind", "failed", "only_fitted"):
+        text = (file.parent / "all of #1_pages" / f"{name}.html").read_text(encoding="utf-8")
+        assert '"state not-judged"' in text
+        assert "Healthy" not in Page(text).paragraphs[2]
+
+
+def test_the_page_is_sound_and_says_what_failed(page, file):
+    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "iframe", "object", "form")]
+    assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "promise", "warnings", "settings"]
+    assert f"ValueError: {QUOTED}" in page.text
+    assert "OSError: checksum <wrong>" in page.text
+    assert "raise about 10 false alarms a year" in page.text
+    assert "3 of 4\xa0damage events so far are singled out" in page.text
+    fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
+    assert "with a mean error of" in fitted.text
+    assert QUOTED in fitted.text
+
+
+def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
+    well = FakeFleet({0: FakeMonitor(), 1: FakeMonitor()})
+    text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
+    assert "No alarm: all 2 bridges are healthy" in text
+    assert "There has been no damage event so far." in text
+    late = Page(owner_report(well, tmp_path / "a.html", now="2025-09-01").read_text(encoding="utf-8")).text
+    assert "No alarm, but nothing is known of 2 of 2 bridges" in late
+
+
+def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
+    with pytest.raises(ValueError, match="detector given for a FakeFleet; expected only for a DetectabilityStudy"):
+        owner_report(fleet, tmp_path / "a.html", detector="x")
+    with pytest.raises(ValueError, match="false_share is 2; expected a share"):
+        owner_report(fleet, tmp_path / "a.html", false_share=2)
+    assert not list(tmp_path.iterdir())
+
+
+def test_by_the_size_of_alarm_drift_and_silence():
+    monitors = [FakeMonitor(events=[{**event_row("2025-06-01", None), "peak": peak}]) for peak in (4.0, 30.0)]
+    alarms = [Bridge.watched(0, Standing.of(monitor, NOW), set()) for monitor in monitors]
+    assert alarms[1].order < alarms[0].order
+    assert "highest 10.00" in alarms[1].index
+    worn = [Bridge.watched(0, Standing.of(FakeMonitor(drift=drift_of(-c)), NOW), set()) for c in (0.1, 0.3)]
+    assert worn[1].order < worn[0].order
+    silent = [Bridge.watched(0, Standing.of(FakeMonitor(n_days=n), NOW), set()) for n in (150, 20)]
+    assert silent[1].order < silent[0].order
+    assert silent[1].since == FakeMonitor(n_days=20).last_
+    assert [bridge.days for bridge in silent] == ["1 of 31\xa0days", "0 of 31\xa0days"]
+
+
+@given(st.lists(st.text(max_size=90) | st.integers(), unique=True, max_size=20))
+@settings(max_examples=50, deadline=None)
+def test_names_of_files_are_plain_and_distinct(names):
+    files = page_names(names)
+    assert list(files) == names
+    assert len({name.casefold() for name in files.values()}) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}\.html", name) for name in files.values())
+    assert not [name for name in files.values() if re.fullmatch(r"(?i)(con|nul|aux|prn)\.html", name)]
+
+
+def test_files_are_named_after_their_bridges():
+    files = page_names(["KW51", "../../etc/passwd", "Brücke 7", "a b", "a_b", "A/B", "con", "", 1, "1"])
+    assert [files[name] for name in ("KW51", "../../etc/passwd", "Brücke 7", "con", "")] == [
+        "KW51.html",
+        "etc_passwd.html",
+        "Brucke_7.html",
+        "bridge_con.html",
+        "bridge.html",
+    ]
+    assert len({files[name] for name in ("a b", "a_b", "A/B", 1, "1")}) == 5
+
+
+def places(svg, name):
+    """Positions of the dots or ticks of one kind in a drawing."""
+    path = re.search(rf'<path class="{name}" d="([^"]*)"', svg)
+    return (
+        np.array([pair.split() for pair in re.findall(r"M([\d. ]+)", path[1])], dtype=float)
+        if path
+        else np.zeros((0, 2))
+    )
+
+
+def test_a_drawing_has_a_mark_for_every_day():
+    days = pd.date_range("2024-11-01", periods=100)
+    index = pd.Series(np.linspace(0.1, 2.9, 100), days)
+    index.iloc[40:45], index.iloc[90] = np.nan, 1000.0
+    drawn = chart(index, index > 2.5, 2.5, "alt <text>", [(days[80], days[99])])
+    dots, alarms, gaps = (places(drawn, name) for name in ("dots", "dots above", "gaps"))
+    assert len(dots) + len(alarms) + len(gaps) == 100
+    assert len(gaps) == 5
+    assert len(alarms) == int((index > 2.5).sum())
+    assert (np.diff(dots[:, 1]) < 0.051).all()  # the higher the index, the higher the dot
+    level = float(re.search(r'class="threshold" d="M\d+ ([\d.]+)H', drawn)[1])
+    assert (alarms[:, 1] <= level).all()
+    assert (dots[:, 1] >= level).all()
+    assert "1 beyond, up to 1000" in drawn
+    assert "Jan 2025" in drawn
+    assert 0 <= alarms[:, 1].min() < HEIGHT / HIGHEST
+
+
+def test_a_line_shows_the_highest_of_each_week():
+    index = np.ones(70)
+    index[30] = 3.0
+    index[63:] = np.nan
+    drawn = line(index, 2.0)
+    assert len(places(drawn, "dots above")) == 1
+    assert len(re.findall("[ML]", re.search('class="course" d="([^"]*)"', drawn)[1])) == 9
+    assert line(np.full(20, np.nan), 2.0) == ""

@@ -1,0 +1,138 @@
+"""Laws of a chain whose mapper knows how uncertain it is: covariances, intervals, and weather that a fleet has seen."""
+
+import functools
+import re
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.fem import AffineModel
+from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.bayesian import BayesianLogs, Logs, basis, weather
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+MODEL = AffineModel(
+    {("deck",): [[300.0, -100.0], [-100.0, 100.0]], ("pier",): [[200.0, 0.0], [0.0, 0.0]]}, np.eye(2), n_modes=2
+)
+MEAN, WIDTH = np.array([0.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01])
+EVERYWHERE = (-40.0, 60.0)
+NOISE = 0.003
+
+
+def bridge(seed, days, noise=NOISE):
+    """Records of a bridge from the fleet that the prior is right for: winter first."""
+    rng, T = np.random.default_rng(seed), weather(days, seed)
+    beta = MEAN[:, None] + WIDTH[:, None] * rng.standard_normal((4, 2))
+    F = MODEL.frequencies(np.exp(basis(T) @ beta)) * (1 + noise * rng.standard_normal((days, 2)))
+    return T, pd.DataFrame(F, index=T.index, columns=["f1", "f2"])
+
+
+def chain(mapper=None, **options):
+    prior = BayesianLogs(MEAN, WIDTH, 2 * NOISE, EVERYWHERE)
+    start = InverseSurrogate(MODEL, LinearRegression(), bounds=0.3, n_samples=200, noise=NOISE, random_state=0)
+    return DataInformedFEM(MODEL, inverse=start, mapper=prior if mapper is None else mapper, **options)
+
+
+@functools.cache
+def fitted(**options):
+    T, F = bridge(0, 395)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return chain(**options).fit(T[:30], F[:30]), T, F
+
+
+@pytest.mark.parametrize("options", [{}, {"reduce": True}, {"aligner": BiasAligner(MODEL, method="scale")}])
+def test_covariance_is_that_of_the_mappers_posterior_behind_the_model(options):
+    T, F = bridge(0, 200)
+    fem = chain(**options).fit(T[:30], F[:30])
+    few, mapper = T[30::20], fem.mapper_
+    roots, rng = np.linalg.cholesky(mapper.covariance_), np.random.default_rng(1)
+    drawn = []
+    for _ in range(4000):
+        beta = mapper.coef_ + 0.1 * roots @ rng.standard_normal(mapper.coef_.shape)
+        frequencies = MODEL.frequencies(np.exp(basis(few) @ beta))
+        drawn.append(fem.aligner_.inverse_transform(frequencies))
+    centred = (np.array(drawn) - np.mean(drawn, axis=0)) / 0.1
+    found, expected = fem.predict_covariance(few), np.einsum("nij,nik->ijk", centred, centred) / len(drawn)
+    scale = np.sqrt(np.einsum("ijj->ij", found))
+    assert np.abs((expected - found) / (scale[:, :, None] * scale[:, None, :])).max() < 0.09  # 4 / sqrt(4000 / 2)
+
+
+def test_a_mapper_that_does_not_know_is_refused_by_name():
+    T, F = bridge(0, 60)
+    fem = chain(TemperatureMapper(LinearRegression())).fit(T, F)
+    with pytest.raises(ValueError, match="TemperatureMapper does not state how uncertain it is; expected a mapper"):
+        fem.predict_covariance(T)
+    assert "from_fleet" not in fem.applicability(T)
+
+
+def test_a_mapper_that_is_certain_changes_nothing():
+    T, F = bridge(0, 395)
+    silent = chain(Logs(MEAN, WIDTH, 2 * NOISE)).fit(T[:60], F[:60])
+    certain = chain(BayesianLogs(MEAN, WIDTH, 2 * NOISE, share=0.0)).fit(T[:60], F[:60])
+    assert not certain.predict_covariance(T).any()
+    for ours, theirs in zip(certain.predict(T, return_std=True), silent.predict(T, return_std=True), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    for ours, theirs in zip(certain.predict_interval(T), silent.predict_interval(T), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    noisy = [one.simulate(T, noise="fitted", random_state=0) for one in (certain, silent)]
+    np.testing.assert_array_equal(*noisy)
+
+
+def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_the_distance():
+    fem, T, _ = fitted()
+    later = T[30:]
+    frequencies, std = (table.to_numpy() for table in fem.predict(later, return_std=True))
+    known = np.sqrt(np.einsum("ijj->ij", fem.predict_covariance(later)))
+    scatter = np.sqrt(std**2 - known**2) / frequencies
+    spread = fem.residuals_.spread(later.to_numpy())
+    np.testing.assert_allclose(scatter, spread, rtol=1e-6)
+    assert spread.max() < 2.5 * NOISE  # of thirty records, and however far from their weather
+    assert (fem.residuals_.spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()).all()  # beyond what anybody has seen
+
+
+def test_intervals_after_thirty_days_hold_a_later_year():
+    held = []
+    for seed in range(25):
+        T, F = bridge(seed, 395)
+        lowest, highest = chain().fit(T[:30], F[:30]).predict_interval(T[30:])
+        held.append(((F[30:] > lowest) & (F[30:] < highest)).to_numpy().mean())
+    assert 0.85 < np.mean(held) < 0.95
+    assert np.mean(np.array(held) < 0.7) < 0.15
+
+
+def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of():
+    fem, T, _ = fitted()
+    table, own = fem.applicability(T), (T[:30].min(), T[:30].max())
+    seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)
+    np.testing.assert_array_equal(table["from_fleet"], ~seen)
+    assert list(table)[-2:] == ["outside_bounds", "from_fleet"]
+    assert not table[["T1", "T2"]].to_numpy().any()
+    with pytest.warns(UserWarning, match="stand on what the fleet") as given:
+        fem.predict(T)
+    said = f"{(~seen).sum()} of 395 rows are in weather that the training records have not seen, and stand on what the"
+    assert [str(one.message).startswith(said) for one in given] == [True]
+    with pytest.warns(UserWarning, match="1 of 1 rows have temperatures far outside those of the training records"):
+        fem.predict(T[:1] + 200)
+
+
+def test_the_report_says_what_weather_is_the_fleets():
+    report = fitted()[0].report_
+    assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
+    assert re.search("predictions stand on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
+    T, F = bridge(0, 60)
+    assert chain(TemperatureMapper(LinearRegression())).fit(T, F).report_.fleet is None
+
+
+def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
+    T, F = bridge(0, 120)
+    fem = chain(make_pipeline(LagFeatures(2), BayesianLogs(MEAN, WIDTH, 2 * NOISE, EVERYWHERE))).fit(T, F)
+    assert fem.predict_covariance(T).shape == (120, 2, 2)
+    assert list(fem.applicability(T)) == [*fem.training_range_.names, "outside_bounds", "from_fleet"]
+    assert len(fem.training_range_.names) == 4
