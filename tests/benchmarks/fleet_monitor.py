@@ -267,7 +267,9 @@ def main():
     numbers = ["promised", "events", "within", "in alarm", *found, "threshold", "highest"]
     table[numbers] = table[numbers].astype(float)
     summary = table.groupby(["days", "detector"])[numbers].mean()
-    with pd.option_context("display.width", 200, "display.max_rows", None, "display.max_colwidth", 100):
+    with pd.option_context(
+        "display.width", 200, "display.max_columns", None, "display.max_rows", None, "display.max_colwidth", 100
+    ):
         print(summary.round(2))
         print(table[table["promised"] == 0].groupby(["days", "detector"])["error"].agg(["size", "first"]))
     print(f"{time.perf_counter() - begun:.0f} s")
@@ -286,7 +288,7 @@ def meets(summary, found):
             met = False
         if len(keeps) and fleet[found] < keeps[found].max():
             print(
-                f"{days} days: {keeps['found'].idxmax()} finds {keeps['found'].max():.0%}, fleet {fleet['found']:.0%}"
+                f"{days} days: {keeps[found].idxmax()} has {keeps[found].max():.0%} {found}, fleet {fleet[found]:.0%}"
             )
             met = False
     return met
