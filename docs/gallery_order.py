@@ -17,6 +17,7 @@ ORDER = [
     "plot_located_damage.py",
     "plot_in_service.py",
     "plot_new_baseline.py",
+    "plot_fleet.py",
     "plot_gauss_newton_step.py",
     "plot_regressors.py",
     "plot_grid_search.py",

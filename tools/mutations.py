@@ -477,6 +477,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("silence called healthy", "return self.now - self.last > self.step + LATE", "return False"),
         ("much lost stiffness called healthy", "return ATTENTION if said == HEALTHY and self.worn else", "return"),
     ],
+    ("reporting/fleet/_bridge.py", "reporting/test_fleet.py"): [
+        ("called alarms among the others", "CALLED if called & set(opened.index) else OPEN", "OPEN"),
+        ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
+    ],
+    ("plotting/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
+        ("where own records end", "ends[0].max()), float(ends[1].min())", "ends[0].min()), float(ends[1].max())"),
+    ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
         (
             "days without records that nobody sees",

@@ -24,7 +24,7 @@ COLUMNS = [
     "Since",
     "Damage index over threshold",
     "Slow change",
-    "Days judged of the last 31",
+    "Days judged in the last month",
     "Warnings",
 ]
 

@@ -1,0 +1,112 @@
+"""
+A new bridge learns from a fleet
+================================
+
+A monitoring system was switched on in June. What its bridge does in frost, nobody has measured yet; what other bridges
+do in frost, the owner knows. Twelve trusses and girders with a year of records each are fitted, a prior is learned from
+them, and four new bridges with 30 days of June predict their next year, with the fleet and without. The fleet is
+synthetic, so that the truth is known: every bridge has its own span, material, climate and thermometers, and an FE
+model that is a little wrong.
+
+Run it with ``python examples/plot_fleet.py``; the figures go to the folder ``figures``. It needs
+:download:`page_recipes.py` beside it. The guide is :doc:`/guide/many_bridges`.
+"""
+
+from functools import partial
+
+import matplotlib.pyplot as plt
+import pandas as pd
+from page_recipes import command_line, save_figures
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_fleet
+from skthermo.fleet import FleetPrior, fit_fleet
+from skthermo.metrics import mape
+from skthermo.plotting import FleetPriorDisplay, HistoryDisplay
+from skthermo.preprocessing import BiasAligner, SensorMeans
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+
+options = command_line().parse_args()
+
+# %%
+# Twelve bridges with a year of records
+# -------------------------------------
+# Thermometers differ from bridge to bridge: the means of those in the air and of those in the deck are inputs that all
+# bridges have. Chains and records are made in the workers.
+
+campaign = make_fleet(16, kinds=("truss", "girder"), random_state=0)
+known, new = list(campaign)[:12], list(campaign)[12:]
+
+
+def make_chain(name, mapper=None):
+    bridge = campaign[name]
+    mapper = make_pipeline(SensorMeans(bridge.roles), TemperatureMapper() if mapper is None else mapper)
+    return DataInformedFEM(
+        bridge.model, aligner=BiasAligner(bridge.model, method="scale"), mapper=mapper, random_state=0
+    )
+
+
+def load_records(name, days=365, start="2025-01-01"):
+    records = campaign[name].records(days, start)
+    return records.temperatures, records.frequencies
+
+
+fleet = fit_fleet(
+    {name: partial(make_chain, name) for name in known}, {name: partial(load_records, name) for name in known}
+)
+print(fleet.summary())
+
+# %%
+# What they have in common
+# ------------------------
+# The deck of a girder and that of a truss share a name and little else, so that each kind has its own families. Each
+# family is pooled only if the other bridges foretell a bridge's records better than it does alone.
+
+families = {
+    name: {part: f"{bridge.kind} {part}" for part in bridge.model.parameter_names} for name, bridge in campaign.items()
+}
+prior = FleetPrior(families={name: families[name] for name in known}).fit(fleet)
+print(prior.summary())
+
+# %%
+# Four new bridges
+# ----------------
+# Mean error in percent of the frequencies of 2026, without their noise: learned from 30 days of June 2025 alone, from
+# these days and the fleet, and from an own full year.
+
+chains, errors = {}, {}
+for name in new:
+    later = campaign[name].records(365, "2026-01-01")
+    june, year = load_records(name, 30, "2025-06-01"), load_records(name)
+    chains[name] = {
+        "30 days alone": make_chain(name).fit(*june),
+        "30 days and the fleet": make_chain(name, prior.mapper(families=families[name])).fit(*june),
+        "own full year": make_chain(name).fit(*year),
+    }
+    errors[f"{name} ({campaign[name].kind})"] = {
+        label: mape(later.clean_frequencies, chain.predict(later.temperatures)).mean()
+        for label, chain in chains[name].items()
+    }
+print(pd.DataFrame(errors).T.round(2).to_string())
+
+# %%
+# What the fleet adds
+# -------------------
+# Between the dotted lines, the girder's own records tell how its deck follows the temperature; beyond them, the fleet
+# does, and the band says how well.
+
+girder = next(name for name in new if campaign[name].kind == "girder")
+figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+for ax, part in zip(axes, ("deck", "bearings"), strict=True):
+    FleetPriorDisplay.from_estimator(chains[girder]["30 days and the fleet"], part, ax=ax)
+
+# %%
+# The next year
+# -------------
+# The frequencies rise in frost. Who has seen June only expects that they go on as in June.
+
+later = campaign[girder].records(365, "2026-01-01")
+predictions = {label: chain.predict(later.temperatures)[["f1"]] for label, chain in chains[girder].items()}
+HistoryDisplay.from_predictions({"measured": later.frequencies[["f1"]]} | predictions)
+
+save_figures(options.figures)
