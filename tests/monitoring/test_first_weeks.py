@@ -59,6 +59,5 @@ def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
         silent = monitor_of(Logs).fit(records[:WEEKS])
         silent.update(records[WEEKS:])
         unaware.append(len(silent.events_))
-    assert np.mean(events) <= 1.5
-    assert np.mean(unaware) > 2 * max(np.mean(events), 1.0)
+    assert np.mean(unaware) > 1.5 > np.mean(events) + 0.5
     assert np.mean(found) > 0.8
