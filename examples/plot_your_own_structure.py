@@ -48,7 +48,7 @@ SCATTER = 0.003  # of one record, relative
 # for rocking. :class:`~skthermo.fem.Structure` assembles it; :doc:`/guide/fe_programs` says how to bring a model from
 # another program.
 
-HEIGHT, N_BEAMS = 25.0, 12
+HEIGHT, N_BEAMS = 25.0, 8
 PARAMETERS = {"E": ("E", "walls"), "G": ("G", "walls"), "rocking_x": "rocking_x", "rocking_y": "rocking_y"}
 
 

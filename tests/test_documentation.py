@@ -39,6 +39,7 @@ def run_code(page):
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES[1:] if python_blocks(p) and p != HOME], ids=lambda p: p.name)
+@pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_code_runs_from_top_to_bottom(page):
     assert run_code(page).keys() > {"__builtins__"}  # it runs without an error, and defines something
 
@@ -67,6 +68,7 @@ def test_the_home_page_shows_readmes_code_and_figure():
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if "\n>>> " in p.read_text()], ids=lambda p: p.name)
+@pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_examples_print_what_it_shows(page):
     options = {"module_relative": False, "optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
     failed, tried = doctest.testfile(str(page), **options)

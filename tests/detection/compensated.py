@@ -27,7 +27,7 @@ def compensator(estimator=None, **options):
 
 def chain(mapper=None):
     quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    inverse = InverseSurrogate(TRUSS, quadratic, bounds=0.2, n_samples=100, random_state=0)
+    inverse = InverseSurrogate(TRUSS, quadratic, bounds=0.2, n_samples=100, noise=0.01, random_state=0)
     return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
 
 

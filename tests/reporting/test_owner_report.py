@@ -68,6 +68,12 @@ def page(file):
     return Page(file.read_text(encoding="utf-8"))
 
 
+@pytest.fixture
+def blank_drawings(monkeypatch):
+    """Drawings are made but not written, for laws of the text around them."""
+    monkeypatch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
+
+
 def test_it_is_one_sound_page_without_network_or_script(page):
     assert page.all("html") == [{"lang": "en"}]
     assert [tag["id"] for tag in page.all("section")] == [*ALWAYS[:4], "identified", "settings"]
@@ -151,6 +157,7 @@ def test_what_cannot_be_told_is_said():
     assert "All groups can be seen and told apart by the measured modes." in page.text
 
 
+@pytest.mark.usefixtures("blank_drawings")
 def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(study, tmp_path):
     nothing = identified({"something else": (0.93, {}), "no damage": (0.07, {})}, groups=[HOSTILE, QUOTED])
     page = Page(owner_report(study, tmp_path / "a.html", identified=nothing).read_text(encoding="utf-8"))
@@ -165,6 +172,7 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
 
 
 @pytest.mark.filterwarnings("ignore:temperatures of other rows explain .* of 3 rows after")  # north_lag3 stands alone
+@pytest.mark.usefixtures("blank_drawings")
 def test_lags_are_no_sensors(tmp_path):
     fem, T, F = fitted_chain()
     lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), T.rename(columns={SENSOR: "deck"})], axis=1)
@@ -184,6 +192,7 @@ def test_the_time_to_the_first_alarm_says_when_it_begins(page):
     assert "with the first record of the simulated weather, 2024-01-01 00:00." in page.text
 
 
+@pytest.mark.usefixtures("blank_drawings")
 def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
     fem, T, _ = fitted_chain(index=False)
     scenarios = [Scenario("one", {HOSTILE: 0.2})]
@@ -198,6 +207,7 @@ def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
     assert [tag["id"] for tag in page.all("section")] == ALWAYS
 
 
+@pytest.mark.usefixtures("blank_drawings")
 def test_a_study_of_the_healthy_structure_alone(chain, tmp_path):
     study = run_study(*chain[:2], [Scenario("healthy")])
     text = Page(owner_report(study, str(tmp_path / "a.html")).read_text(encoding="utf-8")).text
@@ -206,6 +216,7 @@ def test_a_study_of_the_healthy_structure_alone(chain, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
+@pytest.mark.usefixtures("blank_drawings")
 def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     fem, T, _ = chain
     with pytest.warns(UserWarning, match="far outside") as caught:
@@ -279,6 +290,7 @@ def luminance(colour):
     return linear @ [0.2126, 0.7152, 0.0722]
 
 
+@pytest.mark.usefixtures("blank_drawings")
 def test_families_of_damage_and_strengthening_are_named(chain, tmp_path):
     study = run_study(*chain[:2], [Scenario(f"part {severity}", {HOSTILE: severity}) for severity in (-0.1, 0.2)])
     text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text

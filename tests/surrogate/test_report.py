@@ -27,11 +27,14 @@ T, F = YEAR.temperatures, YEAR.frequencies
 LATER = make_truss_campaign(random_state=1).temperatures
 
 
-def chain(**options):
-    """With an inverse that learns fast; refined estimates do not depend on its regressor."""
+def quadratic_inverse(noise=0.01):
+    """It learns fast; refined estimates do not depend on its regressor."""
     quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    inverse = InverseSurrogate(regressor=quadratic, n_samples=200)
-    return DataInformedFEM(TRUSS, **({"inverse": inverse, "random_state": 0} | options))
+    return InverseSurrogate(regressor=quadratic, n_samples=200, noise=noise)
+
+
+def chain(**options):
+    return DataInformedFEM(TRUSS, **({"inverse": quadratic_inverse(), "random_state": 0} | options))
 
 
 def swapped(one, other):
@@ -40,7 +43,7 @@ def swapped(one, other):
 
 @pytest.fixture(scope="module")
 def fitted():
-    return chain().fit(T, F)
+    return chain(inverse=quadratic_inverse(noise=0.0)).fit(T, F)
 
 
 def caught(function, *arguments):
@@ -207,11 +210,11 @@ class TestWarningsOfFit:
         assert fem.report_.n_trained > 2500
 
     def test_one_warning_for_all_folds(self):
-        estimator = chain(mapper=TemperatureMapper(Ridge()), inverse=InverseSurrogate(TRUSS, noise=0.01, n_samples=200))
-        record = caught(lambda: cross_val_score(estimator, T, F * 1.5, cv=KFold(3)))
+        estimator, records = chain(mapper=TemperatureMapper(Ridge())), (T[::3], 1.5 * F[::3])
+        record = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
         kinds = [str(warning.message).split(":")[0] for warning in record]
         assert sum(kind.startswith("measured modes differ") for kind in kinds) == 1
-        again = caught(lambda: cross_val_score(estimator, T, F * 1.5, cv=KFold(3)))
+        again = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
         assert len(again) == len(record)
         assert {warning.filename for warning in record} == {__file__}
 

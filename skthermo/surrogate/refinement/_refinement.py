@@ -77,7 +77,7 @@ class Refinement:
         if not rows.size or (self.surface is None and self.simulator.reduced is None):
             return self
         objective, start = self._problem(inputs[rows], guess[rows])
-        x = refine(objective, start, self.n_steps, sorts=self._sorts).local.x
+        x = minimise(objective, start, self.n_steps).local.x
         simulator = self.simulator.extended(np.exp(x), self.prior.limits)
         if self.surface is None:
             return replace(self, simulator=simulator)

@@ -1,0 +1,58 @@
+"""One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen; little time
+for the garbage collector; chains of examples, most of which are the same, fitted once."""
+
+import copy
+import functools
+import gc
+import os
+import sys
+
+import pytest
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+FITTED = {}  # what chains of examples have learned, by all that tells them and their records from others
+gc.set_threshold(10_000)  # by default 700: a fifth of the time in which tests are collected
+
+
+def pytest_collection_finish(session):
+    """What modules hold stays until the end: the garbage collector need not look through it."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture
+def in_process(request, monkeypatch):
+    """Files are read in this process, as in a frozen program, which saves half a second for each."""
+    if getattr(request, "param", True):
+        monkeypatch.setattr(sys, "frozen", True, raising=False)
+
+
+@pytest.fixture
+def chains_fitted_once(monkeypatch):
+    """A chain that was fitted to the same records before becomes a copy of what it learned then."""
+    import joblib
+
+    from skthermo.surrogate import DataInformedFEM
+
+    fit = DataInformedFEM.fit
+
+    @functools.wraps(fit)
+    def once(fem, *records, **options):
+        settings = {name: value for name, value in vars(fem).items() if not name.endswith("_")}
+        key = joblib.hash((settings, records, options))
+        if key not in FITTED:
+            fit(fem, *records, **options)
+            FITTED[key] = copy.deepcopy({name: value for name, value in vars(fem).items() if name not in settings})
+        vars(fem).update(copy.deepcopy(FITTED[key]))
+        return fem
+
+    monkeypatch.setattr(DataInformedFEM, "fit", once)
+
+
+@pytest.fixture(autouse=True)
+def _chains_of_docstrings_are_fitted_once(request):
+    if isinstance(request.node, pytest.DoctestItem):
+        request.getfixturevalue("chains_fitted_once")
