@@ -141,6 +141,8 @@ def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
         owner_report(fleet, tmp_path / "a.html", detector="x")
     with pytest.raises(ValueError, match="false_share is 2; expected a share"):
         owner_report(fleet, tmp_path / "a.html", false_share=2)
+    with pytest.raises(ValueError, match="now is 'soon'; expected a time"):
+        owner_report(fleet, tmp_path / "a.html", now="soon")
     assert not list(tmp_path.iterdir())
 
 

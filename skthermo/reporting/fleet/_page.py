@@ -16,7 +16,7 @@ from skthermo.reporting.fleet._answer import answer, warnings_of_all
 from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.fleet._fit import fit_page
-from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol
+from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
 
 COLUMNS = [
     "Bridge",
@@ -33,6 +33,7 @@ def fleet_page(
     fleet: Any, file: Path, title: str, now: Any, limit: float, share: float
 ) -> tuple[Html, dict[str, tuple[str, Html]]]:
     """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
+    written = moment(_as_written(now))
     folder = folder_of(file)
     folder.mkdir(exist_ok=True)
     names = list(fleet.table.index)
@@ -41,7 +42,6 @@ def fleet_page(
     found = fleet.discoveries(share) if len(fleet.monitors) else None
     writer = PageWriter(fleet, found, folder, files, element("a", title, href=link("..", file.name)), now, limit)
     bridges = sorted((writer.write(name) for name in names), key=lambda bridge: bridge.order)
-    written = moment(pd.Timestamp.now().floor("min") if now is None else pd.Timestamp(now))
     sections = {
         "today": ("Today", answer(bridges, links, found, written)),
         "bridges": ("All bridges", _all_bridges(bridges, links)),
@@ -78,8 +78,7 @@ class PageWriter:
             sections["settings"] = sections.pop("settings")
         else:
             bridge, chain = self._without_monitor(name, error, len(messages))
-            written = moment(pd.Timestamp.now().floor("min") if self.now is None else pd.Timestamp(self.now))
-            introduction, sections = fit_page(bridge, chain, listed, written)
+            introduction, sections = fit_page(bridge, chain, listed, moment(_as_written(self.now)))
         back = element("p", "One of the bridges of ", self.back, ".")
         text = page(str(name), joined([back, introduction]), sections, paragraphs("Written by skthermo."))
         write_when_complete(self.folder / self.files[name], text)
@@ -95,6 +94,14 @@ class PageWriter:
         if chain is None:
             return Bridge.failed(name, unread or known, n_warnings), None
         return Bridge.unwatched(name, known, n_warnings), chain
+
+
+def _as_written(now: Any) -> pd.Timestamp:
+    """The time that stands on the pages, as it was given: bridges may have records of different time zones."""
+    if now is None:
+        return time_of(None).floor("min")
+    zone = pd.to_datetime(str(now), errors="coerce").tz
+    return time_of(now, zone)
 
 
 def _opened(mapping: Mapping[Any, Any], name: Any) -> tuple[Any, str]:

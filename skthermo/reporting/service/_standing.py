@@ -27,16 +27,7 @@ class Standing:
     @classmethod
     def of(cls, monitor: Any, now: Any = None, limit: float = 0.1) -> Standing:
         """Now is by the clock where no time is given."""
-        zone = monitor.last_.tz
-        try:
-            time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
-        except (TypeError, ValueError):
-            time = pd.NaT
-        if pd.isna(time) or (time.tz is not None and zone is None):
-            raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
-        if zone is not None:
-            time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
-        return cls(monitor, time, limit)
+        return cls(monitor, time_of(now, monitor.last_.tz), limit)
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -186,6 +177,19 @@ class Standing:
         number, judged = int(days["n_records"].sum()), int(days["n_judged"].sum())
         which = f"{judged:,}" if judged < number else "all"
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
+
+
+def time_of(now: Any, zone: Any = None) -> pd.Timestamp:
+    """A time in the zone of the records, by the clock where none is given."""
+    try:
+        time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
+    except (TypeError, ValueError):
+        time = pd.NaT
+    if pd.isna(time) or (time.tz is not None and zone is None):
+        raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
+    if zone is not None:
+        time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
+    return time
 
 
 def moment(time: Any, *, is_short: bool = False) -> str:
