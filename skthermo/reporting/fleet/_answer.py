@@ -87,23 +87,25 @@ def _false_alarms(found: Any) -> list[str]:
     """How many events there were, how many of them stand out, and how many are expected by chance."""
     if found is None:
         return []
-    n_events, n_called = len(found.table), int(found.table["is_called"].sum())
+    n_events, n_called = len(found.table), len(found.called)
     promised, left = (
         counted_number(float(significant(number, 2)), "false alarm")
         for number in (found.promised_false_per_year, found.expected_false_per_year)
     )
     sentences = [f"Even if all bridges stay healthy, their monitors together raise about {promised} a year."]
     if not n_events:
-        return [*sentences, "There has been no damage event so far."]
-    limit, number = percent(found.share), counted(n_events, "damage event")
-    called = f"None of {number} so far is singled out: chance among all bridges explains them"
+        return [*sentences, "There has been no damage event in the last year that was not said to be harmless."]
+    limit, judged = percent(found.share), counted(found.n_judged, "judged bridge")
+    events = f"{counted(n_events, 'damage event')} in the last year"
+    called = f"None of {judged} is singled out: among so many, chance explains {events}"
     if n_called:
-        which = "it" if n_called == 1 else "them"
-        called = f"{n_called:,} of {number} so far {_is(n_called)} singled out: chance hardly explains {which}"
+        called = (
+            f"{n_called:,} of {judged} {_is(n_called)} singled out: chance hardly explains the highest events there"
+        )
     return [
         *sentences,
-        f"{called}. Of events that are singled out in this way, at most {limit} are expected to be false on average, "
-        f"about {left} a year.",
+        f"{called}. Of bridges that are singled out in this way, at most {limit} are expected to be healthy on "
+        f"average, about {left} a year.",
     ]
 
 

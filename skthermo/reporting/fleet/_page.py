@@ -63,13 +63,15 @@ class PageWriter:
         called = None if found is None else found.table[found.table["is_called"].astype(bool)]
         self.called = {} if called is None else {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
         self.warned = dict(list(fleet.warnings.groupby("bridge")))
+        self.errors = {name: "; ".join(rows["error"].astype(str)) for name, rows in fleet.errors.groupby("bridge")}
 
     def write(self, name: Any) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
         warned = self.warned.get(name, self.fleet.warnings.iloc[:0])
         messages = list(dict.fromkeys(warned["message"]))
-        monitor, error = _opened(self.fleet.monitors, name)
-        standing = None if monitor is None else Standing.of(monitor, self.now, self.limit)
+        monitor, unread = _opened(self.fleet.monitors, name)
+        error = self.errors.get(name, "")
+        standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         listed = section("warnings", "Warnings of its fit", bullets(messages) or paragraphs("There was no warning."))
         if standing is not None:
             bridge = Bridge.watched(name, standing, self.called.get(name, set()), len(messages))
@@ -77,23 +79,21 @@ class PageWriter:
             sections["warnings"] = ("Warnings", listed)
             sections["settings"] = sections.pop("settings")
         else:
-            bridge, chain = self._without_monitor(name, error, len(messages))
+            bridge, chain = self._without_monitor(name, unread, error, len(messages))
             introduction, sections = fit_page(bridge, chain, listed, moment(_as_written(self.now)))
         back = element("p", "One of the bridges of ", self.back, ".")
         text = page(str(name), joined([back, introduction]), sections, paragraphs("Written by skthermo."))
         write_when_complete(self.folder / self.files[name], text)
         return bridge
 
-    def _without_monitor(self, name: Any, error: str, n_warnings: int) -> tuple[Bridge, Any]:
+    def _without_monitor(self, name: Any, unread: str, error: str, n_warnings: int) -> tuple[Bridge, Any]:
         """A bridge that nobody watches, and its chain, if it has one."""
-        errors = self.fleet.errors
-        known = "; ".join(errors.loc[errors["bridge"] == name, "error"].astype(str))
-        chain, unread = _opened(self.fleet.chains, name)
-        if error:
-            return Bridge.unread(name, error, n_warnings), chain
+        chain, without_chain = _opened(self.fleet.chains, name)
+        if unread:
+            return Bridge.unread(name, unread, n_warnings), chain
         if chain is None:
-            return Bridge.failed(name, unread or known, n_warnings), None
-        return Bridge.unwatched(name, known, n_warnings), chain
+            return Bridge.failed(name, without_chain or error, n_warnings), None
+        return Bridge.unwatched(name, error, n_warnings), chain
 
 
 def _as_written(now: Any) -> pd.Timestamp:
@@ -156,11 +156,11 @@ def _promise(found: Any) -> Html:
         "bridges are compared with what chance gives: an event whose index is so high that a healthy bridge reaches it "
         "once in a hundred years stands out, one that comes once a year does not."
     )
-    limit = percent(found.share)
     rule = (
-        "Events are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
-        f"most {limit} are expected to be false. An event that is not singled out is not proved to be false: it only "
-        "cannot be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
+        "Bridges are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
+        f"most {percent(found.share)} are expected to be healthy. An event of another bridge is not proved to be "
+        "false: it only cannot be told from the false ones that so many bridges give. Of damage that is missed, the "
+        "rule says nothing."
     )
     return section("promise", title, paragraphs(meaning, rule))
 
@@ -173,6 +173,6 @@ def _settings(fleet: Any, limit: float, share: float) -> Html:
         ["of these fitted", chains],
         ["of these with a monitor", monitors],
         ["loss of stiffness that is told", percent(limit)],
-        ["share of false ones among events that are singled out", percent(share)],
+        ["share of false ones among the bridges that are singled out", percent(share)],
     ]
     return settings("For the engineer who looks after the monitors.", "Settings of this page.", rows)
