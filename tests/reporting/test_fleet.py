@@ -134,6 +134,9 @@ def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
     text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
     assert "No alarm: all 2 bridges are healthy" in text
     assert "There has been no damage event in the last year" in text
+    events = FakeFleet({0: FakeMonitor(), 1: FakeMonitor(events=[ENDED])}, kept={(1, 1)})
+    past = Page(owner_report(events, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
+    assert "No alarm now, but 1 of 2 bridges had one that nobody has explained" in past
     late = Page(owner_report(well, tmp_path / "a.html", now="2025-09-01").read_text(encoding="utf-8")).text
     assert "No alarm, but nothing is known of 2 of 2 bridges" in late
 

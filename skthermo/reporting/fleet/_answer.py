@@ -30,12 +30,14 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
     numbers = pd.Series([bridge.state for bridge in bridges]).value_counts()
     counts = [f"{numbers[state]:,} {text}" for state, text in COUNTED.items() if numbers.get(state, 0)]
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
+    unexplained = sum(bridge.place == UNEXPLAINED for bridge in bridges)
     lines = [
-        element("p", _headline(numbers, len(bridges), unknown), class_="headline"),
+        element("p", _headline(numbers, len(bridges), unknown, unexplained), class_="headline"),
         element("p", f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}."),
         element("p", f"As of {written}, when this page was written. Of later days it says nothing.", class_="soft"),
     ]
-    state = ALARM if ALARM in numbers else ATTENTION if ATTENTION in numbers else NOT_JUDGED if unknown else HEALTHY
+    state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
+    state = NOT_JUDGED if unknown and state == HEALTHY else state
     banner = element("div", symbol(state), element("div", joined(lines)), class_=f"state {state.replace(' ', '-')}")
     known = [
         _named(bridges, links, CALLED, "In alarm, and standing out among all bridges"),
@@ -57,10 +59,12 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
     return section("today", "The bridges today", *parts, element("h3", "What the words mean"), paragraphs(words))
 
 
-def _headline(numbers: pd.Series, total: int, unknown: int) -> str:
+def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) -> str:
     all_of = f"{total:,}"
     if ALARM in numbers:
         return f"{numbers[ALARM]:,} of {all_of} bridges {_is(numbers[ALARM])} in alarm"
+    if unexplained:
+        return f"No alarm now, but {unexplained:,} of {all_of} bridges had one that nobody has explained"
     if ATTENTION in numbers:
         return f"No alarm, but {numbers[ATTENTION]:,} of {all_of} bridges lost much stiffness slowly"
     if unknown:

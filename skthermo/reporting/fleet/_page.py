@@ -13,7 +13,7 @@ from skthermo._io import write_when_complete
 from skthermo.reporting._html import Html, bullets, element, joined, page, paragraphs, section, table
 from skthermo.reporting._settings import settings
 from skthermo.reporting.fleet._answer import answer, warnings_of_all
-from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.fleet._fit import fit_page
 from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
@@ -140,6 +140,7 @@ def _state(bridge: Bridge) -> Html:
     """Symbol and word of a state, and what else an owner should know."""
     drawn = symbol(NOT_JUDGED if bridge.state in UNKNOWN_STATES else bridge.state)
     word = "stiffness lost" if bridge.state == ATTENTION else bridge.state
+    word = "healthy again" if bridge.state == HEALTHY and bridge.place == UNEXPLAINED else word
     name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_JUDGED
     badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
     return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
