@@ -42,7 +42,7 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
     known = [
         _named(bridges, links, CALLED, "In alarm, and standing out among all bridges"),
         _named(bridges, links, OPEN, "In alarm, but no more than chance may give among so many bridges"),
-        _named(bridges, links, UNEXPLAINED, "Healthy again, but nobody has said what the event was"),
+        _named(bridges, links, UNEXPLAINED, "An event has ended, and nobody has said what it was"),
         *_false_alarms(found),
     ]
     if unknown:

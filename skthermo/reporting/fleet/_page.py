@@ -16,7 +16,7 @@ from skthermo.reporting.fleet._answer import answer, warnings_of_all
 from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.fleet._fit import fit_page
-from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
+from skthermo.reporting.service import ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
 
 COLUMNS = [
     "Bridge",
