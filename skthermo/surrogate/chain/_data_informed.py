@@ -528,7 +528,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         >>> from skthermo.surrogate import DataInformedFEM
         >>> year = make_truss_campaign(random_state=0)
         >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> fem.predict_covariance(year.temperatures)
+        >>> fem.predict_covariance(year.temperatures)  # doctest: +ELLIPSIS
         Traceback (most recent call last):
         ...
         ValueError: TemperatureMapper does not state how uncertain it is; expected a mapper with predict_covariance...

@@ -31,7 +31,8 @@ LARGEST_SCATTER = 0.02  # scatter above which a misfit counts as a wrong model r
 ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it is neither given nor can be estimated
 ROWS_FOR_SCATTER = 365
 STEPS_ON_SURFACE = 100
-ROWS_TO_ADAPT = 200  # number of records that tell where the parameters of all are
+ROWS_FOR_SURFACE = 50  # number of records near which a response surface is made accurate
+ROWS_FOR_BOX = 200  # number of records that tell where a reduced model has to be accurate
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
@@ -73,7 +74,8 @@ class Refinement:
 
     def adapted(self, inputs: Array, guess: Array) -> Refinement:
         """The refinement whose reduced model and response surface suit where records have their parameters."""
-        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), ROWS_TO_ADAPT)
+        n_rows = ROWS_FOR_SURFACE if self.simulator.reduced is None else ROWS_FOR_BOX
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), n_rows)
         if not rows.size or (self.surface is None and self.simulator.reduced is None):
             return self
         objective, start = self._problem(inputs[rows], guess[rows])
