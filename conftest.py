@@ -14,7 +14,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 FITTED = {}  # what chains of examples have learned, by all that tells them and their records from others
-gc.set_threshold(10_000)  # by default 700: a fifth of the time in which tests are collected
+gc.set_threshold(50_000)  # by default 700: a fifth of the time in which tests are collected
 
 
 def pytest_collection_finish(session):

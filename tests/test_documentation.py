@@ -44,6 +44,7 @@ def test_a_pages_code_runs_from_top_to_bottom(page):
     assert run_code(page).keys() > {"__builtins__"}  # it runs without an error, and defines something
 
 
+@pytest.mark.usefixtures("chains_fitted_once")
 def test_readmes_study_prints_what_is_shown_and_foretells_true_years(capsys):
     """Rates of alarms of its detectors in ten years from the thermo-mechanical law are near the simulated ones."""
     study = run_code(README)["study"]
