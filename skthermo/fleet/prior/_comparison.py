@@ -10,14 +10,14 @@ import pandas as pd
 from scipy.stats import t as student
 
 from skthermo._arrays import Array
-from skthermo.fleet.prior._families import Family, Member, learn_families
+from skthermo.fleet.prior._families import Family, Member, expect, learn_families
 from skthermo.fleet.prior._posterior import Mixture, mixture, posterior
 
 LEAST_BRIDGES = 3
 LEVEL = 0.95  # probability with which a gain must be one
 ALIENS, COUNT = 0.05, 10.0  # share of aliens before any is seen, and bridges as which it counts
 MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
-WARM_STEPS, FEW = 3, 60  # steps of the iteration without a bridge, the more the fewer bridges there are
+FEW = 60  # bridges of which one changes little of what is known of the others: fewer take more steps without it
 FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: an alien, among at least so many
 SETTLED = 0.05
 ROUNDS = 3  # in which aliens are found, and the families learned without them
@@ -38,13 +38,13 @@ def left_out(
 ) -> list[Mixture]:
     """Every bridge's posterior by families that are learned without it."""
     found: dict[int, Mixture] = {}
+    moments, n_steps = expect(members, families), FEW // len(members)
     for group in groups(len(members)):
         kept = [i for i in range(len(members)) if i not in group]
         others = {(place, name): follows.get((i, name), 1.0) for place, i in enumerate(kept) for name in names}
         rest = [members[i] for i in kept]
         known = [name for name in names if sum(name in member.families for member in rest) > 0]
-        n_steps = max(WARM_STEPS, FEW // max(len(members), 1))
-        without = learn_families(rest, known, others, {name: families[name] for name in known}, n_steps)
+        without = learn_families(rest, known, others, [moments[i] for i in kept], n_steps)
         for i in group:
             member = members[i]
             prior = member.prior(without, predictive=True)
@@ -80,7 +80,7 @@ class Comparison:
             for name in several:
                 shares = [follows[i, name] for i, member in enumerate(members) if name in member.families]
                 probabilities[name] = (sum(shares) + (1 - ALIENS) * COUNT) / (len(shares) + COUNT)
-            families = learn_families(members, names, follows, families)
+            families = learn_families(members, names, follows, expect(members, families))
             if max((abs(share - before.get(key, 1.0)) for key, share in follows.items()), default=0.0) < SETTLED:
                 break
         table = by_bridge(found, bridges, probabilities)
