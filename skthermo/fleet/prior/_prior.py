@@ -79,6 +79,10 @@ class FleetPrior(Estimator):
         self.n_knots = n_knots
         self.families = families
 
+    def __sklearn_clone__(self) -> FleetPrior:
+        # A mapper's clones share what the fleet knows: it is not theirs to learn.
+        return self if hasattr(self, "knowledge_") else super().__sklearn_clone__()
+
     def fit(
         self, bridges: Mapping[Hashable, Any] | Sequence[Any], covariates: pd.DataFrame | None = None
     ) -> FleetPrior:
