@@ -21,6 +21,8 @@ SMALLEST = 1e-8
 SETTLED = 0.03  # relative change of tau^2 that ends the iteration
 JITTER = 1e-9
 NEGLIGIBLE = 1e-9  # share of a combination
+ALIENS, ALIEN_FOLLOWS = 0.05, 0.2  # share of bridges of another kind, and of the families that one follows by chance
+MOST_TYPICAL = 5.0  # times the typical deviation of its family that coefficients of a bridge on its own have at most
 
 
 class CoefficientPrior(NamedTuple):
@@ -125,6 +127,7 @@ class OwnPrior:
             squares, left_open = scaled.sum(axis=2)
             known = np.maximum(n_functions - left_open / variances, JITTER)  # coefficients that the records determine
             updated = np.maximum((squares + count * start) / (known + count), SMALLEST**2)
+            updated = np.minimum(updated, MOST_TYPICAL**2 * start) if self.typical else updated
             settled = np.abs(np.log(updated / variances)).max() < SETTLED
             variances = updated
             if settled:
@@ -159,6 +162,7 @@ def mixture(
 
     Combinations are all following, none, and what is met on the way from either to a combination that no single family
     can improve.
+
     ``families`` are those of the outputs; ``probabilities`` those of following, before any record, of pooled families.
     """
     pooled = [family for family in probabilities if family in families]
@@ -173,8 +177,7 @@ def mixture(
             mean = np.where(is_followed[:, np.newaxis], fleet.mean, own.mean)
             root = np.where(is_followed[:, np.newaxis, np.newaxis], fleet.root, own.root)
             update = Update(J, h, mean, root)
-            before = np.log(np.maximum(np.where(flags, chances, 1 - chances), 1e-300)).sum()
-            known[flags] = float(before + update.evidence), update
+            known[flags] = log_chance(flags, chances) + update.evidence, update
         return known[flags][0]
 
     for start in (True, False):
@@ -188,13 +191,24 @@ def mixture(
     covariance = sum(share * (one.covariance + np.outer(one.mean - mean, one.mean - mean)) for share, one in found)
     with_family, without_family = (
         {
-            family: float(logsumexp(logs[flags[:, i] == flag]) - np.log(max(chance(probabilities[family]), 1e-300)))
+            family: float(logsumexp(logs[flags[:, i] == flag]) - np.log(chance(follow_chance(probabilities[family]))))
             for i, family in enumerate(pooled)
         }
         for flag, chance in ((True, lambda p: p), (False, lambda p: 1 - p))
     )
     follows = {family: float(shares[flags[:, i]].sum()) for i, family in enumerate(pooled)}
     return Mixture(total, mean, covariance, follows, with_family, without_family)
+
+
+def log_chance(flags: Sequence[bool], chances: Array) -> float:
+    """Log probability of a combination before any record; an alien as a whole follows few of its families."""
+    usual, alien = (np.log(np.where(flags, p, 1 - p)).sum() for p in (chances, np.full(len(chances), ALIEN_FOLLOWS)))
+    return float(np.logaddexp(np.log1p(-ALIENS) + usual, np.log(ALIENS) + alien))
+
+
+def follow_chance(chance: float) -> float:
+    """Probability of following a family before any record, be the bridge an alien or not."""
+    return (1 - ALIENS) * chance + ALIENS * ALIEN_FOLLOWS
 
 
 def climb(weight: Callable[[tuple[bool, ...]], float], flags: tuple[bool, ...]) -> None:

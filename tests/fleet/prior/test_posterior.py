@@ -96,7 +96,8 @@ def test_a_mixture_averages_over_what_is_followed():
     for a in (True, False):
         for b in (True, False):
             rows = np.array([a, b])[:, np.newaxis]
-            chance = (0.9 if a else 0.1) * (0.6 if b else 0.4)
+            usual, alien = (0.9 if a else 0.1) * (0.6 if b else 0.4), (0.2 if a else 0.8) * (0.2 if b else 0.8)
+            chance = 0.95 * usual + 0.05 * alien
             mean = np.where(rows, fleet.mean, own.mean)
             state = posterior(J, h, mean, np.where(rows[..., np.newaxis], fleet.root, own.root))
             parts.append((chance * np.exp(state.evidence - found.evidence), state, a))

@@ -37,7 +37,7 @@ def error(mapper, seed, **options):
 def test_a_fleet_of_one_law_is_pooled(prior):
     assert prior.comparison_["is_pooled"].all()
     assert (prior.bridges_["follows"] > 0.9).all()
-    assert "pooled over 12 bridges" in prior.summary()
+    assert "f1: pooled over 12" in prior.summary()
     assert_allclose(prior.comparison_["gain"], prior.bridges_["gain"].groupby("family").sum())
 
 
