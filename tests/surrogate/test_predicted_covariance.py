@@ -50,18 +50,19 @@ def fitted(**options):
 @pytest.mark.parametrize("options", [{}, {"reduce": True}, {"aligner": BiasAligner(MODEL, method="scale")}])
 def test_covariance_is_that_of_the_mappers_posterior_behind_the_model(options):
     T, F = bridge(0, 200)
-    fem = chain(**options).fit(T[:30], F[:30])
+    offset = [1.3, 0.8] if "aligner" in options else 1.0
+    fem = chain(**options).fit(T[:30], F[:30] * offset)
     few, mapper = T[30::20], fem.mapper_
     roots, rng = np.linalg.cholesky(mapper.covariance_), np.random.default_rng(1)
     drawn = []
-    for _ in range(4000):
+    for _ in range(1500):
         beta = mapper.coef_ + 0.1 * roots @ rng.standard_normal(mapper.coef_.shape)
         frequencies = MODEL.frequencies(np.exp(basis(few) @ beta))
         drawn.append(fem.aligner_.inverse_transform(frequencies))
     centred = (np.array(drawn) - np.mean(drawn, axis=0)) / 0.1
     found, expected = fem.predict_covariance(few), np.einsum("nij,nik->ijk", centred, centred) / len(drawn)
     scale = np.sqrt(np.einsum("ijj->ij", found))
-    assert np.abs((expected - found) / (scale[:, :, None] * scale[:, None, :])).max() < 0.09  # 4 / sqrt(4000 / 2)
+    assert np.abs((expected - found) / (scale[:, :, None] * scale[:, None, :])).max() < 0.15  # 4 / sqrt(1500 / 2)
 
 
 def test_a_mapper_that_does_not_know_is_refused_by_name():
@@ -99,12 +100,12 @@ def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_th
 
 def test_intervals_after_thirty_days_hold_a_later_year():
     held = []
-    for seed in range(25):
+    for seed in range(12):
         T, F = bridge(seed, 395)
         lowest, highest = chain().fit(T[:30], F[:30]).predict_interval(T[30:])
         held.append(((F[30:] > lowest) & (F[30:] < highest)).to_numpy().mean())
     assert 0.85 < np.mean(held) < 0.95
-    assert np.mean(np.array(held) < 0.7) < 0.15
+    assert np.mean(np.array(held) < 0.7) < 0.2
 
 
 def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of():
@@ -126,8 +127,11 @@ def test_the_report_says_what_weather_is_the_fleets():
     report = fitted()[0].report_
     assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
     assert re.search("predictions stand on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
-    T, F = bridge(0, 60)
-    assert chain(TemperatureMapper(LinearRegression())).fit(T, F).report_.fleet is None
+    assert not [kind for kind, _ in chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings()]
+    T, F = bridge(0, 15)
+    alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_
+    assert alone.fleet is None
+    assert [kind for kind, _ in alone.warnings()] == ["few rows"]
 
 
 def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():

@@ -3,57 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import Array, broken_lines, spread_evenly
+from skthermo._arrays import Array, broken_lines, real_array, spread_evenly
 from skthermo._weather import TrainingRange
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
-EXPLAINED = 0.9999  # share of the variance of all broken lines that the basis keeps
-MOST_FUNCTIONS = 24
+SMALLEST = 1e-5  # share of the variance of the inputs that a principal component needs
+BREAKING = 0.02  # share from which lines in a component break
 
 
 @dataclass(frozen=True)
 class FleetBasis:
-    """Principal components u(T), (n_samples, n_functions), of broken lines in all inputs, with zero mean in the fleet.
+    """Principal components of the standardised inputs, and broken lines in the largest; of zero mean in the fleet.
 
-    The lines break at quantiles of the weather of all bridges, and each is standardised by its deviation there. Beyond
-    the weather of the fleet they go on straight. ``names`` are those of the inputs, None where they have none.
+    The lines break at quantiles of the weather of all bridges and have unit variance there. Beyond the weather of the
+    fleet they go on straight. ``covariance`` is that of the functions in the fleet. ``names`` are those of the inputs,
+    None where they have none.
     """
 
     names: Sequence[Any] | None
+    middle: Array
+    components: Array
     knots: Array
     centre: Array
     scale: Array
-    components: Array
+    covariance: Array
     reach: TrainingRange
 
     @classmethod
     def of(cls, tables: Sequence[Array], n_knots: int, names: Sequence[Any] | None = None) -> FleetBasis:
         """The basis for the weather of some bridges, each (n_samples, n_inputs) without gaps."""
         pooled = np.concatenate([table[spread_evenly(np.arange(len(table)), ROWS_EACH)] for table in tables])
-        knots = np.quantile(pooled, np.linspace(0, 1, n_knots + 2)[1:-1], axis=0)
-        lines = broken_lines(pooled, knots)
-        centre, scale = lines.mean(axis=0), lines.std(axis=0)
-        scale = np.where(scale > 1e-9 * np.maximum(np.abs(centre), 1.0), scale, np.inf)
-        variances, vectors = np.linalg.eigh(np.cov((lines - centre) / scale, rowvar=False, bias=True))
-        variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1]
-        n_needed = 1 + int(np.searchsorted(np.cumsum(variances), EXPLAINED * variances.sum()))
-        components = vectors[:, : min(n_needed, MOST_FUNCTIONS)].T
-        largest = np.abs(components).argmax(axis=1)[:, np.newaxis]
-        components = components * np.sign(np.take_along_axis(components, largest, axis=1))  # eigenvectors have no sign
+        middle, deviations = pooled.mean(axis=0), pooled.std(axis=0)
+        varying = deviations > 1e-9 * np.maximum(np.abs(middle), 1.0)
+        scale = np.where(varying, deviations, np.inf)
+        variances, vectors = np.linalg.eigh(np.atleast_2d(np.cov((pooled - middle) / scale, rowvar=False, bias=True)))
+        shares, vectors = variances[::-1] / max(variances.sum(), 1e-300), vectors[:, ::-1]
+        vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(shares))])
+        components = vectors[:, shares > SMALLEST].T / scale
+        places = (pooled - middle) @ components.T
+        n_breaking = max(int((shares > BREAKING).sum()), 1)
+        knots = np.quantile(places[:, :n_breaking], np.linspace(0, 1, n_knots + 2)[1:-1], axis=0)
         ends = [end(table, axis=0) for table in tables for end in (np.min, np.max)]
         shown = [f"T{i + 1}" for i in range(pooled.shape[1])] if names is None else names
-        return cls(names, knots, centre, scale, components, TrainingRange(np.min(ends, 0), np.max(ends, 0), shown))
+        reach = TrainingRange(np.min(ends, axis=0), np.max(ends, axis=0), shown)
+        plain = cls(names, middle, components, knots, np.zeros(1), np.ones(1), np.empty((0, 0)), reach)
+        lines = plain(pooled)
+        scale = np.where(np.arange(lines.shape[1]) < places.shape[1], 1.0, np.maximum(lines.std(axis=0), 1e-12))
+        covariance = np.atleast_2d(np.cov(lines / scale, rowvar=False))
+        return replace(plain, centre=lines.mean(axis=0), scale=scale, covariance=covariance)
+
+    @property
+    def n_functions(self) -> int:
+        """Number of functions."""
+        return len(self.scale)
+
+    def steady(self, temperatures: Array) -> Array:
+        """The functions where all inputs have been at one temperature for long."""
+        return self(np.repeat(temperatures[:, np.newaxis], self.n_inputs, axis=1))
 
     @property
     def n_inputs(self) -> int:
         """Number of inputs."""
-        return self.knots.shape[1]
+        return len(self.middle)
 
     def __call__(self, inputs: Array) -> Array:
-        """The functions at rows of complete inputs."""
-        return (broken_lines(inputs, self.knots) - self.centre) / self.scale @ self.components.T
+        """The functions at rows of complete inputs, (n_samples, n_functions)."""
+        places = (inputs - self.middle) @ self.components.T
+        n_breaking = self.knots.shape[1]
+        lines = broken_lines(places[:, :n_breaking], self.knots)[:, n_breaking:]
+        return (np.hstack([places, lines]) - self.centre) / self.scale
+
+
+def steady_changes(
+    basis: FleetBasis, temperatures: Any, reference: float | None, reach: TrainingRange
+) -> tuple[Array, Array]:
+    """Temperatures, and the functions there less those at a reference, by default the middle of some weather."""
+    values = np.ravel(real_array(temperatures, "temperatures"))
+    middle = float(np.mean([reach.lowest, reach.highest])) if reference is None else float(reference)
+    return values, basis.steady(values) - basis.steady(np.array([middle]))

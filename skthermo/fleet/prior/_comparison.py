@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from skthermo._arrays import Array
 from skthermo.fleet.prior._families import Family, Member, learn_families
-from skthermo.fleet.prior._posterior import Mixture, mixture
+from skthermo.fleet.prior._posterior import Mixture, mixture, posterior
 
 LEAST_BRIDGES = 3
 LEVEL = 0.95  # probability with which a gain must be one
 ALIENS, COUNT = 0.05, 10.0  # share of aliens before any is seen, and bridges as which it counts
 MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
 WARM_STEPS, FEW = 3, 60  # steps of the iteration without a bridge, the more the fewer bridges there are
+FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: an alien, among at least so many
+SETTLED = 0.05
 ROUNDS = 3  # in which aliens are found, and the families learned without them
 
 
@@ -49,47 +53,92 @@ def left_out(
     return [found[i] for i in range(len(members))]
 
 
-def compare(
-    members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable]
-) -> tuple[dict[Hashable, Family], dict[Hashable, float], pd.DataFrame, pd.DataFrame]:
-    """Families, probabilities of following them, and the tables by family and by bridge."""
-    follows = {(i, name): 1.0 for i in range(len(members)) for name in names}
-    probabilities = dict.fromkeys(names, 1 - ALIENS)
-    several = [name for name in names if sum(name in member.families for member in members) > 1]
-    families = learn_families(members, names, follows)
-    for _ in range(ROUNDS):
-        outcome = left_out(members, several, follows, families, {name: probabilities[name] for name in several})
-        before = dict(follows)
-        for i, found in enumerate(outcome):
-            follows |= {(i, name): share for name, share in found.follows.items()}
-        for name in several:
-            own = [follows[i, name] for i, member in enumerate(members) if name in member.families]
-            probabilities[name] = (sum(own) + (1 - ALIENS) * COUNT) / (len(own) + COUNT)
-        families = learn_families(members, names, follows, families)
-        if max((abs(follows[key] - before[key]) for key in follows), default=0.0) < 0.05:
-            break
+@dataclass(frozen=True)
+class Comparison:
+    """Families, the probability of following each, tables by family and by bridge, and the bridges' coefficients."""
+
+    families: dict[Hashable, Family]
+    probabilities: dict[Hashable, float]
+    by_family: pd.DataFrame
+    by_bridge: pd.DataFrame
+    coefficients: dict[Hashable, Array]
+
+    @classmethod
+    def of(
+        cls, members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
+    ) -> Comparison:
+        """Learn families, leave bridges out, and learn again without the weight of aliens."""
+        probabilities = dict.fromkeys(names, 1 - ALIENS)
+        several = [name for name in names if sum(name in member.families for member in members) > 1]
+        follows = seem_to_follow(members, several, covariance)
+        families = learn_families(members, names, follows)
+        for _ in range(ROUNDS):
+            before = follows
+            chances = {name: probabilities[name] for name in several}
+            found = left_out(members, several, follows, families, chances)
+            follows = {(i, name): share for i, one in enumerate(found) for name, share in one.follows.items()}
+            for name in several:
+                shares = [follows[i, name] for i, member in enumerate(members) if name in member.families]
+                probabilities[name] = (sum(shares) + (1 - ALIENS) * COUNT) / (len(shares) + COUNT)
+            families = learn_families(members, names, follows, families)
+            if max((abs(share - before.get(key, 1.0)) for key, share in follows.items()), default=0.0) < SETTLED:
+                break
+        table = by_bridge(found, bridges, probabilities)
+        comparison = by_family(table, members, names, len(covariance))
+        pooled = {name: families[name] for name in names if comparison.loc[name, "is_pooled"]}
+        chances = {name: probabilities[name] for name in pooled}
+        coefficients = {
+            bridge: mixture(
+                member.information.J, member.information.h, member.families, member.prior(pooled), member.own, chances
+            ).mean.reshape(member.information.n_outputs, -1)
+            for bridge, member in zip(bridges, members, strict=True)
+        }
+        return cls(pooled, chances, comparison, table, coefficients)
+
+
+def seem_to_follow(
+    members: Sequence[Member], names: Sequence[Hashable], covariance: Array
+) -> dict[tuple[int, Hashable], float]:
+    """1, or 0 for bridges that on their own respond far from the median of their family, in the fleet's weather."""
+    own = [posterior(m.information.J, m.information.h, *m.own).mean.reshape(len(m.families), -1) for m in members]
+    follows = {}
+    for name in names:
+        of_family = [(i, own[i][j]) for i, m in enumerate(members) for j, f in enumerate(m.families) if f == name]
+        b = np.array([coefficients for _, coefficients in of_family])
+        away = b - np.median(b, axis=0)
+        distances = np.sqrt(np.einsum("ij,jk,ik->i", away, covariance, away))
+        far = (distances > FAR * np.median(distances)) & (len(b) >= FEW_MEMBERS)
+        for (i, _), is_far in zip(of_family, far, strict=True):
+            follows[i, name] = min(follows.get((i, name), 1.0), 0.0 if is_far else 1.0)
+    return follows
+
+
+def by_bridge(
+    found: Sequence[Mixture], bridges: Sequence[Hashable], probabilities: Mapping[Hashable, float]
+) -> pd.DataFrame:
+    """Log likelihoods alone, and by the mixture of following the others and being on its own."""
     rows = []
-    for bridge, found in zip(bridges, outcome, strict=True):
-        for name in several:
-            if name in found.follows:
-                alone = found.without_family[name]
-                chance = probabilities[name]
-                pooled = float(np.logaddexp(np.log(chance) + found.with_family[name], np.log1p(-chance) + alone))
-                rows.append((bridge, name, alone, pooled, pooled - alone, found.follows[name]))
+    for bridge, one in zip(bridges, found, strict=True):
+        for name, share in one.follows.items():
+            alone, chance = one.without_family[name], probabilities[name]
+            pooled = float(np.logaddexp(np.log(chance) + one.with_family[name], np.log1p(-chance) + alone))
+            rows.append((bridge, name, alone, pooled, pooled - alone, share))
     columns = ["bridge", "family", "alone", "pooled", "gain", "follows"]
-    by_bridge = pd.DataFrame(rows, columns=columns).set_index(["bridge", "family"])
-    return families, probabilities, by_family(by_bridge, members, names), by_bridge
+    return pd.DataFrame(rows, columns=columns).set_index(["bridge", "family"])
 
 
-def by_family(by_bridge: pd.DataFrame, members: Sequence[Member], names: Sequence[Hashable]) -> pd.DataFrame:
+def by_family(
+    table: pd.DataFrame, members: Sequence[Member], names: Sequence[Hashable], n_functions: int
+) -> pd.DataFrame:
     """Sums over bridges; a family is pooled where its gain is clearly positive and enough bridges have it."""
     rows = []
     for name in names:
         n_bridges = sum(name in member.families for member in members)
-        part = by_bridge[by_bridge.index.get_level_values("family") == name]
+        part = table[table.index.get_level_values("family") == name]
         gain, error = float(part["gain"].sum()), np.nan
         if n_bridges > 1:
-            error = float(part["gain"].std() * np.sqrt(n_bridges))
+            own = np.sqrt(n_functions / 2)  # deviation of the log of a ratio of normal densities
+            error = float(max(part["gain"].std(), own) * np.sqrt(n_bridges))
         is_pooled = n_bridges >= LEAST_BRIDGES and gain > student.ppf(LEVEL, n_bridges - 1) * error
         rows.append((name, n_bridges, part["alone"].sum(), part["pooled"].sum(), gain, error, bool(is_pooled)))
     columns = ["family", "n_bridges", "alone", "pooled", "gain", "standard_error", "is_pooled"]

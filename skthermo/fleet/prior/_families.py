@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from skthermo._arrays import Array
+from skthermo.fleet.prior._information import Information
 from skthermo.fleet.prior._posterior import CoefficientPrior, posterior
-from skthermo.fleet.prior._records import Information
 
 ROUND_COUNT = 3.0  # bridges as which a round covariance counts
 COVARIATE_PENALTY = 1.0  # bridges as which it counts that a covariate has no effect

@@ -15,12 +15,16 @@ from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, row_weights
 from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
 from skthermo._weather import TrainingRange, parts
+from skthermo.fleet.prior._basis import steady_changes
 from skthermo.fleet.prior._bridges import families_by_name
-from skthermo.fleet.prior._families import Member
-from skthermo.fleet.prior._posterior import alone, mixture
-from skthermo.fleet.prior._records import BridgeRecords, Information
+from skthermo.fleet.prior._information import Information
+from skthermo.fleet.prior._knowledge import FleetKnowledge
+from skthermo.fleet.prior._posterior import Mixture
+from skthermo.fleet.prior._records import BridgeRecords, usable_rows
 from skthermo.metrics import complete_r2
 from skthermo.surrogate import FrequencyCoordinates
+
+N_KNOTS = 4  # without a fleet
 
 
 class FleetMapper(RegressorMixin, Estimator):
@@ -28,8 +32,9 @@ class FleetMapper(RegressorMixin, Estimator):
 
     Parameters
     ----------
-    prior : FleetPrior
-        Fitted.
+    prior : FleetPrior, optional
+        Fitted. Without one, the bridge is on its own: broken lines in the weather of its own records, and a ridge of
+        the most likely strength.
     covariates : mapping of str to value, optional
         Covariates of this bridge; what is not given counts as unknown.
     families : mapping of str to str, optional
@@ -39,12 +44,16 @@ class FleetMapper(RegressorMixin, Estimator):
 
     Attributes
     ----------
+    families_ : dict
+        Family of each output by name, None where it is never pooled.
     follows_ : dict
         By family: probability that this bridge behaves as the fleet does.
     reach_ : TrainingRange
         Lowest and highest value of each input in the fleet and in the bridge's own records.
     own_range_ : TrainingRange
         The same of its own records.
+    basis_ : FleetBasis
+        Functions of the weather.
     coefficients_ : ndarray of shape (n_outputs, 1 + n_functions)
         Posterior mean of the level and of the coefficients of the fleet's basis, of ln y.
     covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
@@ -73,7 +82,7 @@ class FleetMapper(RegressorMixin, Estimator):
     """
 
     _parameter_constraints: dict = {
-        "prior": [HasMethods(["mapper"])],
+        "prior": [HasMethods(["mapper"]), None],
         "covariates": [Mapping, pd.Series, None],
         "families": [Mapping, None],
         "coordinates": [FrequencyCoordinates, None],
@@ -81,7 +90,7 @@ class FleetMapper(RegressorMixin, Estimator):
 
     def __init__(
         self,
-        prior: Any,
+        prior: Any = None,
         *,
         covariates: Mapping[Hashable, Any] | None = None,
         families: Mapping[Hashable, Any] | None = None,
@@ -120,30 +129,25 @@ class FleetMapper(RegressorMixin, Estimator):
         ValueError
             If the prior is not fitted, inputs are not those of the fleet, or no row can be used.
         """
-        check_is_fitted(self.prior)
         inputs, values = self._read(X, y)
         weights = row_weights(sample_weight, X)
         if self.coordinates is not None:
             self.coordinates.check(values)
-        prior = self.prior
+        trained = usable_rows(inputs, values, weights, complete=self.coordinates is not None)
+        if not trained.any():
+            raise ValueError(f"none of {len(inputs)} rows has all inputs, a quantity and a weight; expected one")
+        known = FleetKnowledge.none(inputs[trained], N_KNOTS) if self.prior is None else self.prior.knowledge_
         names = self._names_of(y, values.shape[1])
-        families = list(families_by_name(self._families(), names).values())
+        given = getattr(self.prior, "families", None) if self.families is None else self.families
+        self.families_ = families_by_name(given, names)
         records = BridgeRecords.of(inputs, values, names, weights, self.coordinates)
-        if not len(records.inputs):
-            raise ValueError(f"none of {len(inputs)} rows has all inputs and an output; expected at least one")
-        typical_of_all = float(np.median(list(prior.typical_.values())))
-        typical = np.array([prior.typical_.get(family, typical_of_all) for family in families])
-        found = Information.of(prior.basis_, records, prior.noise_, families, typical)
-        z, unknown = prior.covariates_.row(self.covariates)
-        plain = alone(found.J, found.h, found.n_outputs, typical)
-        pooled = {name: prior.families_[name] for name, row in prior.comparison_.iterrows() if row["is_pooled"]}
-        member = Member(found, families, z, unknown, plain)
-        chances = {name: prior.follows_[name] for name in pooled}
-        state = mixture(found.J, found.h, families, member.prior(pooled, predictive=True), plain, chances)
+        families = list(self.families_.values())
+        found, state = known.posterior(records, families, self.covariates)
         self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
-        self._keep(found, state.mean, state.covariance)
-        self.own_range_ = TrainingRange.of(frame_like(X, inputs), self._trained(inputs, values, weights))
-        own, fleet = self.own_range_, prior.reach_
+        self.basis_, self.centre_ = known.basis, found.centre
+        self.coefficients_, self.covariance_ = with_levels(found, state)
+        self.own_range_ = TrainingRange.of(frame_like(X, inputs), trained)
+        own, fleet = self.own_range_, known.basis.reach
         lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)
         self.reach_ = TrainingRange(lowest, highest, own.names)
         return self
@@ -161,7 +165,7 @@ class FleetMapper(RegressorMixin, Estimator):
         Returns
         -------
         y : ndarray or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
-            exp of the posterior mean, the median of the posterior.
+            Exponential of the posterior mean, the median of the posterior.
         std : ndarray or DataFrame of the same shape
             Only with ``return_std``: what the records and the fleet leave open, without the noise of a measurement.
         """
@@ -203,6 +207,41 @@ class FleetMapper(RegressorMixin, Estimator):
         outside = (self.own_range_.excess(inputs) > 0).any(axis=1)
         return outside & (self.reach_.excess(inputs) == 0).all(axis=1)
 
+    def effects(
+        self, temperatures: ArrayLike, name: Hashable = None, *, reference: float | None = None
+    ) -> pd.DataFrame:
+        """How ln y changes from a reference temperature to others, where all inputs have been at one for long.
+
+        Parameters
+        ----------
+        temperatures : array-like of shape (n_temperatures,)
+            In degrees Celsius.
+        name : str, optional
+            Of the output; by default the first.
+        reference : float, optional
+            Temperature at which the change is 0; by default the middle of the bridge's own weather.
+
+        Returns
+        -------
+        DataFrame
+            On an index of temperatures: ``mean`` and ``standard_deviation`` of the posterior of the change.
+
+        Raises
+        ------
+        ValueError
+            If there is no such output.
+        """
+        check_is_fitted(self)
+        names = list(self.families_)
+        name = names[0] if name is None else name
+        if name not in names:
+            raise ValueError(f"name is {name!r}; expected one of {names}")
+        row = names.index(name)
+        values, d = steady_changes(self.basis_, temperatures, reference, self.own_range_)
+        variances = np.einsum("ti,ij,tj->t", d, self.covariance_[row, 1:, row, 1:], d)
+        columns = {"mean": d @ self.coefficients_[row, 1:], "standard_deviation": np.sqrt(variances)}
+        return pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
+
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over outputs.
 
@@ -236,7 +275,10 @@ class FleetMapper(RegressorMixin, Estimator):
         return inputs, as_columns(values)
 
     def _check_inputs(self, X: Any) -> None:
-        basis = self.prior.basis_
+        if self.prior is None:
+            return
+        check_is_fitted(self.prior)
+        basis = self.prior.knowledge_.basis
         if self.n_features_in_ != basis.n_inputs:
             raise ValueError(f"X has {self.n_features_in_} inputs; expected the {basis.n_inputs} of the fleet")
         names = getattr(X, "columns", None)
@@ -244,39 +286,18 @@ class FleetMapper(RegressorMixin, Estimator):
             return
         raise ValueError(f"X has the inputs {list(names)[:20]}; expected those of the fleet, {list(basis.names)[:20]}")
 
-    def _families(self) -> Mapping[Hashable, Any] | None:
-        return self.prior.families if self.families is None else self.families
-
     def _names_of(self, y: Any, n_outputs: int) -> list[Any]:
         """Names of the outputs, or those of the fleet in their order."""
         if isinstance(y, pd.DataFrame):
             return list(y.columns)
         if isinstance(y, pd.Series) and y.name is not None:
             return [y.name]
-        names = list(self.families) if self.families is not None else self.prior.parameter_names_
+        if self.prior is None and self.families is None:
+            return list(range(n_outputs))
+        names = self.prior.parameter_names_ if self.families is None else list(self.families)
         if len(names) != n_outputs:
-            raise ValueError(
-                f"y has {n_outputs} columns without names; expected names, or the {len(names)} {names[:20]}"
-            )
+            raise ValueError(f"y has {n_outputs} columns without names; expected names, or {names[:20]}")
         return list(names)
-
-    @staticmethod
-    def _trained(inputs: Array, values: Array, weights: Array | None) -> NDArray[np.bool_]:
-        usable = ~np.isnan(inputs).any(axis=1) & ~np.isnan(values).all(axis=1)
-        return usable if weights is None else usable & (weights > 0)
-
-    def _keep(self, found: Information, b: Array, covariance: Array) -> None:
-        """Coefficients with levels, and their covariance."""
-        n_outputs, size = found.n_outputs, len(b)
-        n_functions = size // n_outputs
-        self.coefficients_ = np.column_stack([found.level - found.gain @ b, b.reshape(n_outputs, n_functions)])
-        whole = np.zeros((n_outputs, 1 + n_functions, n_outputs, 1 + n_functions))
-        cross = -found.gain @ covariance
-        whole[:, 0, :, 0] = found.level_covariance - cross @ found.gain.T
-        whole[:, 0, :, 1:] = cross.reshape(n_outputs, n_outputs, n_functions)
-        whole[:, 1:, :, 0] = cross.T.reshape(n_outputs, n_functions, n_outputs)
-        whole[:, 1:, :, 1:] = covariance.reshape(n_outputs, n_functions, n_outputs, n_functions)
-        self.covariance_, self.centre_ = whole, found.centre
 
     def _inputs(self, X: Any) -> Array:
         check_is_fitted(self)
@@ -291,7 +312,7 @@ class FleetMapper(RegressorMixin, Estimator):
         covariance = np.full((len(inputs) if with_covariance else 0, n_outputs, n_outputs), np.nan)
         for part in parts(len(known), self.coefficients_.size * n_outputs):
             rows = known[part]
-            x = np.column_stack([np.ones(len(rows)), self.prior.basis_(inputs[rows]) - self.centre_])
+            x = np.column_stack([np.ones(len(rows)), self.basis_(inputs[rows]) - self.centre_])
             values[rows] = np.exp(x @ self.coefficients_.T)
             if with_covariance:
                 half = np.einsum("ti,aibj->tabj", x, self.covariance_)
@@ -309,3 +330,16 @@ class FleetMapper(RegressorMixin, Estimator):
         tags.target_tags.multi_output = True
         tags.target_tags.positive_only = True
         return tags
+
+
+def with_levels(found: Information, state: Mixture) -> tuple[Array, Array]:
+    """Mean, (n_outputs, 1 + n_functions), and covariance of levels and coefficients."""
+    n_outputs, b, covariance = found.n_outputs, state.mean, state.covariance
+    n_functions = len(b) // n_outputs
+    whole = np.zeros((n_outputs, 1 + n_functions, n_outputs, 1 + n_functions))
+    cross = -found.gain @ covariance
+    whole[:, 0, :, 0] = found.level_covariance - cross @ found.gain.T
+    whole[:, 0, :, 1:] = cross.reshape(n_outputs, n_outputs, n_functions)
+    whole[:, 1:, :, 0] = cross.T.reshape(n_outputs, n_functions, n_outputs)
+    whole[:, 1:, :, 1:] = covariance.reshape(n_outputs, n_functions, n_outputs, n_functions)
+    return np.column_stack([found.level - found.gain @ b, b.reshape(n_outputs, n_functions)]), whole

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
@@ -14,9 +14,13 @@ from scipy.special import logsumexp
 from skthermo._arrays import Array
 
 STEPS = 25  # to the deviation of a bridge on its own
+SHAPE_STEPS = 4
+SHAPE_COUNT = 3.0  # outputs as which it counts that all functions are alike
 TYPICAL_COUNT = 2.0  # coefficients as which a typical deviation counts
 START = 0.1  # deviation of coefficients of ln y where nothing else is known
 SMALLEST = 1e-8
+SETTLED = 0.03  # relative change of tau^2 that ends the iteration
+JITTER = 1e-9
 MOST_COMBINED = 6  # families of which all combinations are weighed
 
 
@@ -52,31 +56,62 @@ def posterior(J: Array, h: Array, mean: Array, root: Array) -> Posterior:
     L = np.linalg.cholesky(np.eye(len(m)) + (whole + whole.T) / 2)
     w = np.einsum("aij,ai->aj", root, e.reshape(mean.shape)).ravel()
     shift = np.einsum("aij,aj->ai", root, cho_solve((L, True), w).reshape(mean.shape)).ravel()
-    blocks = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
-    blocks[np.arange(n_outputs), :, np.arange(n_outputs)] = root.transpose(0, 2, 1)[:, :, :]
-    transposed = blocks.transpose(0, 1, 2, 3).reshape(J.shape)
-    B = solve_triangular(L, transposed, lower=True)
+    transposed = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
+    transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = root.transpose(0, 2, 1)
+    B = solve_triangular(L, transposed.reshape(J.shape), lower=True)
     evidence = m @ h - m @ J @ m / 2 - np.log(np.diag(L)).sum() + e @ shift / 2
     return Posterior(float(evidence), m + shift, B.T @ B)
 
 
-def alone(J: Array, h: Array, n_outputs: int, typical: Array | None = None) -> CoefficientPrior:
-    """N(0, tau^2 I) for each output, with the most likely tau; a typical tau^2 counts as a few coefficients more."""
-    n_functions = len(h) // n_outputs
-    eye = np.eye(n_functions)
-    zeros = np.zeros((n_outputs, n_functions))
-    variances = np.full(n_outputs, START**2) if typical is None else typical
-    count = 0.0 if typical is None else TYPICAL_COUNT
-    start = variances
-    for _ in range(STEPS):
-        found = posterior(J, h, zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * eye)
-        second = (found.mean**2 + np.diag(found.covariance)).reshape(n_outputs, n_functions).sum(axis=1)
-        updated = np.maximum((second + count * start) / (n_functions + count), SMALLEST**2)
-        settled = np.abs(np.log(updated / variances)).max() < 0.01
-        variances = updated
-        if settled:
-            break
-    return CoefficientPrior(zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * eye)
+@dataclass(frozen=True)
+class OwnPrior:
+    """Coefficients of an output on its own are N(0, tau^2 diag(shape)), with the most likely tau.
+
+    The shape tells which functions are large in any bridge, not what its response is. A family's ``typical`` tau^2
+    counts as a few coefficients more.
+    """
+
+    shape: Array
+    typical: Mapping[Hashable, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, J: Sequence[Array], h: Sequence[Array], families: Sequence[Sequence[Hashable]], n_functions: int
+    ) -> OwnPrior:
+        """Learn shape and typical deviations from bridges, by expectation maximisation."""
+        found = cls(np.ones(n_functions))
+        for _ in range(SHAPE_STEPS):
+            ratios, variances = np.full(n_functions, SHAPE_COUNT), {}
+            for one_J, one_h, of_output in zip(J, h, families, strict=True):
+                prior = found.fitted(one_J, one_h, of_output)
+                state = posterior(one_J, one_h, *prior)
+                taus = prior.root[:, 0, 0] ** 2 / found.shape[0]
+                second = (state.mean**2 + np.diag(state.covariance)).reshape(len(of_output), n_functions)
+                ratios += (second / taus[:, np.newaxis]).sum(axis=0)
+                for family, tau in zip(of_output, taus, strict=True):
+                    variances.setdefault(family, []).append(float(tau))
+            shape = ratios / (SHAPE_COUNT + sum(map(len, families)))
+            found = cls(shape, {family: float(np.median(values)) for family, values in variances.items()})
+        return found
+
+    def fitted(self, J: Array, h: Array, families: Sequence[Hashable]) -> CoefficientPrior:
+        """The prior with the most likely deviations."""
+        n_outputs, n_functions = len(families), len(self.shape)
+        zeros, roots = np.zeros((n_outputs, n_functions)), np.diag(np.sqrt(self.shape))
+        middle = float(np.median(list(self.typical.values()))) if self.typical else START**2
+        start = np.array([self.typical.get(family, middle) for family in families])
+        count, variances = TYPICAL_COUNT if self.typical else 0.0, start
+        for _ in range(STEPS):
+            found = posterior(J, h, zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * roots)
+            scaled = np.stack([found.mean**2, np.diag(found.covariance)]).reshape(2, n_outputs, -1) / self.shape
+            squares, left_open = scaled.sum(axis=2)
+            known = np.maximum(n_functions - left_open / variances, JITTER)  # coefficients that the records determine
+            updated = np.maximum((squares + count * start) / (known + count), SMALLEST**2)
+            settled = np.abs(np.log(updated / variances)).max() < SETTLED
+            variances = updated
+            if settled:
+                break
+        return CoefficientPrior(zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * roots)
 
 
 @dataclass(frozen=True)

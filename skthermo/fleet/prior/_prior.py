@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from skthermo._validation import Estimator, Interval, check_is_fitted
-from skthermo.fleet.prior._basis import FleetBasis
+from skthermo.fleet.prior._basis import FleetBasis, steady_changes
 from skthermo.fleet.prior._bridges import bridges_of, common_inputs, families_by_name, read_bridge
-from skthermo.fleet.prior._comparison import compare
+from skthermo.fleet.prior._comparison import LEAST_BRIDGES, Comparison
 from skthermo.fleet.prior._covariates import Covariates
 from skthermo.fleet.prior._families import Member
+from skthermo.fleet.prior._information import FleetNoise, Information
+from skthermo.fleet.prior._knowledge import FleetKnowledge
 from skthermo.fleet.prior._mapper import FleetMapper
-from skthermo.fleet.prior._posterior import alone
-from skthermo.fleet.prior._records import BridgeRecords, FleetNoise, Information
+from skthermo.fleet.prior._posterior import OwnPrior
 
 
 class FleetPrior(Estimator):
@@ -39,22 +41,16 @@ class FleetPrior(Estimator):
         its ``standard_error`` over bridges; and ``is_pooled``.
     bridges_ : DataFrame
         The same by bridge and family, and ``follows``, the probability that the bridge behaves as the family.
-    families_ : dict
-        Distribution of the coefficients of each family.
-    follows_ : dict
-        Probability that a new bridge follows a family, before its first record.
-    basis_ : FleetBasis
-        Functions of the weather.
+    knowledge_ : FleetKnowledge
+        What a mapper needs: functions of the weather, distributions of their coefficients by family, noise.
     reach_ : TrainingRange
         Lowest and highest value of each input in the fleet.
-    noise_ : FleetNoise
-        Scatter of the records and its memory.
-    covariates_ : Covariates
-        Encoding of the covariates.
     parameter_names_ : list
         Names of parameters or modes, in order of their appearance.
     bridge_families_ : dict
-        Family of each of the bridge's parameters, by bridge.
+        By bridge: family of each of its parameters or modes.
+    coefficients_ : dict
+        By bridge: posterior means of its coefficients, (n_outputs, n_functions).
 
     Examples
     --------
@@ -108,34 +104,32 @@ class FleetPrior(Estimator):
             If the bridges have different inputs, or tables that are no records; if covariates lack a bridge.
         """
         self._validate_params()
-        given = bridges_of(bridges)
-        names = list(given)
-        read = {name: read_bridge(name, bridge) for name, bridge in given.items()}
+        read = {name: read_bridge(name, bridge) for name, bridge in bridges_of(bridges).items()}
         inputs = common_inputs(read)
         records = [one.records(inputs) for one in read.values()]
-        self.basis_ = FleetBasis.of([one.inputs for one in records], self.n_knots, inputs)
-        self.reach_ = self.basis_.reach
-        self.bridge_families_ = {
-            name: self._families_of(name, one.names) for name, one in zip(names, records, strict=True)
+        of_bridge = {
+            bridge: families_by_name(self.families, one.names, bridge)
+            for bridge, one in zip(read, records, strict=True)
         }
-        self.parameter_names_ = list(dict.fromkeys(name for one in records for name in one.names))
-        self.covariates_, Z, unknown = Covariates.of(covariates, names)
-        information = [Information.of(self.basis_, one) for one in records]
-        families = [list(self.bridge_families_[name].values()) for name in names]
-        self.noise_ = noise_of(information, families, records)
-        typical = typical_deviations(information, families)
-        self.typical_ = typical
-        members = []
-        for one, of_output, z, covariance in zip(information, families, Z, unknown, strict=True):
-            prior = alone(one.J, one.h, one.n_outputs, np.array([typical[family] for family in of_output]))
-            members.append(Member(one, of_output, z, covariance, prior))
-        pooled = sorted({f for of_output in families for f in of_output if f is not None}, key=str)
-        self.families_, self.follows_, self.comparison_, self.bridges_ = compare(members, names, pooled)
+        families = [list(by_name.values()) for by_name in of_bridge.values()]
+        basis = FleetBasis.of([one.inputs for one in records], self.n_knots, inputs)
+        plain = OwnPrior(np.ones(basis.n_functions))
+        found = [Information.of(basis, one, own, plain) for one, own in zip(records, families, strict=True)]
+        own = OwnPrior.of([one.J for one in found], [one.h for one in found], families, basis.n_functions)
+        encoding, Z, unknown = Covariates.of(covariates, list(read))
+        members = [
+            Member(one, of_output, z, covariance, own.fitted(one.J, one.h, of_output))
+            for one, of_output, z, covariance in zip(found, families, Z, unknown, strict=True)
+        ]
+        names = sorted({family for of_output in families for family in of_output if family is not None}, key=str)
+        compared = Comparison.of(members, list(read), names, basis.covariance)
+        noise = FleetNoise.of(found, families, records)
+        self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities)
+        self.comparison_, self.bridges_ = compared.by_family, compared.by_bridge
+        self.coefficients_, self.bridge_families_ = compared.coefficients, of_bridge
+        self.parameter_names_ = list(dict.fromkeys(name for by_name in of_bridge.values() for name in by_name))
+        self.reach_ = basis.reach
         return self
-
-    def _families_of(self, bridge: Hashable, names: Sequence[Hashable]) -> dict[Hashable, Hashable | None]:
-        """The family of each of a bridge's parameters."""
-        return families_by_name(self.families, names, bridge)
 
     def mapper(
         self, covariates: Mapping[Hashable, Any] | None = None, families: Mapping[Hashable, Any] | None = None
@@ -157,6 +151,47 @@ class FleetPrior(Estimator):
         check_is_fitted(self)
         return FleetMapper(self, covariates=covariates, families=families)
 
+    def effects(
+        self, temperatures: ArrayLike, family: Hashable = None, *, reference: float | None = None
+    ) -> pd.DataFrame:
+        """How ln y changes from a reference temperature to others, where all inputs have been at one for long.
+
+        Parameters
+        ----------
+        temperatures : array-like of shape (n_temperatures,)
+            In degrees Celsius.
+        family : str, optional
+            By default the first.
+        reference : float, optional
+            Temperature at which the change is 0; by default the middle of the fleet's weather.
+
+        Returns
+        -------
+        DataFrame
+            On an index of temperatures: ``mean`` and ``standard_deviation`` of another bridge of the fleet, of unknown
+            covariates (NaN for a family that is not pooled), and a column for each bridge with its own.
+
+        Raises
+        ------
+        ValueError
+            If there is no such family.
+        """
+        check_is_fitted(self)
+        family = self.comparison_.index[0] if family is None else family
+        if family not in self.comparison_.index:
+            raise ValueError(f"family is {family!r}; expected one of {list(self.comparison_.index)}")
+        basis, known = self.knowledge_.basis, self.knowledge_.families
+        values, d = steady_changes(basis, temperatures, reference, self.reach_)
+        columns = {"mean": np.full(len(d), np.nan), "standard_deviation": np.full(len(d), np.nan)}
+        if family in known:
+            mean, covariance = known[family].predictive(*self.knowledge_.covariates.row(None))
+            columns = {"mean": d @ mean, "standard_deviation": np.sqrt(np.einsum("ti,ij,tj->t", d, covariance, d))}
+        for bridge, by_name in self.bridge_families_.items():
+            rows = [i for i, of_output in enumerate(by_name.values()) if of_output == family]
+            if rows:
+                columns[bridge] = d @ self.coefficients_[bridge][rows].mean(axis=0)
+        return pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
+
     def summary(self) -> str:
         """What the comparison says, in sentences.
 
@@ -172,8 +207,8 @@ class FleetPrior(Estimator):
             if row["is_pooled"]:
                 gain = f"{row['gain']:.3g} +- {row['standard_error']:.2g}"
                 text = f"{name}: pooled over {n}; log likelihood better by {gain}"
-            elif row["n_bridges"] < 3:
-                text = f"{name}: not pooled: {n}; expected at least 3"
+            elif row["n_bridges"] < LEAST_BRIDGES:
+                text = f"{name}: not pooled: {n}; expected at least {LEAST_BRIDGES}"
             else:
                 text = (
                     f"{name}: not pooled over {n}: other bridges do not foretell its response to the weather (log "
@@ -181,30 +216,3 @@ class FleetPrior(Estimator):
                 )
             lines.append(text)
         return "\n".join(lines)
-
-
-def noise_of(
-    information: Sequence[Information], families: Sequence[Sequence[Any]], records: Sequence[BridgeRecords]
-) -> FleetNoise:
-    """Median scatter and memory of the bridges."""
-    by_family: dict[Any, list[float]] = {}
-    measured = []
-    for one, of_output, given in zip(information, families, records, strict=True):
-        if given.is_measured:
-            measured.append(float(np.mean(np.diag(one.scatter))))
-            continue
-        for family, variance in zip(of_output, np.diag(one.scatter), strict=True):
-            by_family.setdefault(family, []).append(float(variance))
-    variances = {family: float(np.median(values)) for family, values in by_family.items()}
-    memory = float(np.median([one.memory for one in information]))
-    return FleetNoise(variances, float(np.median(measured)) if measured else 1.0, memory)
-
-
-def typical_deviations(information: Sequence[Information], families: Sequence[Sequence[Any]]) -> dict[Any, float]:
-    """Mean square of the coefficients of a family, from what bridges learn on their own."""
-    squares: dict[Any, list[float]] = {}
-    for one, of_output in zip(information, families, strict=True):
-        own = alone(one.J, one.h, one.n_outputs)
-        for family, root in zip(of_output, own.root, strict=True):
-            squares.setdefault(family, []).append(float(root[0, 0] ** 2))
-    return {family: float(np.median(values)) for family, values in squares.items()}

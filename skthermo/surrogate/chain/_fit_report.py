@@ -227,7 +227,7 @@ class FitReport(SavesFrames):
                 f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected "
                 "records at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
             )
-        if self.n_trained < ROWS_PER_PARAMETER * n_parameters:
+        if self.n_trained < ROWS_PER_PARAMETER * n_parameters and self.fleet is None:
             yield (
                 "few rows",
                 f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "

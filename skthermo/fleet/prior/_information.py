@@ -1,0 +1,193 @@
+"""What the records of a bridge tell of its response to the weather, and of their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from skthermo._arrays import Array, rows_by_pattern
+from skthermo._gaussian import Gaussian
+from skthermo._times import correlation_time
+from skthermo.fleet.prior._basis import FleetBasis
+from skthermo.fleet.prior._posterior import OwnPrior, posterior
+from skthermo.fleet.prior._records import BridgeRecords
+
+ROUNDS = 4  # of noise and coefficients in turn
+USUAL = 0.99  # share of the records, if normal, that count in full; others the less the farther away they are
+PSEUDO_ROWS = 20.0  # independent records as which the noise of the fleet counts beside that of a new bridge
+LEAST_LEFT = 0.25  # share of the records that regression leaves to the noise, at least
+SMALLEST_VARIANCE = 1e-18  # of ln y
+JITTER = 1e-9  # share of its variance that each output has of its own
+
+
+@dataclass(frozen=True)
+class FleetNoise:
+    """How records of a fleet scatter: variances of ln y by family, of what chains measure, and the memory of both."""
+
+    variances: Mapping[Any, float] = field(default_factory=dict)
+    measured: float | None = None
+    memory: float = 1.0
+
+    @classmethod
+    def of(
+        cls, found: Sequence[Information], families: Sequence[Sequence[Any]], records: Sequence[BridgeRecords]
+    ) -> FleetNoise:
+        """Medians over bridges."""
+        by_family: dict[Any, list[float]] = {}
+        measured = []
+        for one, of_output, given in zip(found, families, records, strict=True):
+            variances = np.diag(one.noise.scatter)
+            if given.seen is not None:
+                measured.append(float(variances.mean()))
+                continue
+            for family, variance in zip(of_output, variances, strict=True):
+                by_family.setdefault(family, []).append(float(variance))
+        medians = {family: float(np.median(variances)) for family, variances in by_family.items()}
+        memory = float(np.median([one.noise.memory for one in found]))
+        return cls(medians, float(np.median(measured)) if measured else None, memory)
+
+    def scatter(self, records: BridgeRecords, families: Sequence[Any]) -> Array | None:
+        """Expected covariance of what a bridge measures; None where the fleet does not tell."""
+        if records.seen is not None:
+            return None if self.measured is None else self.measured * np.eye(len(records.seen))
+        if not self.variances:
+            return None
+        typical = float(np.median(list(self.variances.values())))
+        return np.diag([self.variances.get(family, typical) for family in families])
+
+
+@dataclass(frozen=True)
+class RowNoise:
+    """Covariance of what a row of weight 1 measures, records that tell as much as an independent one, and weights.
+
+    ``robust``, (n_rows,), are at most 1 and smaller for outliers.
+    """
+
+    scatter: Array
+    memory: float
+    robust: Array
+
+    @classmethod
+    def before(cls, z: Array, expected: Array | None, memory: float) -> RowNoise:
+        """That of the fleet, or the variances of what was measured."""
+        if expected is None:
+            expected = np.diag(np.maximum(np.nanvar(z, axis=0), SMALLEST_VARIANCE))
+        return cls(expected, memory, np.ones(len(z)))
+
+    def updated(
+        self, residuals: Array, weights: Array, dof: float, expected: Array | None, fleet_memory: float
+    ) -> RowNoise:
+        """From residuals of a regression with that many degrees of freedom; the fleet's counts as some rows more."""
+        n_rows, n_seen = residuals.shape
+        clean = np.where(self.robust[:, np.newaxis] >= 1, residuals, np.nan)
+        centred = residuals - np.nan_to_num(np.where(np.isnan(clean).all(axis=0), 0.0, _mean(clean)))
+        scaled = centred * np.sqrt(weights)[:, np.newaxis]
+        gaussian = Gaussian(np.zeros(n_seen), self.scatter)
+        squares = np.nan_to_num(gaussian.distances(scaled)) ** 2
+        usual = chi2.ppf(USUAL, (~np.isnan(scaled)).sum(axis=1))
+        robust = np.minimum(1.0, usual / np.maximum(squares, 1e-300))
+        products = np.einsum("t,tij->ij", robust, gaussian.second_moments(scaled))
+        products *= n_rows / max(n_rows - self.memory * dof, LEAST_LEFT * n_rows)
+        if expected is None:  # a bridge of the fleet: only so much that its covariance can be inverted
+            expected, count = np.diag(np.diag(products)) / n_rows, float(n_seen)
+        else:
+            count = PSEUDO_ROWS * fleet_memory
+        scatter = (products + count * expected) / (n_rows + count)
+        scatter += np.diag(JITTER * np.diag(scatter) + SMALLEST_VARIANCE)
+        own = float(np.mean([correlation_time(column) for column in (scaled * np.sqrt(robust)[:, np.newaxis]).T]))
+        memory = max((n_rows * own + count * fleet_memory) / (n_rows + count), 1.0)
+        return RowNoise(scatter, memory, robust)
+
+
+@dataclass(frozen=True)
+class Information:
+    """Gaussian likelihood of a bridge's coefficients: exp(-b'J b / 2 + h'b), levels integrated out (flat prior).
+
+    b holds the coefficients of the basis u(T) of one output after the other. A row is N(level + B'(u - centre), S / w),
+    its precision divided by the memory of the noise. Given b, levels are ``level - gain b`` with ``level_covariance``.
+    """
+
+    J: Array
+    h: Array
+    centre: Array
+    level: Array
+    gain: Array
+    level_covariance: Array
+    noise: RowNoise
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of parameters or modes."""
+        return len(self.level)
+
+    @classmethod
+    def of(
+        cls,
+        basis: FleetBasis,
+        records: BridgeRecords,
+        families: Sequence[Hashable],
+        own: OwnPrior,
+        fleet: FleetNoise | None = None,
+    ) -> Information:
+        """Learn noise, memory and outliers in turn with coefficients that have the bridge's own prior."""
+        u = basis(records.inputs)
+        centre = records.weights @ u / records.weights.sum()
+        level = _mean(records.logs, records.weights)
+        X, y = np.column_stack([np.ones(len(u)), u - centre]), records.logs - level
+        z, q = records.measured(y), records.n_outputs
+        expected = None if fleet is None else fleet.scatter(records, families)
+        memory = 1.0 if fleet is None else fleet.memory
+        noise = RowNoise.before(z, expected, memory)
+        for _ in range(ROUNDS):
+            found = cls.given(noise, records, X, y, level, centre)
+            state = posterior(found.J, found.h, *own.fitted(found.J, found.h, families))
+            dof = 1 + np.einsum("ij,ji->", found.J, state.covariance) / q
+            residuals = z - records.measured(X[:, 1:] @ state.mean.reshape(q, -1).T)
+            noise = noise.updated(residuals, records.weights, dof, expected, memory)
+        return cls.given(noise, records, X, y, level, centre)
+
+    @classmethod
+    def given(
+        cls, noise: RowNoise, records: BridgeRecords, X: Array, y: Array, level: Array, centre: Array
+    ) -> Information:
+        """The information in rows X (a constant first) and y, less their level, for known noise.
+
+        Over levels and coefficients it is the sum over rows of (P kron x x') w / memory, with P = A' S^-1 A, or the
+        inverse of the part of S that a row with gaps has. The Schur complement integrates the levels out.
+        """
+        q, n_columns = y.shape[1], X.shape[1]
+        weights = (records.weights * noise.robust / noise.memory)[:, np.newaxis]
+        J, h = np.zeros((q, n_columns, q, n_columns)), np.zeros((q, n_columns))
+        for mask, rows in rows_by_pattern(~np.isnan(y)):
+            P = np.zeros((q, q))
+            if records.seen is None:
+                P[np.ix_(mask, mask)] = np.linalg.inv(noise.scatter[np.ix_(mask, mask)])
+            else:
+                P = records.seen.T @ np.linalg.solve(noise.scatter, records.seen)
+            weighted = X[rows] * weights[rows]
+            J += np.einsum("ab,ij->aibj", P, X[rows].T @ weighted)
+            h += P @ np.nan_to_num(y[rows]).T @ weighted
+        size = q * (n_columns - 1)
+        level_covariance = np.linalg.inv(J[:, 0, :, 0] + np.diag(records.level_precision))
+        cross, own = J[:, 0, :, 1:].reshape(q, size), level_covariance @ h[:, 0]
+        gain = level_covariance @ cross
+        return cls(
+            J[:, 1:, :, 1:].reshape(size, size) - cross.T @ gain,
+            h[:, 1:].ravel() - cross.T @ own,
+            centre,
+            level + own,
+            gain,
+            level_covariance,
+            noise,
+        )
+
+
+def _mean(values: Array, weights: Array | None = None) -> Array:
+    """Means of columns over the rows that have a value, 0 without any."""
+    known = ~np.isnan(values)
+    shares = known * (1.0 if weights is None else weights[:, np.newaxis])
+    return (shares * np.nan_to_num(values)).sum(axis=0) / np.maximum(shares.sum(axis=0), 1e-300)

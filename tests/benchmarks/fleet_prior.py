@@ -1,0 +1,408 @@
+"""What a fleet's prior gives to a new bridge: errors of a later year after 15, 30, 60 and 120 days.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --bridges 50 --groups 50 --seeds 0 1
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --quick
+
+Bridges of `make_fleet` with gaps, outliers and noise that lasts. In turn each is the new one: groups of bridges are
+left out, the others give a year (2025), the new one its first days from January or from July 2026 on, and its clean
+frequencies of 2027 are predicted. Errors are mean absolute percent over records and modes. Ways to predict:
+
+alone     the library without a fleet: `TemperatureMapper` in the chain, or for frequencies
+mean      the mean response to the weather of the other bridges of its kind, at the bridge's own level
+pooled    one regression on the records of all bridges of its kind, each at its own level, in which every coefficient
+          depends on material, span and latitude; its penalty by leaving out bridges
+ridge     the bridge's own ridge regression towards that mean, its penalty chosen by what would have predicted the
+          others' later records best after as many days from the same date
+prior     ``FleetPrior().fit(...).mapper(covariates=...)``, covariates kind, material, span and latitude
+own year  alone, with all of 2026
+
+Everything is done twice: on frequencies alone, and in chains with the FE models that come with the bridges (``mean``,
+``pooled`` and ``ridge`` then predict ln theta). Then new bridges with thermal laws of their own come to the fleet; then
+to a fleet in which every bridge has such laws. Shares of measured records within 90 % intervals are given for all: for
+frequencies alone, of the posterior and the scatter of the bridge's own residuals.
+
+Targets: the prior's mean error is below that of alone and no more than 2 % above the best of mean, pooled and ridge, at
+each number of days and start; with aliens at most 5 % above alone; 85 to 95 % of the records of the year are in
+intervals of 90 %. The exit code is 1 if one is missed.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+from collections import defaultdict
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from sklearn.linear_model import RidgeCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from skthermo.datasets import make_fleet
+from skthermo.fleet import FleetPrior
+from skthermo.preprocessing import BiasAligner, HingeFeatures, SensorMeans
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+DAYS = (15, 30, 60, 120)
+STARTS = {"winter": "2026-01-01", "summer": "2026-07-01"}
+PENALTIES = np.logspace(-3, 6, 19)
+COMPETITORS = ("mean", "pooled", "ridge")
+CLOSE, LOSS, LEAST, MOST = 1.02, 1.05, 0.85, 0.95
+CONFIDENCE, QUANTILE = 0.9, 1.645
+
+
+class Frequencies:
+    """A bridge without FE model: the quantities are its frequencies."""
+
+    def __init__(self, bridge):
+        self.bridge = bridge
+
+    def year(self, start, days=365):
+        """Means of the thermometers by role, frequencies, clean frequencies."""
+        records = self.bridge.records(days, start)
+        return SensorMeans(self.bridge.roles).fit_transform(records.temperatures), records
+
+    @cached_property
+    def of_fleet(self):
+        """What it gives to the fleet: its pair of tables."""
+        X, records = self.year("2025-01-01")
+        return X, records.frequencies
+
+    def pair(self):
+        """Inputs and logarithms of its year in the fleet."""
+        X, F = self.of_fleet
+        return X.to_numpy(), np.log(F.to_numpy())
+
+    def fitted(self, mapper, start, days):
+        """Predictions of the judged year by a mapper that has seen the first days, and their intervals."""
+        X, records = self.year(start, days)
+        judged, later = self.judged
+        complete = judged.notna().all(axis=1).to_numpy()
+        centre = np.full(later.frequencies.shape, np.nan)
+        spread = np.zeros_like(centre)
+        if hasattr(mapper, "prior"):
+            mapper.fit(X, records.frequencies)
+            centre[complete] = mapper.predict(judged[complete])
+            spread[complete] = np.sqrt(np.einsum("tii->ti", mapper.predict_covariance(judged[complete])))
+            at = X.notna().all(axis=1).to_numpy()
+            left = records.frequencies[at].to_numpy() - mapper.predict(X[at]).to_numpy()
+            noise = 1.4826 * np.nanmedian(np.abs(left), axis=0) * np.sqrt(days / (days - 3))
+            half = QUANTILE * np.sqrt(spread**2 + noise**2)
+            return centre, (centre - half, centre + half)
+        for i, mode in enumerate(records.frequencies):
+            f = records.frequencies[mode]
+            known = f.notna() & X.notna().all(axis=1)
+            centre[complete, i] = np.ravel(TemperatureMapper().fit(X[known], f[known]).predict(judged[complete]))
+        return centre, None
+
+    @cached_property
+    def judged(self):
+        """Inputs and records of the judged year."""
+        return self.year("2027-01-01")
+
+    def by_logs(self, start, days, predict):
+        """Predictions of the judged year by a function of (X, logs, X judged) that predicts logs."""
+        X, records = self.year(start, days)
+        return np.exp(predict(X.to_numpy(), np.log(records.frequencies.to_numpy()), self.judged[0].to_numpy()))
+
+
+class Chain(Frequencies):
+    """A bridge with its FE model: the quantities are the model's parameters."""
+
+    def __init__(self, bridge):
+        super().__init__(bridge)
+        self.alone = {}
+
+    def chain(self, mapper):
+        """The chain, as a user would set it up."""
+        quadratic = make_pipeline(StandardScaler(), PolynomialFeatures(2), RidgeCV(np.logspace(-8, 2, 11)))
+        return DataInformedFEM(
+            self.bridge.model,
+            inverse=InverseSurrogate(regressor=quadratic, refine=3, noise=0.004),
+            mapper=make_pipeline(SensorMeans(self.bridge.roles), mapper),
+            aligner=BiasAligner(method="scale"),
+            random_state=0,
+        )
+
+    def chain_alone(self, start, days):
+        """The chain without a fleet, fitted once."""
+        if (start, days) not in self.alone:
+            records = self.bridge.records(days, start)
+            self.alone[start, days] = self.chain(TemperatureMapper()).fit(records.temperatures, records.frequencies)
+        return self.alone[start, days]
+
+    @cached_property
+    def of_fleet(self):
+        return self.chain_alone("2025-01-01", 365)
+
+    def pair(self):
+        known = self.of_fleet.records_
+        return np.asarray(known.inputs), np.log(known.targets)
+
+    def fitted(self, mapper, start, days):
+        records, later = self.bridge.records(days, start), self.judged[1]
+        if hasattr(mapper, "prior"):
+            chain = self.chain(mapper).fit(records.temperatures, records.frequencies)
+        else:
+            chain = self.chain_alone(start, days)
+        lower, upper = (np.asarray(end) for end in chain.predict_interval(later.temperatures, confidence=CONFIDENCE))
+        return np.asarray(chain.predict(later.temperatures)), (lower, upper)
+
+    def by_logs(self, start, days, predict):
+        chain = self.chain_alone(start, days)
+        known = chain.records_
+        logs = predict(np.asarray(known.inputs), np.log(known.targets), self.judged[0].to_numpy())
+        complete = ~np.isnan(logs).any(axis=1)
+        F = np.full((len(logs), len(self.bridge.noise)), np.nan)
+        F[complete] = chain.aligner_.inverse_transform(self.bridge.model.frequencies(np.exp(logs[complete])))
+        return F
+
+
+class Competitors:
+    """Mean, pooled regression and ridge of bridges of one kind, on one basis of broken lines."""
+
+    def __init__(self, members, covariates):
+        tables = {name: member.pair() for name, member in members.items()}
+        everything = np.concatenate([X[~np.isnan(X).any(axis=1)] for X, _ in tables.values()])
+        self.basis = make_pipeline(HingeFeatures(), StandardScaler()).fit(everything)
+        self.years = {name: (self.of(X), y) for name, (X, y) in tables.items()}
+        self.own = {name: self.year_alone(U, y) for name, (U, y) in self.years.items()}
+        self.covariates = covariates
+        self.penalties = {}
+        self.pooled = self.fit_pooled()
+
+    def of(self, X):
+        """The basis; NaN where an input is."""
+        U = np.full((len(X), 5 * X.shape[1]), np.nan)
+        known = ~np.isnan(X).any(axis=1)
+        U[known] = self.basis.transform(X[known])
+        return U
+
+    @staticmethod
+    def year_alone(U, y):
+        """Coefficients of a bridge's own year, an array (n_functions, n_outputs)."""
+        known = [~np.isnan(U).any(axis=1) & ~np.isnan(column) for column in y.T]
+        return np.column_stack(
+            [RidgeCV(np.logspace(-3, 5, 17)).fit(U[k], c[k]).coef_ for k, c in zip(known, y.T, strict=True)]
+        )
+
+    def mean(self, without=None):
+        """Mean of the coefficients."""
+        return np.mean([beta for name, beta in self.own.items() if name != without], axis=0)
+
+    @staticmethod
+    def predict(beta, U, y, U_new):
+        """Logarithms by given coefficients, at the level of the bridge's own records."""
+        level = np.nanmean(y - U @ beta, axis=0)
+        return level + U_new @ beta
+
+    @staticmethod
+    def towards(mean, penalty, U, y):
+        """Coefficients of a ridge regression towards a mean, each output at its own level."""
+        beta = np.empty_like(mean)
+        for i, column in enumerate(y.T):
+            k = ~np.isnan(U).any(axis=1) & ~np.isnan(column)
+            u, left = U[k] - U[k].mean(axis=0), column[k] - U[k] @ mean[:, i]
+            beta[:, i] = mean[:, i] + np.linalg.solve(
+                u.T @ u + penalty * np.eye(u.shape[1]), u.T @ (left - left.mean())
+            )
+        return beta
+
+    def penalty(self, start, days):
+        """What predicts the others' later records best after as many days from the same date of their year."""
+        if (start, days) not in self.penalties:
+            first = (pd.Timestamp(start) - pd.Timestamp("2026-01-01")).days
+            errors = np.zeros(len(PENALTIES))
+            for name, (U, y) in self.years.items():
+                early, later = slice(first, first + days), np.r_[0:first, first + days : len(U)]
+                mean = self.mean(without=name)
+                for i, penalty in enumerate(PENALTIES):
+                    beta = self.towards(mean, penalty, U[early], y[early])
+                    errors[i] += np.nanmean(np.abs(self.predict(beta, U[early], y[early], U[later]) - y[later]))
+            self.penalties[start, days] = PENALTIES[errors.argmin()]
+        return self.penalties[start, days]
+
+    def known(self, name):
+        """Covariates of a bridge as numbers, centred."""
+        row = self.covariates.loc[name]
+        mates = self.covariates.loc[list(self.years)]
+        numbers = [(row[c] - mates[c].mean()) / max(mates[c].std(), 1e-9) for c in ("span", "latitude")]
+        return np.array([1.0, *numbers, float(row["material"] == "composite")])
+
+    def fit_pooled(self):
+        """Coefficients of basis times covariates, every bridge at its own level; the penalty by bridges left out."""
+        found = []
+        for i in range(next(iter(self.own.values())).shape[1]):
+            tables = []
+            for name, (U, y) in self.years.items():
+                k = ~np.isnan(U).any(axis=1) & ~np.isnan(y[:, i])
+                x, left = np.kron(self.known(name), U[k] - U[k].mean(axis=0)), y[k, i] - y[k, i].mean()
+                tables.append((x.T @ x, x.T @ left, left @ left))
+            G, g, _ = (sum(parts) for parts in zip(*tables, strict=True))
+            eye, errors = np.eye(len(g)), []
+            for penalty in PENALTIES:
+                betas = [np.linalg.solve(G - A + penalty * eye, g - b) for A, b, _ in tables]
+                errors.append(
+                    sum(c - 2 * beta @ b + beta @ A @ beta for beta, (A, b, c) in zip(betas, tables, strict=True))
+                )
+            found.append(np.linalg.solve(G + PENALTIES[np.argmin(errors)] * eye, g))
+        return np.column_stack(found)
+
+    def ways(self, name, start, days):
+        """A function of (X, logs, X judged) for each way."""
+        z = self.known(name)
+        pooled = np.einsum("k,kio->io", z, self.pooled.reshape(len(z), -1, self.pooled.shape[1]))
+
+        def with_own(X, y, X_new):
+            U = self.of(X)
+            return self.predict(self.towards(self.mean(), self.penalty(start, days), U, y), U, y, self.of(X_new))
+
+        def by(beta):
+            return lambda X, y, X_new: self.predict(beta, self.of(X), y, self.of(X_new))
+
+        return {"mean": by(self.mean()), "pooled": by(pooled), "ridge": with_own}
+
+
+def share_inside(ends, measured):
+    """Share of measured frequencies inside their intervals."""
+    lower, upper = ends
+    known = ~np.isnan(measured) & ~np.isnan(lower)
+    return ((measured >= lower) & (measured <= upper))[known].mean()
+
+
+def judge(member, new, start, days, ways):
+    """Errors in percent, and shares in intervals, of all ways to predict one bridge."""
+    truth = member.judged[1]
+    clean, measured = truth.clean_frequencies.to_numpy(), truth.frequencies.to_numpy()
+    found = {}
+    for way, mapper in ways.items():
+        if callable(mapper):
+            centre, ends = member.by_logs(start, days, mapper), None
+        else:
+            centre, ends = member.fitted(mapper, start, days)
+        found[way] = (100 * np.nanmean(np.abs(centre / clean - 1)), share_inside(ends, measured) if ends else np.nan)
+    return [{"bridge": new, "days": days, "way": way, "error": e, "inside": share} for way, (e, share) in found.items()]
+
+
+def campaign_rows(world, fleet, groups, days_asked, starts, newcomers=None):
+    """A row for each new bridge, start, number of days and way; each bridge is new, or the newcomers are."""
+    members = {name: world(bridge) for name, bridge in fleet.items()}
+    names, rows = list(members), []
+    folds = [list(part) for part in np.array_split(names, groups)] if newcomers is None else [list(newcomers)]
+    strangers = {} if newcomers is None else {name: world(bridge) for name, bridge in newcomers.items()}
+    covariates = fleet.covariates if newcomers is None else pd.concat([fleet.covariates, newcomers.covariates])
+    seconds = 0.0
+    for fold in folds:
+        known = {name: member for name, member in members.items() if name not in fold}
+        begun = time.process_time()
+        prior = FleetPrior().fit({n: m.of_fleet for n, m in known.items()}, covariates=covariates.loc[list(known)])
+        seconds += time.process_time() - begun
+        kinds = defaultdict(dict)
+        for name, member in known.items():
+            kinds[member.bridge.kind][name] = member
+        by_kind = {kind: Competitors(mates, covariates) for kind, mates in kinds.items()}
+        for name in fold:
+            member = strangers.get(name) or members[name]
+            year = judge(member, name, "2026-01-01", 365, {"own year": TemperatureMapper()})
+            for label in starts:
+                start = STARTS[label]
+                for days in days_asked:
+                    ways = {"alone": TemperatureMapper()}
+                    ways |= by_kind[member.bridge.kind].ways(name, start, days)
+                    ways |= {"prior": prior.mapper(covariates=member.bridge.covariates)}
+                    found = judge(member, name, start, days, ways) + [row | {"days": days} for row in year]
+                    about = {"start": label, "kind": member.bridge.kind, "alien": member.bridge.alien or ""}
+                    rows += [row | about for row in found]
+            if hasattr(member, "alone"):
+                member.alone.clear()
+    return pd.DataFrame(rows), seconds, prior
+
+
+def table(rows, by=("start", "days"), what="error", how="mean"):
+    """A row for each number of days, a column for each way."""
+    order = ["alone", *COMPETITORS, "prior", "own year"]
+    found = rows.pivot_table(index=list(by), columns="way", values=what, aggfunc=how, sort=False, dropna=True)
+    return found[[way for way in order if way in found]]
+
+
+def shown(title, frame):
+    print(f"\n{title}\n{frame.round(3).to_string()}", flush=True)
+
+
+def misses_of(label, rows):
+    """Targets that the rows miss."""
+    missed, errors = [], table(rows)
+    for (start, days), row in errors.iterrows():
+        where = f"{label}, {start}, {days} days"
+        best = row[list(COMPETITORS)].min()
+        if row["prior"] >= row["alone"]:
+            missed.append(f"{where}: prior {row['prior']:.3f} %, alone {row['alone']:.3f} %")
+        if row["prior"] > CLOSE * best:
+            name = row[list(COMPETITORS)].idxmin()
+            missed.append(f"{where}: prior {row['prior']:.3f} %, {name} {best:.3f} %")
+    for (start, days), share in (
+        rows[rows["way"] == "prior"].groupby(["start", "days"], sort=False)["inside"].mean().items()
+    ):
+        if not LEAST <= share <= MOST:
+            missed.append(f"{label}, {start}, {days} days: {100 * share:.1f} % of records in intervals of 90 %")
+    return missed
+
+
+def losses_of(label, rows):
+    """Where a fleet costs more than is allowed."""
+    errors = table(rows)
+    worse = errors[errors["prior"] > LOSS * errors["alone"]]
+    return [f"{label}, {i}: prior {row['prior']:.3f} %, alone {row['alone']:.3f} %" for i, row in worse.iterrows()]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bridges", type=int, default=50)
+    parser.add_argument("--groups", type=int, default=10, help="left out in turn; as many as bridges: one by one")
+    parser.add_argument("--newcomers", type=int, default=12, help="bridges with laws of their own")
+    parser.add_argument("--days", type=int, nargs="+", default=DAYS)
+    parser.add_argument("--starts", nargs="+", choices=list(STARTS), default=list(STARTS))
+    parser.add_argument("--worlds", nargs="+", choices=["frequencies", "chains"], default=["frequencies", "chains"])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--quick", action="store_true", help="9 bridges, 3 groups, 60 days from winter")
+    options = parser.parse_args()
+    if options.quick:
+        options.bridges, options.groups, options.newcomers = 9, 3, 3
+        options.days, options.starts = (60,), ["winter"]
+    warnings.simplefilter("ignore")  # few days and unseen weather are what this is about
+    missed = []
+    for seed in options.seeds:
+        fleet = make_fleet(options.bridges, random_state=seed)
+        lawless = make_fleet(max(options.bridges // 2, 9), aliens=1.0, random_state=100 + seed)
+        strangers = make_fleet(options.newcomers, aliens=1.0, random_state=200 + seed)
+        strangers = type(strangers)([type(b)(f"alien {n}", b.kind, b.seed, b.alien) for n, b in strangers.items()])
+        for name in options.worlds:
+            world = {"frequencies": Frequencies, "chains": Chain}[name]
+            label = f"{name}, seed {seed}"
+            rows, seconds, prior = campaign_rows(world, fleet, options.groups, options.days, options.starts)
+            shown(f"{label}: mean error, % ({len(fleet)} bridges, {options.groups} groups)", table(rows))
+            shown(f"{label}: median error, %", table(rows, how="median"))
+            shown(f"{label}: mean error by kind, %", table(rows, by=("kind", "start", "days")))
+            shown(f"{label}: share of records in 90 % intervals", table(rows, what="inside"))
+            if (rows["alien"] != "").any():
+                shown(f"{label}: mean error of the aliens among them, %", table(rows[rows["alien"] != ""]))
+            print(prior.summary())
+            print(f"a prior of {len(fleet) - len(fleet) // options.groups} bridges: {seconds / options.groups:.1f} s")
+            missed += misses_of(label, rows)
+            rows, *_ = campaign_rows(world, fleet, 1, options.days, options.starts, strangers)
+            shown(f"{label}: new bridges with thermal laws of their own, mean error, %", table(rows))
+            shown(f"{label}: the same by law", table(rows, by=("alien", "days")))
+            missed += losses_of(f"{label}, aliens", rows)
+            groups = min(options.groups, 5)
+            rows, _, prior = campaign_rows(world, lawless, groups, options.days, options.starts)
+            shown(f"{label}: a fleet of bridges with thermal laws of their own, mean error, %", table(rows))
+            print(prior.summary(), flush=True)
+            missed += losses_of(f"{label}, fleet of aliens", rows)
+    print("\nmissed:", *missed or ["nothing"], sep="\n")
+    sys.exit(bool(missed))
+
+
+if __name__ == "__main__":
+    main()
