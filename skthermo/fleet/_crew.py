@@ -85,6 +85,6 @@ def _refuse_what_cannot_travel(tasks: Mapping[Hashable, Any], error: Exception) 
 
 def _killed(error: Exception) -> Failure:
     """What is said of a task whose process was killed each time."""
-    reason = str(error).strip().partition("\n")[0]
+    first = str(error).strip().partition("\n")[0].partition(". ")[0]
     text = "its process was killed each time, also when it was alone: was it out of memory?"
-    return Failure("process", type(error).__name__, f"{text} ({reason})", "")
+    return Failure("process", type(error).__name__, f"{text} ({first})", "")

@@ -88,26 +88,26 @@ class Discoveries:
 
 
 def discover(
-    monitors: Mapping[Hashable, Any], states: Mapping[Hashable, str], share: float, days: float
+    monitors: Mapping[Hashable, Any], standings: Mapping[Hashable, Mapping[str, Any]], share: float, days: float
 ) -> Discoveries:
     """Compare the events of all monitors that were open within so many days before the newest record of all."""
     share = check_size(share, "share", 0, 1, "a number between 0 and 1, such as 0.1")
     window = pd.Timedelta(days=check_size(days, "days", 0, np.inf, "a number of days, such as 365"))
-    now = max(_in_utc(monitors[name].last_) for name in monitors)
+    begin = max((without_zone(standings[name]["last"]) for name in _seen(standings)), default=pd.NaT) - window
     tables, p_values, years, promised, not_judged = [], {}, {}, 0.0, []
     for name in monitors:
-        monitor = monitors[name]
-        promised += monitor.promise_.expected
-        since = (now - window).tz_convert(monitor.last_.tz) if monitor.last_.tz else (now - window).tz_localize(None)
-        chances = monitor.event_chances(since)
-        n_years = monitor.years_watched(since)
-        events = monitor.events_.loc[chances.index]
-        table = events.assign(p_value=chances)[~events["harmless"].astype(bool)]
-        if (states[name] == "not judged" and not len(table)) or not (n_years or len(table)):
+        try:
+            monitor = monitors[name]
+            promised += monitor.promise_.expected
+            table, n_years = _compared(monitor, begin)
+        except Exception:  # damaged files raise errors of every type, and the table of errors tells them
             not_judged.append(name)
             continue
-        p_values[name] = table["p_value"].min() if table["p_value"].notna().any() else 1.0
-        years[name] = max(n_years, monitor.years_watched(table["start"].min()) if len(table) else 0.0)
+        is_blind = standings[name]["state"] == "not judged" or not n_years
+        if (is_blind and not len(table)) or table["p_value"].isna().any():
+            not_judged.append(name)
+            continue
+        p_values[name], years[name] = table["p_value"].min() if len(table) else 1.0, n_years
         table = table.reset_index()
         table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
         tables.append(table)
@@ -131,6 +131,22 @@ def _limits(p_values: Any, share: float, method: Literal["bh", "by"] = METHOD) -
     return (float(called.max()) if len(called) else -1.0), share * max(len(called), 1) / (n * weight)
 
 
-def _in_utc(stamp: pd.Timestamp) -> pd.Timestamp:
-    """Stamps without a time zone count as those of UTC."""
-    return stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")
+def _compared(monitor: Any, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
+    """Events of a monitor with their p values, and the years that it has watched since then, or since the first."""
+    if not len(monitor.days_) or pd.isna(begin):
+        return monitor.events_.iloc[:0].assign(p_value=0.0), 0.0
+    since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
+    chances = monitor.event_chances(since)
+    table = monitor.events_.loc[chances.index].assign(p_value=chances)
+    table = table[~table["harmless"].astype(bool)]
+    return table, monitor.years_watched(min([since, *table.loc[table["end"].isna(), "start"]]))
+
+
+def _seen(standings: Mapping[Hashable, Mapping[str, Any]]) -> list[Hashable]:
+    """Bridges of which there is a record since the fit."""
+    return [name for name, standing in standings.items() if not pd.isna(standing["last"])]
+
+
+def without_zone(stamp: pd.Timestamp) -> pd.Timestamp:
+    """A stamp of UTC without a time zone, by which those of all bridges can be compared."""
+    return stamp if stamp.tzinfo is None else stamp.tz_convert("UTC").tz_localize(None)

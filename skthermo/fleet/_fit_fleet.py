@@ -97,11 +97,8 @@ def fit_fleet(
     >>> fleet = fit_fleet(dict.fromkeys(records, LinearRegression()), records)
     >>> fleet
     Fleet(2 bridges, 2 fitted)
-    >>> fleet.table[["is_fitted", "n_records"]]
-            is_fitted  n_records
-    bridge
-    north        True        365
-    south        True        365
+    >>> fleet.table["n_records"].to_dict()
+    {'north': 365, 'south': 365}
     """
     _check_names(makers, records)
     check_jobs(n_jobs)
@@ -120,9 +117,8 @@ def fit_fleet(
         kept.outcomes = {name: kept.outcomes[name] for name in makers if name in kept.outcomes}
         n_done = 0
         try:
-            for name, result in with_progress(
-                work_off(tasks, n_jobs), len(tasks), progress, count=_one, unit="bridges"
-            ):
+            work = work_off(tasks, n_jobs)
+            for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 if not result.is_as_before:
                     kept.put(result.outcome, result.fitted)
                 elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
@@ -135,10 +131,6 @@ def fit_fleet(
     fleet = Fleet._of(kept)
     warn_of_fleet(fleet)
     return fleet
-
-
-def _one(_: Any) -> int:
-    return 1
 
 
 def _restore(kept: Kept, name: Hashable) -> None:

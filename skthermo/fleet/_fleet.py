@@ -15,11 +15,10 @@ from skthermo._io import with_progress
 from skthermo._warnings import warn_user
 from skthermo.fleet._bridge import NOT_WATCHED, Outcome, Update, unpickled
 from skthermo.fleet._crew import work_off
-from skthermo.fleet._discoveries import Discoveries, discover
+from skthermo.fleet._discoveries import Discoveries, discover, without_zone
+from skthermo.fleet._in_words import in_words, kinds, named
 from skthermo.fleet._kept import Kept
 
-MOST_NAMED = 5  # bridges or kinds in a sentence
-SILENT = 7  # days without a record, after which a bridge counts as silent
 ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
 
 
@@ -125,7 +124,7 @@ class Fleet:
         rows = [_row(one) for one in self._outcomes.values()]
         names = pd.Index(list(self._outcomes), name="bridge", tupleize_cols=False)
         table = pd.DataFrame(rows, index=names)
-        last = pd.Series([_utc(stamp) for stamp in table["last"]], index=names, dtype="datetime64[ns]")
+        last = pd.Series([without_zone(stamp) for stamp in table["last"]], index=names, dtype="datetime64[ns]")
         table.insert(table.columns.get_loc("last") + 1, "days_silent", (last.max() - last) / pd.Timedelta("1D"))
         warned = self.warnings
         counts = warned.groupby(["bridge", "kind"], sort=False)["times"].sum().unstack(fill_value=0)
@@ -251,7 +250,8 @@ class Fleet:
         """
         if not len(self.monitors):
             raise ValueError("no bridge has a monitor; expected fit_fleet(..., monitor=function of a chain)")
-        return discover(self.monitors, self._states_by_name(), share, days)
+        standings = {name: self._outcomes[name].standing for name in self.monitors}
+        return discover(self.monitors, standings, share, days)
 
     def summary(self) -> str:
         """How many bridges were fitted, failed, and are in which state, in a few lines.
@@ -261,13 +261,10 @@ class Fleet:
         str
             Plain sentences.
         """
-        return "\n".join(_sentences(self))
-
-    def _states_by_name(self) -> dict[Hashable, str]:
-        return {name: one.standing["state"] for name, one in self._outcomes.items()}
+        return in_words(self)
 
     def _states(self) -> dict[str, int]:
-        return pd.Series(list(self._states_by_name().values()), dtype=object).value_counts().to_dict()
+        return pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts().to_dict()
 
 
 class ReadWhenAsked(Mapping):
@@ -300,56 +297,6 @@ def _row(one: Outcome) -> dict[str, Any]:
     return first | standing | {"seconds": one.seconds, "megabytes": one.n_bytes / 1e6}
 
 
-def _utc(stamp: Any) -> Any:
-    """A stamp without a time zone, by which those of all bridges can be compared."""
-    return stamp.tz_convert("UTC").tz_localize(None) if getattr(stamp, "tzinfo", None) is not None else stamp
-
-
-def _sentences(fleet: Fleet) -> Iterator[str]:
-    table = fleet.table
-    broken = table.index[~table["is_fitted"]]
-    yield f"{int(table['is_fitted'].sum())} of {len(table)} bridges are fitted."
-    if len(broken):
-        yield f"Not fitted: {_named(broken)}."
-    fitted = table[table["is_fitted"]]
-    watched = fitted[fitted["state"] != ""]
-    if len(watched) < len(fitted):
-        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor: nothing is known of their state."
-    if len(watched):
-        state = watched["state"]
-        yield (
-            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not judged').sum()} "
-            f"cannot judge, {(state == 'healthy').sum()} saw no change in their newest record."
-        )
-        if (state == "alarm").any():
-            yield f"In alarm: {_named(watched.index[state == 'alarm'])}."
-        if (state == "not judged").any():
-            yield f"Not judged, and so not known to be healthy: {_named(watched.index[state == 'not judged'])}."
-        silent = watched.index[(state != "not judged") & (watched["days_silent"] > SILENT)]
-        if len(silent):
-            yield f"Without a record for more than {SILENT} days before the newest of all: {_named(silent)}."
-    failed = fitted.index[fitted["error"] != ""]
-    if len(failed):
-        yield f"Fitted, but with an error since: {_named(failed)}."
-    warned = fleet.warnings
-    if len(warned):
-        yield f"Warnings: {_kinds(warned)}."
-
-
-def _named(names: Any) -> str:
-    """The first names, and how many there are besides."""
-    shown = ", ".join(str(name) for name in names[:MOST_NAMED])
-    return shown if len(names) <= MOST_NAMED else f"{shown} and {len(names) - MOST_NAMED} more"
-
-
-def _kinds(warned: pd.DataFrame) -> str:
-    """Kinds of warnings by how many bridges gave them."""
-    numbers = warned.groupby("kind")["bridge"].nunique().sort_values(ascending=False, kind="stable")
-    shown = [f"{kind!r} of {counted(number, 'bridge')}" for kind, number in numbers.iloc[:MOST_NAMED].items()]
-    rest = [f"{len(numbers) - MOST_NAMED} other kinds"] if len(numbers) > MOST_NAMED else []
-    return ", ".join(shown + rest).replace("\N{NO-BREAK SPACE}", " ")
-
-
 def warn_of_fleet(fleet: Fleet, names: list[Hashable] | None = None, stage: str = "fit") -> None:
     """One warning for all bridges that failed, and one for all of their warnings."""
     asked = list(fleet._outcomes) if names is None else names
@@ -357,7 +304,7 @@ def warn_of_fleet(fleet: Fleet, names: list[Hashable] | None = None, stage: str 
     if failed:
         first = fleet._outcomes[failed[0]].failures[0]
         warn_user(
-            f"{len(failed)} of {len(asked)} bridges have failed ({_named(failed)}), the first with {first!s:.300}; "
+            f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}; "
             "expected none: see fleet.errors",
             "bridges that failed",
         )
@@ -365,6 +312,6 @@ def warn_of_fleet(fleet: Fleet, names: list[Hashable] | None = None, stage: str 
     warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
     if len(warned):
         warn_user(
-            f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {_kinds(warned)}; see fleet.warnings",
+            f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}; see fleet.warnings",
             "warnings of bridges",
         )
