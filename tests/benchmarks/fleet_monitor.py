@@ -221,7 +221,7 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
     }
 
 
-def rows_of(kind, bridge, number, days_of, with_chains, scale, severities):
+def rows_of(kind, bridge, number, days_of, with_chains, scale, severities, wanted):
     start = pd.Timestamp("2025-01-01") + pd.Timedelta(days=int(np.random.default_rng(number).integers(0, 365)))
     longest = max(days_of)
     records = history(bridge, longest + 365, start)
@@ -233,6 +233,8 @@ def rows_of(kind, bridge, number, days_of, with_chains, scale, severities):
     for days in days_of:
         baseline = healthy[first - days * PER_DAY : first]
         for name, detector in detectors(kind, bridge, modes, days, with_chains, scale).items():
+            if wanted is not None and name not in wanted:
+                continue
             row = {"kind": kind.kind, "bridge": bridge.name, "alien": bridge.is_alien, "days": days, "detector": name}
             try:
                 found = served(detector, modes, baseline, healthy[first:], damaged, number == 0)
@@ -247,6 +249,7 @@ def main():
     parser.add_argument("--fleet", type=int, default=40, help="bridges of each kind with a year of records")
     parser.add_argument("--new", type=int, default=12, help="new bridges of each kind")
     parser.add_argument("--days", type=int, nargs="+", default=list(DAYS))
+    parser.add_argument("--detectors", nargs="+", help="only these")
     parser.add_argument("--scale", choices=["global", "local"], help="of the compensators; by default none")
     parser.add_argument("--severities", type=float, nargs="+", default=list(SEVERITIES), help="of the damage")
     parser.add_argument("--seed", type=int, default=0)
@@ -261,7 +264,9 @@ def main():
         one = Kind(kind, options.fleet, options.new, options.seed, options.chains)
         print(f"{kind}: fleet of {options.fleet} after {time.perf_counter() - begun:.0f} s", flush=True)
         for number, bridge in enumerate(one.new):
-            rows += rows_of(one, bridge, number, options.days, options.chains, options.scale, options.severities)
+            rows += rows_of(
+                one, bridge, number, options.days, options.chains, options.scale, options.severities, options.detectors
+            )
     table = pd.DataFrame(rows)
     found = [f"found {severity:.0%}" for severity in options.severities]
     numbers = ["promised", "events", "within", "in alarm", *found, "threshold", "highest"]
