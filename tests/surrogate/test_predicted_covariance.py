@@ -151,6 +151,6 @@ def test_damage_is_identified_and_studies_run_on_a_chain_that_stands_on_a_fleet(
     assert found.table["probability"].idxmax() == "pier"
     assert abs(found.table.loc["pier", "severity"] - 0.15) < 0.05
     detector = make_pipeline(TemperatureCompensator(fem, targets=list(F)), MahalanobisDetector())
-    rates = DetectabilityStudy(fem, detector, [{"pier": 0.15}], n_repeats=2, random_state=0).run(T[:200])
-    by_scenario = rates.groupby("scenario")["rate"].mean()
-    assert by_scenario.max() > 0.3 > 0.1 > by_scenario["healthy"]
+    study = DetectabilityStudy(fem, detector, [{"pier": 0.15}], n_repeats=1, uncertainty="noise", random_state=0)
+    rates = study.run(T[:60]).groupby("measure")["rate"].mean()
+    assert rates["POD"] > 0.9
