@@ -327,6 +327,15 @@ def table(rows, by=("start", "days"), what="error", how="mean"):
     return found[[way for way in order if way in found]]
 
 
+def losses(rows):
+    """By start and days: share of bridges that lose more than 5 % against alone, and the largest ratio of errors."""
+    errors = table(rows, by=("start", "days", "bridge"))
+    ratios = (errors["prior"] / errors["alone"]).groupby(["start", "days"], sort=False)
+    return pd.DataFrame(
+        {"more than 5 % worse": ratios.apply(lambda r: (r > LOSS).mean()), "largest ratio": ratios.max()}
+    )
+
+
 def shown(title, frame):
     print(f"\n{title}\n{frame.round(3).to_string()}", flush=True)
 
@@ -384,6 +393,7 @@ def main():
             rows, seconds, prior = campaign_rows(world, fleet, options.groups, options.days, options.starts)
             shown(f"{label}: mean error, % ({len(fleet)} bridges, {options.groups} groups)", table(rows))
             shown(f"{label}: median error, %", table(rows, how="median"))
+            shown(f"{label}: bridges that lose by the prior", losses(rows))
             shown(f"{label}: mean error by kind, %", table(rows, by=("kind", "start", "days")))
             shown(f"{label}: share of records in 90 % intervals", table(rows, what="inside"))
             if (rows["alien"] != "").any():
