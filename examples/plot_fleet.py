@@ -34,8 +34,8 @@ options = command_line().parse_args()
 # Thermometers differ from bridge to bridge: the means of those in the air and of those in the deck are inputs that all
 # bridges have. Chains and records are made in the workers.
 
-campaign = make_fleet(16, kinds=("truss", "girder"), random_state=0)
-known, new = list(campaign)[:12], list(campaign)[12:]
+campaign = make_fleet(20, kinds=("truss", "girder"), random_state=0)
+known, new = list(campaign)[:16], list(campaign)[16:]
 
 
 def make_chain(name, mapper=None):

@@ -29,7 +29,30 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
     ],
     ("preprocessing/_sensors.py", "preprocessing/test_sensors.py"): [
-        ("a failing sensor that moves the mean", "level = values - self.offsets_", "level = values - 0 * self.offsets_"),
+        (
+            "a failing sensor that moves the mean",
+            "level = values - self.offsets_",
+            "level = values - 0 * self.offsets_",
+        ),
+    ],
+    ("_gaussian.py", "detection/test_known_errors.py"): [
+        (
+            "known errors that count as scatter",
+            "precisions(covariance + errors, present)",
+            "precisions(covariance, present)",
+        ),
+    ],
+    ("surrogate/chain/_data_informed.py", "surrogate/test_predicted_covariance.py"): [
+        (
+            "covariance in the model's domain",
+            "slopes[:, :, np.newaxis] * jacobian",
+            "slopes[:, :1, np.newaxis] ** 0 * jacobian",
+        ),
+        (
+            "intervals of a certain mapper",
+            "np.hypot(self._cost_of_gaps(X), self._uncertainty(X))\n        margin",
+            "self._cost_of_gaps(X)\n        margin",
+        ),
     ],
     ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),

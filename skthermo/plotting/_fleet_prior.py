@@ -122,25 +122,23 @@ class FleetPriorDisplay:
             )
         is_prior = hasattr(found, "comparison_")
         prior = found if is_prior else found.prior
-        families = {family: family for family in prior.comparison_.index} if is_prior else dict(found.families_)
+        pooled = {} if prior is None else prior.comparison_["is_pooled"].to_dict()
+        families = {family: family for family in pooled} if is_prior else dict(found.families_)
         name = next(iter(families), None) if name is None else name
         if name not in families:
             raise ValueError(f"name is {name!r}; expected one of {list(families)}")
         family = families[name]
-        lowest, highest = _steady(prior.reach_, whole=True)
-        grid = (
-            np.linspace(lowest, highest, N_TEMPERATURES) if temperatures is None else np.sort(as_floats(temperatures))
-        )
+        lowest, highest = _steady(found.reach_, whole=True)
+        grid = np.linspace(lowest, highest, N_TEMPERATURES)
+        grid = grid if temperatures is None else np.sort(as_floats(temperatures))
         own_range = None if is_prior else _steady(found.own_range_)
         if reference is None:
             reference = float(np.mean((lowest, highest) if own_range is None else own_range))
-        is_known = family in prior.comparison_.index
-        fleet = (
-            prior.effects(grid, family, reference=reference) if is_known else pd.DataFrame(index=grid, columns=MOMENTS)
-        )
+        fleet = pd.DataFrame(np.nan, grid, MOMENTS)  # of what is never pooled
+        if family in pooled:
+            fleet = prior.effects(grid, family, reference=reference)
         own = None if is_prior else found.effects(grid, name, reference=reference)
-        is_pooled = is_known and bool(prior.comparison_.loc[family, "is_pooled"])
-        return cls(fleet, own, own_range, name=name, is_pooled=is_pooled).plot(**options)
+        return cls(fleet, own, own_range, name=name, is_pooled=bool(pooled.get(family, False))).plot(**options)
 
     def plot(self, ax: Axes = None) -> FleetPriorDisplay:
         """Draw into axes.
@@ -167,7 +165,8 @@ class FleetPriorDisplay:
             self.bridge_lines_[bridges[0]].set_label("single bridges")
         mean, low, high = _band(self.fleet)
         self.fleet_band_ = ax.fill_between(temperatures, low, high, color=SKY, alpha=0.3, linewidth=0, zorder=0)
-        style = {"color": BLUE, "linestyle": "--", "linewidth": 1.8, "label": "fleet, with its band"}
+        label = "fleet, with its band" if np.isfinite(mean).any() else "_"
+        style = {"color": BLUE, "linestyle": "--", "linewidth": 1.8, "label": label}
         self.fleet_line_ = ax.plot(temperatures, mean, **style)[0]
         self.own_line_, self.own_band_ = None, None
         if self.own is not None:

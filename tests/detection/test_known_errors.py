@@ -115,7 +115,7 @@ def test_an_estimator_that_is_certain_changes_nothing(scale):
 @pytest.mark.parametrize("scale", SCALES)
 def test_weeks_of_winter_raise_no_more_alarms_in_summer_than_are_asked_for(scale):
     rates, unaware = [], []
-    for seed in range(12):
+    for seed in range(6):
         records = bridge(seed, 405)
         for compensator, found in ((knowing(scale=scale), rates), (unknowing(scale=scale), unaware)):
             detector = make_pipeline(compensator, MahalanobisDetector(0.05)).fit(records[:40])

@@ -33,6 +33,7 @@ class Mapper:
 
     prior, families_ = Prior(), {"floor": "deck", "piles": "soil", "pylon": None}
     own_range_ = SimpleNamespace(lowest=np.array([-5.0, -4.0]), highest=np.array([8.0, 10.0]))
+    reach_ = Prior.reach_
 
     def effects(self, temperatures, name=None, *, reference=None):
         d = np.asarray(temperatures) - reference
@@ -75,6 +76,9 @@ def test_a_mapper_is_found_within_a_chain():
     alone = FleetPriorDisplay.from_estimator(chain, "pylon")
     assert np.isnan(drawn(alone.fleet_line_)[1]).all()
     assert np.isfinite(drawn(alone.own_line_)[1]).all()
+    mapper = Mapper()
+    mapper.prior = None
+    assert "not pooled" in FleetPriorDisplay.from_estimator(mapper).ax_.get_title()
 
 
 def test_it_draws_into_given_axes_and_refuses_what_has_no_prior():

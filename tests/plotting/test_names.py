@@ -11,6 +11,7 @@ from skthermo.fem import Bar, Structure
 from skthermo.plotting import (
     AgreementDisplay,
     DamageIndexDisplay,
+    FleetPriorDisplay,
     FrequencyTemperatureDisplay,
     HistoryDisplay,
     PODCurveDisplay,
@@ -63,6 +64,9 @@ def structure():
         lambda: SensitivityDisplay.from_predictions(TABLE),
         lambda: AgreementDisplay.from_predictions(RATES, groups={HOSTILE: LONG, LONG: HOSTILE}),
         lambda: AgreementDisplay.from_predictions(RATES, groups={HOSTILE: LONG, LONG: HOSTILE}, kind="scatter"),
+        lambda: FleetPriorDisplay(
+            TABLE.assign(mean=0.1, standard_deviation=0.01), own_range=(2, 5), name=HOSTILE, is_pooled=False
+        ).plot(),
         lambda: ROCDisplay.from_predictions([1, 1, -1], {HOSTILE: [1, 2, -1], LONG: [1, np.nan, 0]}),
         lambda: StructureDisplay.from_structure(structure(), groups=[HOSTILE, LONG]),
         lambda: StructureDisplay.from_structure(structure(), {HOSTILE: 0.1}, label=HOSTILE),

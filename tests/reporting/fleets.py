@@ -28,4 +28,6 @@ class FakeFleet:
         ]
         table = pd.DataFrame(rows, columns=["bridge", "event", "is_called"]).astype({"is_called": bool})
         n = len(self.monitors)
-        return SimpleNamespace(table=table, share=share, promised_false_per_year=float(n), expected_false_per_year=0.5)
+        numbers = {"promised_false_per_year": float(n), "expected_false_per_year": 0.5, "n_judged": n}
+        called = table.loc[table["is_called"], "bridge"].unique().tolist()
+        return SimpleNamespace(table=table, share=share, called=called, **numbers)

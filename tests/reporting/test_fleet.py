@@ -51,7 +51,8 @@ def fleet():
         HOSTILE: FakeMonitor(events=[event_row("2025-06-01", None)]),
         "broken file": None,
     }
-    errors = {"failed": f"ValueError: {QUOTED}"}
+    errors = {"failed": f"ValueError: {QUOTED}", "not updated": "OSError (new records): no such file"}
+    monitors["not updated"] = FakeMonitor()
     warned = [(HOSTILE, "offset", HOSTILE), ("only fitted", "gaps", QUOTED)]
     kept = {(HOSTILE, 1), ("unexplained", 1), ("explained", 1)}
     made = FakeFleet(monitors, {"only fitted": chain}, errors, warned, kept)
@@ -67,6 +68,7 @@ ORDER = [
     "broken file",
     "silent",
     "blind",
+    "not updated",
     "failed",
     "only fitted",
     "drifting",
@@ -88,7 +90,7 @@ def page(file):
 
 def test_worst_bridges_come_first(page):
     links = [(name, link) for name, link in zip(page.link_texts, page.values("href"), strict=True) if "_pages/" in link]
-    in_table = [name for name, _ in links[-12:]]
+    in_table = [name for name, _ in links[-13:]]
     assert in_table[: len(ORDER)] == ORDER
     assert sorted(in_table[len(ORDER) :]) == ["explained", "healthy"]
 
@@ -105,11 +107,11 @@ def test_every_bridge_has_a_page_that_links_back(page, file, fleet):
 
 
 def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
-    assert "2 of 12 bridges are in alarm" in page.text
-    counts = "2 in alarm; 1 without an alarm, but with much stiffness lost slowly; 3 not judged by the monitor"
-    assert f"Of 12\xa0bridges: {counts}; 1 that could not be fitted; 1 without a monitor; 4 healthy." in page.text
-    assert "Nothing is known of 5\xa0bridges" in page.text
-    for name in ("broken_file", "silent", "blind", "failed", "only_fitted"):
+    assert "2 of 13 bridges are in alarm" in page.text
+    counts = "2 in alarm; 1 without an alarm, but with much stiffness lost slowly; 4 not judged by the monitor"
+    assert f"Of 13\xa0bridges: {counts}; 1 that could not be fitted; 1 without a monitor; 4 healthy." in page.text
+    assert "Nothing is known of 6\xa0bridges" in page.text
+    for name in ("broken_file", "silent", "blind", "not_updated", "failed", "only_fitted"):
         text = (file.parent / "all of #1_pages" / f"{name}.html").read_text(encoding="utf-8")
         assert '"state not-judged"' in text
         assert "Healthy" not in Page(text).paragraphs[2]
@@ -120,8 +122,8 @@ def test_the_page_is_sound_and_says_what_failed(page, file):
     assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "promise", "warnings", "settings"]
     assert f"ValueError: {QUOTED}" in page.text
     assert "OSError: checksum <wrong>" in page.text
-    assert "raise about 10 false alarms a year" in page.text
-    assert "3 of 4\xa0damage events so far are singled out" in page.text
+    assert "raise about 11 false alarms a year" in page.text
+    assert "3 of 11\xa0judged bridges are singled out" in page.text
     fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
     assert "with a mean error of" in fitted.text
     assert QUOTED in fitted.text
@@ -131,7 +133,10 @@ def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
     well = FakeFleet({0: FakeMonitor(), 1: FakeMonitor()})
     text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
     assert "No alarm: all 2 bridges are healthy" in text
-    assert "There has been no damage event so far." in text
+    assert "There has been no damage event in the last year" in text
+    events = FakeFleet({0: FakeMonitor(), 1: FakeMonitor(events=[ENDED])}, kept={(1, 1)})
+    past = Page(owner_report(events, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
+    assert "No alarm now, but 1 of 2 bridges had one that nobody has explained" in past
     late = Page(owner_report(well, tmp_path / "a.html", now="2025-09-01").read_text(encoding="utf-8")).text
     assert "No alarm, but nothing is known of 2 of 2 bridges" in late
 
@@ -141,6 +146,8 @@ def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
         owner_report(fleet, tmp_path / "a.html", detector="x")
     with pytest.raises(ValueError, match="false_share is 2; expected a share"):
         owner_report(fleet, tmp_path / "a.html", false_share=2)
+    with pytest.raises(ValueError, match="now is 'soon'; expected a time"):
+        owner_report(fleet, tmp_path / "a.html", now="soon")
     assert not list(tmp_path.iterdir())
 
 

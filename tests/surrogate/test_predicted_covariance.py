@@ -10,8 +10,10 @@ import pytest
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import AffineModel
 from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.studies import DetectabilityStudy, identify_damage
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.bayesian import BayesianLogs, Logs, basis, weather
 
@@ -50,18 +52,19 @@ def fitted(**options):
 @pytest.mark.parametrize("options", [{}, {"reduce": True}, {"aligner": BiasAligner(MODEL, method="scale")}])
 def test_covariance_is_that_of_the_mappers_posterior_behind_the_model(options):
     T, F = bridge(0, 200)
-    fem = chain(**options).fit(T[:30], F[:30])
+    offset = [1.3, 0.8] if "aligner" in options else 1.0
+    fem = chain(**options).fit(T[:30], F[:30] * offset)
     few, mapper = T[30::20], fem.mapper_
     roots, rng = np.linalg.cholesky(mapper.covariance_), np.random.default_rng(1)
     drawn = []
-    for _ in range(4000):
+    for _ in range(1500):
         beta = mapper.coef_ + 0.1 * roots @ rng.standard_normal(mapper.coef_.shape)
         frequencies = MODEL.frequencies(np.exp(basis(few) @ beta))
         drawn.append(fem.aligner_.inverse_transform(frequencies))
     centred = (np.array(drawn) - np.mean(drawn, axis=0)) / 0.1
     found, expected = fem.predict_covariance(few), np.einsum("nij,nik->ijk", centred, centred) / len(drawn)
     scale = np.sqrt(np.einsum("ijj->ij", found))
-    assert np.abs((expected - found) / (scale[:, :, None] * scale[:, None, :])).max() < 0.09  # 4 / sqrt(4000 / 2)
+    assert np.abs((expected - found) / (scale[:, :, None] * scale[:, None, :])).max() < 0.15  # 4 / sqrt(1500 / 2)
 
 
 def test_a_mapper_that_does_not_know_is_refused_by_name():
@@ -99,12 +102,12 @@ def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_th
 
 def test_intervals_after_thirty_days_hold_a_later_year():
     held = []
-    for seed in range(25):
+    for seed in range(12):
         T, F = bridge(seed, 395)
         lowest, highest = chain().fit(T[:30], F[:30]).predict_interval(T[30:])
         held.append(((F[30:] > lowest) & (F[30:] < highest)).to_numpy().mean())
     assert 0.85 < np.mean(held) < 0.95
-    assert np.mean(np.array(held) < 0.7) < 0.15
+    assert np.mean(np.array(held) < 0.7) < 0.2
 
 
 def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of():
@@ -113,7 +116,7 @@ def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of
     seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)
     np.testing.assert_array_equal(table["from_fleet"], ~seen)
     assert list(table)[-2:] == ["outside_bounds", "from_fleet"]
-    assert not table[["T1", "T2"]].to_numpy().any()
+    np.testing.assert_array_equal((table[["T1", "T2"]] > 0).any(axis=1), ~seen)
     with pytest.warns(UserWarning, match="stand on what the fleet") as given:
         fem.predict(T)
     said = f"{(~seen).sum()} of 395 rows are in weather that the training records have not seen, and stand on what the"
@@ -126,8 +129,11 @@ def test_the_report_says_what_weather_is_the_fleets():
     report = fitted()[0].report_
     assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
     assert re.search("predictions stand on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
-    T, F = bridge(0, 60)
-    assert chain(TemperatureMapper(LinearRegression())).fit(T, F).report_.fleet is None
+    assert not [kind for kind, _ in chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings()]
+    T, F = bridge(0, 15)
+    alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_
+    assert alone.fleet is None
+    assert [kind for kind, _ in alone.warnings()] == ["few rows"]
 
 
 def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
@@ -136,3 +142,15 @@ def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     assert fem.predict_covariance(T).shape == (120, 2, 2)
     assert list(fem.applicability(T)) == [*fem.training_range_.names, "outside_bounds", "from_fleet"]
     assert len(fem.training_range_.names) == 4
+
+
+def test_damage_is_identified_and_studies_run_on_a_chain_that_stands_on_a_fleet():
+    fem, T, F = fitted()
+    damaged = fem.simulate(T[30:], damage={"pier": 0.15}, noise="fitted", random_state=0)
+    found = identify_damage(fem, T[30:], damaged)
+    assert found.table["probability"].idxmax() == "pier"
+    assert abs(found.table.loc["pier", "severity"] - 0.15) < 0.05
+    detector = make_pipeline(TemperatureCompensator(fem, targets=list(F)), MahalanobisDetector())
+    study = DetectabilityStudy(fem, detector, [{"pier": 0.15}], n_repeats=1, uncertainty="noise", random_state=0)
+    rates = study.run(T[:60]).groupby("measure")["rate"].mean()
+    assert rates["POD"] > 0.9

@@ -30,17 +30,19 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
     numbers = pd.Series([bridge.state for bridge in bridges]).value_counts()
     counts = [f"{numbers[state]:,} {text}" for state, text in COUNTED.items() if numbers.get(state, 0)]
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
+    unexplained = sum(bridge.place == UNEXPLAINED for bridge in bridges)
     lines = [
-        element("p", _headline(numbers, len(bridges), unknown), class_="headline"),
+        element("p", _headline(numbers, len(bridges), unknown, unexplained), class_="headline"),
         element("p", f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}."),
         element("p", f"As of {written}, when this page was written. Of later days it says nothing.", class_="soft"),
     ]
-    state = ALARM if ALARM in numbers else ATTENTION if ATTENTION in numbers else NOT_JUDGED if unknown else HEALTHY
+    state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
+    state = NOT_JUDGED if unknown and state == HEALTHY else state
     banner = element("div", symbol(state), element("div", joined(lines)), class_=f"state {state.replace(' ', '-')}")
     known = [
         _named(bridges, links, CALLED, "In alarm, and standing out among all bridges"),
         _named(bridges, links, OPEN, "In alarm, but no more than chance may give among so many bridges"),
-        _named(bridges, links, UNEXPLAINED, "Healthy again, but nobody has said what the event was"),
+        _named(bridges, links, UNEXPLAINED, "An event has ended, and nobody has said what it was"),
         *_false_alarms(found),
     ]
     if unknown:
@@ -57,10 +59,12 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
     return section("today", "The bridges today", *parts, element("h3", "What the words mean"), paragraphs(words))
 
 
-def _headline(numbers: pd.Series, total: int, unknown: int) -> str:
+def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) -> str:
     all_of = f"{total:,}"
     if ALARM in numbers:
         return f"{numbers[ALARM]:,} of {all_of} bridges {_is(numbers[ALARM])} in alarm"
+    if unexplained:
+        return f"No alarm now, but {unexplained:,} of {all_of} bridges had one that nobody has explained"
     if ATTENTION in numbers:
         return f"No alarm, but {numbers[ATTENTION]:,} of {all_of} bridges lost much stiffness slowly"
     if unknown:
@@ -87,23 +91,25 @@ def _false_alarms(found: Any) -> list[str]:
     """How many events there were, how many of them stand out, and how many are expected by chance."""
     if found is None:
         return []
-    n_events, n_called = len(found.table), int(found.table["is_called"].sum())
+    n_events, n_called = len(found.table), len(found.called)
     promised, left = (
         counted_number(float(significant(number, 2)), "false alarm")
         for number in (found.promised_false_per_year, found.expected_false_per_year)
     )
     sentences = [f"Even if all bridges stay healthy, their monitors together raise about {promised} a year."]
     if not n_events:
-        return [*sentences, "There has been no damage event so far."]
-    limit, number = percent(found.share), counted(n_events, "damage event")
-    called = f"None of {number} so far is singled out: chance among all bridges explains them"
+        return [*sentences, "There has been no damage event in the last year that was not said to be harmless."]
+    limit, judged = percent(found.share), counted(found.n_judged, "judged bridge")
+    events = f"{counted(n_events, 'damage event')} in the last year"
+    called = f"None of {judged} is singled out: among so many, chance explains {events}"
     if n_called:
-        which = "it" if n_called == 1 else "them"
-        called = f"{n_called:,} of {number} so far {_is(n_called)} singled out: chance hardly explains {which}"
+        called = (
+            f"{n_called:,} of {judged} {_is(n_called)} singled out: chance hardly explains the highest events there"
+        )
     return [
         *sentences,
-        f"{called}. Of events that are singled out in this way, at most {limit} are expected to be false on average, "
-        f"about {left} a year.",
+        f"{called}. Of bridges that are singled out in this way, at most {limit} are expected to be healthy on "
+        f"average, about {left} a year.",
     ]
 
 

@@ -102,7 +102,7 @@ class Bridge:
 
 def _silent_since(standing: Standing) -> pd.Timestamp:
     """Since when nothing is known of a bridge that is not judged."""
-    if not standing.has_records or standing.is_silent or standing.is_ahead:
+    if not standing.has_records or standing.is_silent or standing.is_ahead or standing.error:
         return standing.last
     return standing.unjudged_since
 
@@ -130,6 +130,8 @@ def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list
         texts.append(_reason(standing))
     elif standing.state == ATTENTION:
         texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
+    if standing.error and standing.state == ALARM:
+        texts.append(f"New records could not be used: {standing.error}.")
     if unexplained:
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(unexplained)}"
         verb = "stood out among all bridges, has" if len(unexplained) == 1 else "stood out among all bridges, have"
@@ -144,6 +146,8 @@ def _more(failed: pd.DataFrame) -> str:
 
 
 def _reason(standing: Standing) -> str:
+    if standing.error:
+        return f"{standing.error}."
     if not standing.has_records:
         return "No record has come since the baseline."
     if standing.is_ahead:

@@ -13,10 +13,10 @@ from skthermo._io import write_when_complete
 from skthermo.reporting._html import Html, bullets, element, joined, page, paragraphs, section, table
 from skthermo.reporting._settings import settings
 from skthermo.reporting.fleet._answer import answer, warnings_of_all
-from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.fleet._fit import fit_page
-from skthermo.reporting.service import ATTENTION, NOT_JUDGED, Standing, moment, monitor_page, symbol
+from skthermo.reporting.service import ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
 
 COLUMNS = [
     "Bridge",
@@ -33,6 +33,7 @@ def fleet_page(
     fleet: Any, file: Path, title: str, now: Any, limit: float, share: float
 ) -> tuple[Html, dict[str, tuple[str, Html]]]:
     """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
+    written = moment(_as_written(now))
     folder = folder_of(file)
     folder.mkdir(exist_ok=True)
     names = list(fleet.table.index)
@@ -41,7 +42,6 @@ def fleet_page(
     found = fleet.discoveries(share) if len(fleet.monitors) else None
     writer = PageWriter(fleet, found, folder, files, element("a", title, href=link("..", file.name)), now, limit)
     bridges = sorted((writer.write(name) for name in names), key=lambda bridge: bridge.order)
-    written = moment(pd.Timestamp.now().floor("min") if now is None else pd.Timestamp(now))
     sections = {
         "today": ("Today", answer(bridges, links, found, written)),
         "bridges": ("All bridges", _all_bridges(bridges, links)),
@@ -63,13 +63,15 @@ class PageWriter:
         called = None if found is None else found.table[found.table["is_called"].astype(bool)]
         self.called = {} if called is None else {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
         self.warned = dict(list(fleet.warnings.groupby("bridge")))
+        self.errors = {name: "; ".join(rows["error"].astype(str)) for name, rows in fleet.errors.groupby("bridge")}
 
     def write(self, name: Any) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
         warned = self.warned.get(name, self.fleet.warnings.iloc[:0])
         messages = list(dict.fromkeys(warned["message"]))
-        monitor, error = _opened(self.fleet.monitors, name)
-        standing = None if monitor is None else Standing.of(monitor, self.now, self.limit)
+        monitor, unread = _opened(self.fleet.monitors, name)
+        error = self.errors.get(name, "")
+        standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         listed = section("warnings", "Warnings of its fit", bullets(messages) or paragraphs("There was no warning."))
         if standing is not None:
             bridge = Bridge.watched(name, standing, self.called.get(name, set()), len(messages))
@@ -77,24 +79,29 @@ class PageWriter:
             sections["warnings"] = ("Warnings", listed)
             sections["settings"] = sections.pop("settings")
         else:
-            bridge, chain = self._without_monitor(name, error, len(messages))
-            written = moment(pd.Timestamp.now().floor("min") if self.now is None else pd.Timestamp(self.now))
-            introduction, sections = fit_page(bridge, chain, listed, written)
+            bridge, chain = self._without_monitor(name, unread, error, len(messages))
+            introduction, sections = fit_page(bridge, chain, listed, moment(_as_written(self.now)))
         back = element("p", "One of the bridges of ", self.back, ".")
         text = page(str(name), joined([back, introduction]), sections, paragraphs("Written by skthermo."))
         write_when_complete(self.folder / self.files[name], text)
         return bridge
 
-    def _without_monitor(self, name: Any, error: str, n_warnings: int) -> tuple[Bridge, Any]:
+    def _without_monitor(self, name: Any, unread: str, error: str, n_warnings: int) -> tuple[Bridge, Any]:
         """A bridge that nobody watches, and its chain, if it has one."""
-        errors = self.fleet.errors
-        known = "; ".join(errors.loc[errors["bridge"] == name, "error"].astype(str))
-        chain, unread = _opened(self.fleet.chains, name)
-        if error:
-            return Bridge.unread(name, error, n_warnings), chain
+        chain, without_chain = _opened(self.fleet.chains, name)
+        if unread:
+            return Bridge.unread(name, unread, n_warnings), chain
         if chain is None:
-            return Bridge.failed(name, unread or known, n_warnings), None
-        return Bridge.unwatched(name, known, n_warnings), chain
+            return Bridge.failed(name, without_chain or error, n_warnings), None
+        return Bridge.unwatched(name, error, n_warnings), chain
+
+
+def _as_written(now: Any) -> pd.Timestamp:
+    """The time that stands on the pages, as it was given: bridges may have records of different time zones."""
+    if now is None:
+        return time_of(None).floor("min")
+    zone = pd.to_datetime(str(now), errors="coerce").tz
+    return time_of(now, zone)
 
 
 def _opened(mapping: Mapping[Any, Any], name: Any) -> tuple[Any, str]:
@@ -133,6 +140,7 @@ def _state(bridge: Bridge) -> Html:
     """Symbol and word of a state, and what else an owner should know."""
     drawn = symbol(NOT_JUDGED if bridge.state in UNKNOWN_STATES else bridge.state)
     word = "stiffness lost" if bridge.state == ATTENTION else bridge.state
+    word = "healthy again" if bridge.state == HEALTHY and bridge.place == UNEXPLAINED else word
     name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_JUDGED
     badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
     return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
@@ -149,11 +157,11 @@ def _promise(found: Any) -> Html:
         "bridges are compared with what chance gives: an event whose index is so high that a healthy bridge reaches it "
         "once in a hundred years stands out, one that comes once a year does not."
     )
-    limit = percent(found.share)
     rule = (
-        "Events are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
-        f"most {limit} are expected to be false. An event that is not singled out is not proved to be false: it only "
-        "cannot be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
+        "Bridges are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
+        f"most {percent(found.share)} are expected to be healthy. An event of another bridge is not proved to be "
+        "false: it only cannot be told from the false ones that so many bridges give. Of damage that is missed, the "
+        "rule says nothing."
     )
     return section("promise", title, paragraphs(meaning, rule))
 
@@ -166,6 +174,6 @@ def _settings(fleet: Any, limit: float, share: float) -> Html:
         ["of these fitted", chains],
         ["of these with a monitor", monitors],
         ["loss of stiffness that is told", percent(limit)],
-        ["share of false ones among events that are singled out", percent(share)],
+        ["share of false ones among the bridges that are singled out", percent(share)],
     ]
     return settings("For the engineer who looks after the monitors.", "Settings of this page.", rows)

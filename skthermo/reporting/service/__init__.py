@@ -1,7 +1,7 @@
 """Pages on detectors in service."""
 
 from skthermo.reporting.service._sections import monitor_page
-from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment
+from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment, time_of
 from skthermo.reporting.service._today import symbol
 
-__all__ = ["ALARM", "ATTENTION", "HEALTHY", "NOT_JUDGED", "Standing", "moment", "monitor_page", "symbol"]
+__all__ = ["ALARM", "ATTENTION", "HEALTHY", "NOT_JUDGED", "Standing", "moment", "monitor_page", "symbol", "time_of"]

@@ -18,25 +18,20 @@ ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not ju
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss."""
+    """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss.
+
+    ``error`` says why the newest records could not be handed to the monitor, if they could not.
+    """
 
     monitor: Any
     now: pd.Timestamp
     limit: float
+    error: str = ""
 
     @classmethod
-    def of(cls, monitor: Any, now: Any = None, limit: float = 0.1) -> Standing:
+    def of(cls, monitor: Any, now: Any = None, limit: float = 0.1, error: str = "") -> Standing:
         """Now is by the clock where no time is given."""
-        zone = monitor.last_.tz
-        try:
-            time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
-        except (TypeError, ValueError):
-            time = pd.NaT
-        if pd.isna(time) or (time.tz is not None and zone is None):
-            raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
-        if zone is not None:
-            time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
-        return cls(monitor, time, limit)
+        return cls(monitor, time_of(now, monitor.last_.tz), limit, error)
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -78,7 +73,7 @@ class Standing:
     def state(self) -> str:
         """An alarm lasts until its event ends; nothing is healthy without new records, or with much stiffness lost."""
         said = self.monitor.state()
-        if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records):
+        if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records or self.error):
             return NOT_JUDGED
         return ATTENTION if said == HEALTHY and self.worn else said
 
@@ -100,6 +95,8 @@ class Standing:
             return "Healthy: no alarm"
         if self.state == ATTENTION:
             return "No alarm, but much stiffness has been lost slowly"
+        if self.error:
+            return "Not judged: its new records could not be used"
         if not self.has_records:
             return "Not judged: no record since the baseline"
         if self.is_ahead:
@@ -117,7 +114,7 @@ class Standing:
             )
             if self.is_silent:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
-            return text
+            return f"{text} New records could not be used: {self.error}." if self.error else text
         if self.state == ATTENTION:
             return (
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
@@ -126,6 +123,8 @@ class Standing:
             )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
+        if self.error:
+            return f"{self.error}. Whether the structure is healthy now is not known."
         if not self.has_records:
             return f"The baseline ends on {moment(self.last)}; whether the structure is healthy now is not known."
         if self.is_ahead:
@@ -186,6 +185,19 @@ class Standing:
         number, judged = int(days["n_records"].sum()), int(days["n_judged"].sum())
         which = f"{judged:,}" if judged < number else "all"
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
+
+
+def time_of(now: Any, zone: Any = None) -> pd.Timestamp:
+    """A time in the zone of the records, by the clock where none is given."""
+    try:
+        time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
+    except (TypeError, ValueError):
+        time = pd.NaT
+    if pd.isna(time) or (time.tz is not None and zone is None):
+        raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
+    if zone is not None:
+        time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
+    return time
 
 
 def moment(time: Any, *, is_short: bool = False) -> str:

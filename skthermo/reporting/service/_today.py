@@ -92,7 +92,7 @@ def _what_to_do(standing: Standing) -> list[str]:
             "Ask an engineer to look at the structure, beginning with what the modes named above depend on, and at the "
             "raw records: works on the structure, unusual loads or ice may be the cause too."
         )
-    if standing.is_silent or standing.is_ahead or not standing.has_records:
+    if standing.is_silent or standing.is_ahead or standing.error or not standing.has_records:
         steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")
     elif standing.state == NOT_JUDGED:
         steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")

@@ -1,0 +1,298 @@
+"""A new bridge's monitor from its first weeks: false events a year and damage found, with a fleet and without.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py --quick
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py --kinds girder --chains
+
+Bridges of the library's synthetic fleet (`skthermo.datasets.make_fleet`), four records a day with gaps; outliers have
+been removed. Those of the fleet have a year each. A new bridge has 15 days or more from a day of the year on that is
+drawn, then a year in service. Its monitor promises one false event a year. At three times of that year, damage sets
+in; it is found if an event opens within 30 days (the first bridge's events are also those of ``Monitor.update``). The
+means by role of the thermometers now and 12 and 48 hours ago, for all regressions.
+
+fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the frequencies
+fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
+             one that foretells the fleet's own bridges best after as many days. It does not know how uncertain it is.
+ridge        of all temperatures, on the bridge's own records
+lines        broken lines of all temperatures, the library's default, on the bridge's own records
+neighbours   distance to the 20th nearest of the raw frequencies of the baseline
+fleet chain  with --chains: a ``DataInformedFEM`` whose mapper is the fleet's prior on the parameters of FE models
+
+"within" is the share of bridges whose number of events lies below the highest that the monitor's ``promise_`` names for
+a single year; "promised" those whose monitor could be made at all. The exit code is 1 if the fleet's monitors have more
+than 1.5 false events a year on average, or fewer than 90 % of them are within their promise, after any number of days;
+or if the fleet finds no more of the damage than the best of the others whose false events are as few.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator, OutlierMixin, RegressorMixin
+from sklearn.linear_model import Ridge
+from sklearn.neighbors import NearestNeighbors
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skthermo.datasets import make_fleet
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.fleet import FleetPrior
+from skthermo.monitoring import Monitor
+from skthermo.monitoring._promise import find_events
+from skthermo.preprocessing import BiasAligner, HingeFeatures, LagFeatures, SensorMeans
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+PER_DAY, LAGS, MEMORY = 4, [0, 2, 8], 60
+DAYS = (15, 30, 60, 120)
+SEVERITIES, FOUND_WITHIN, SETS_IN = (0.05, 0.2), 30, (15, 137, 259)
+MOST_EVENTS, LEAST_WITHIN = 1.5, 0.9
+DAMAGED = {"truss": "bottom", "girder": "first span", "arch": "girder"}
+PENALTIES, N_ASKED = 10.0 ** np.arange(-1, 5), 8
+
+
+class ByPenalty(RegressorMixin, BaseEstimator):
+    """A ridge on ln y towards the mean coefficients of a fleet, by name of the target."""
+
+    def __init__(self, mean, penalty):
+        self.mean = mean
+        self.penalty = penalty
+
+    def fit(self, X, y):
+        names = [y.name] if isinstance(y, pd.Series) else list(y.columns)
+        B, logs = self.mean.features.transform(X), np.log(np.asarray(y, dtype=float)).reshape(len(X), -1)
+        start = np.array([self.mean.coefficients[name] for name in names])
+        rest = Ridge(self.penalty).fit(B, logs - B @ start.T)
+        self.coef_, self.level_ = start + rest.coef_.reshape(start.shape), np.ravel(rest.intercept_)
+        self.is_vector_ = isinstance(y, pd.Series)
+        return self
+
+    def predict(self, X):
+        values = np.exp(self.mean.features.transform(X) @ self.coef_.T + self.level_)
+        return values[:, 0] if self.is_vector_ else values
+
+    def __sklearn_clone__(self):
+        return ByPenalty(self.mean, self.penalty)
+
+
+class FleetMean:
+    """Mean coefficients of the fleet's bridges, and the penalties by which they serve best after some days."""
+
+    def __init__(self, fleet):
+        self.fleet = {name: (T, F) for name, (T, F) in fleet.items()}
+        everything = pd.concat([T for T, _ in fleet.values()]).dropna()
+        self.features = make_pipeline(HingeFeatures(4), StandardScaler()).fit(everything)
+        fits = [self.of_bridge(T, F) for T, F in fleet.values()]
+        self.coefficients = {name: np.mean([fit[name] for fit in fits if name in fit], axis=0) for name in fits[0]}
+
+    def of_bridge(self, T, F):
+        B, known = self.features.transform(T), T.notna().all(axis=1).to_numpy()
+        found = {}
+        for name, column in F.items():
+            rows = known & column.notna().to_numpy()
+            found[name] = Ridge(1.0).fit(B[rows], np.log(column.to_numpy()[rows])).coef_
+        return found
+
+    def penalty(self, days):
+        errors = np.zeros(len(PENALTIES))
+        for T, F in list(self.fleet.values())[:N_ASKED]:
+            for n, penalty in enumerate(PENALTIES):
+                for _, column in F.items():
+                    rows = (T.notna().all(axis=1) & column.notna()).to_numpy()
+                    few = rows & (np.arange(len(T)) < days * PER_DAY)
+                    fitted = ByPenalty(self, penalty).fit(T[few], column[few])
+                    errors[n] += np.mean((fitted.predict(T[rows]) / column[rows] - 1) ** 2)
+        return PENALTIES[errors.argmin()]
+
+
+class NeighbourDistance(OutlierMixin, BaseEstimator):
+    """Distance to the 20th nearest record of the baseline."""
+
+    def fit(self, X, y=None):
+        self.neighbours_ = NearestNeighbors(n_neighbors=min(20, len(X))).fit(X)
+        return self
+
+    def score_samples(self, X):
+        return -self.neighbours_.kneighbors(X)[0][:, -1]
+
+
+def history(bridge, days, start, **options):
+    return bridge.records(days, start, samples_per_day=PER_DAY, outliers=0.0, **options)
+
+
+def weather_of(bridge):
+    """What all regressions see: means by role, lagged."""
+    return [SensorMeans(bridge.roles), LagFeatures(LAGS, freq="6h")]
+
+
+def prepared(bridge, records):
+    return make_pipeline(*weather_of(bridge)).fit_transform(records.temperatures), records.frequencies
+
+
+def chain_of(bridge, mapper):
+    inverse = InverseSurrogate(noise=0.005)
+    mapper = make_pipeline(*weather_of(bridge), mapper)
+    return DataInformedFEM(bridge.model, inverse=inverse, mapper=mapper, aligner=BiasAligner(), random_state=0)
+
+
+class Kind:
+    """The fleet of one kind of bridge, and what it gives new ones."""
+
+    def __init__(self, kind, n_fleet, n_new, seed, with_chains):
+        made = make_fleet(n_fleet + n_new, kinds=(kind,), aliens=0.05, random_state=seed)
+        names = list(made)
+        self.kind, self.new = kind, [made[name] for name in names[n_fleet:]]
+        members = {name: made[name] for name in names[:n_fleet]}
+        years = {name: history(bridge, 365, "2024-01-01") for name, bridge in members.items()}
+        fleet = {name: prepared(members[name], year) for name, year in years.items()}
+        self.columns = list(next(iter(fleet.values()))[0])
+        covariates = made.covariates.loc[list(members), ["material", "span"]]
+        self.prior = FleetPrior().fit(fleet, covariates)
+        self.mean = FleetMean(fleet)
+        self.penalties = {}
+        if with_chains:
+            chains = {
+                name: chain_of(bridge, TemperatureMapper()).fit(years[name].temperatures, years[name].frequencies)
+                for name, bridge in members.items()
+            }
+            self.chain_prior = FleetPrior().fit(chains, covariates)
+
+    def regressors(self, bridge, days, with_chains):
+        if days not in self.penalties:
+            self.penalties[days] = self.mean.penalty(days)
+        own = {"material": bridge.covariates["material"], "span": bridge.covariates["span"]}
+        found = {
+            "fleet": self.prior.mapper(own),
+            "fleet mean": ByPenalty(self.mean, self.penalties[days]),
+            "ridge": make_pipeline(StandardScaler(), Ridge(1.0)),
+            "lines": TemperatureMapper(),
+        }
+        found = {name: make_pipeline(*weather_of(bridge), regressor) for name, regressor in found.items()}
+        if with_chains:
+            found["fleet chain"] = chain_of(bridge, self.chain_prior.mapper(own))
+        return found
+
+
+def detectors(kind, bridge, modes, days, with_chains, scale):
+    found = {
+        name: make_pipeline(TemperatureCompensator(regressor, targets=modes, scale=scale), MahalanobisDetector())
+        for name, regressor in kind.regressors(bridge, days, with_chains).items()
+    }
+    return found | {"neighbours": make_pipeline(StandardScaler(), OutlierDetector(NeighbourDistance()))}
+
+
+def events_of(index, rule):
+    return find_events(index.to_numpy(), index.index, rule)
+
+
+def served(detector, modes, baseline, healthy, damaged, also_by_update):
+    """A monitor's threshold, its false events in a year, the most that it promises, and the share of damage found.
+
+    Damage is found by an event that opens after it has set in; while a false one is open, none can.
+    """
+    monitor = Monitor(detector, targets=modes, sensors=False).fit(baseline)
+    rule, before = monitor.promise_.rule, baseline[-MEMORY:]
+
+    def index_of(new):
+        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor.bench_.judge.columns])
+        return pd.Series(values[len(before) :], new.index).round(6)
+
+    calm, found = index_of(healthy), {}
+    for severity, records in damaged.items():
+        hurt, opened = index_of(records), []
+        for day in SETS_IN:
+            first, last = day * PER_DAY, (day + FOUND_WITHIN) * PER_DAY
+            events = events_of(pd.concat([calm[:first], hurt[first:last]]), rule)
+            opened.append((events["start"] >= hurt.index[first]).any())
+        found[f"found {severity:.0%}"] = float(np.mean(opened))
+    events = events_of(calm, rule)
+    if also_by_update:
+        monitor.update(healthy)
+        assert list(monitor.events_["start"]) == list(events["start"])
+    return {
+        "events": len(events),
+        "within": len(events) <= monitor.promise_.highest,
+        "in alarm": float((calm > rule.threshold).mean()),
+        **found,
+        "threshold": rule.threshold,
+        "highest": float(calm.max()),
+    }
+
+
+def rows_of(kind, bridge, number, options):
+    start = pd.Timestamp("2025-01-01") + pd.Timedelta(days=int(np.random.default_rng(number).integers(0, 365)))
+    longest = max(options.days)
+    records = history(bridge, longest + 365, start)
+    group, modes, first = DAMAGED[kind.kind], list(records.frequencies), longest * PER_DAY
+    healthy, damaged = records.temperatures.join(records.frequencies), {}
+    for severity in options.severities:
+        hurt = history(bridge, longest + 365, start, damage={group: severity})
+        damaged[severity] = hurt.temperatures.join(hurt.frequencies)[first:]
+    for days in options.days:
+        baseline = healthy[first - days * PER_DAY : first]
+        for name, detector in detectors(kind, bridge, modes, days, options.chains, options.scale).items():
+            if options.detectors is not None and name not in options.detectors:
+                continue
+            row = {"kind": kind.kind, "bridge": bridge.name, "alien": bridge.is_alien, "days": days, "detector": name}
+            try:
+                found = served(detector, modes, baseline, healthy[first:], damaged, number == 0)
+                yield row | {"promised": 1.0, "error": ""} | found
+            except ValueError as error:
+                yield row | {"promised": 0.0, "error": str(error)}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kinds", nargs="+", default=["girder", "truss"], choices=list(DAMAGED))
+    parser.add_argument("--fleet", type=int, default=40, help="bridges of each kind with a year of records")
+    parser.add_argument("--new", type=int, default=12, help="new bridges of each kind")
+    parser.add_argument("--days", type=int, nargs="+", default=list(DAYS))
+    parser.add_argument("--detectors", nargs="+", help="only these")
+    parser.add_argument("--scale", choices=["global", "local"], help="of the compensators; by default none")
+    parser.add_argument("--severities", type=float, nargs="+", default=list(SEVERITIES), help="of the damage")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--chains", action="store_true", help="chains with FE models, too")
+    parser.add_argument("--quick", action="store_true", help="few bridges, in less than a minute")
+    options = parser.parse_args()
+    if options.quick:
+        options.kinds, options.fleet, options.new, options.days = ["girder"], 12, 3, [30]
+    warnings.simplefilter("ignore")
+    rows, begun = [], time.perf_counter()
+    for kind in options.kinds:
+        one = Kind(kind, options.fleet, options.new, options.seed, options.chains)
+        print(f"{kind}: fleet of {options.fleet} after {time.perf_counter() - begun:.0f} s", flush=True)
+        for number, bridge in enumerate(one.new):
+            rows += rows_of(one, bridge, number, options)
+    table = pd.DataFrame(rows)
+    found = [f"found {severity:.0%}" for severity in options.severities]
+    numbers = ["promised", "events", "within", "in alarm", *found, "threshold", "highest"]
+    table[numbers] = table[numbers].astype(float)
+    summary = table.groupby(["days", "detector"])[numbers].mean()
+    print(summary.round(2).to_string())
+    refused = table[table["promised"] == 0].groupby(["days", "detector"])["error"].agg(["size", "first"])
+    print(refused.to_string() if len(refused) else "every monitor could be made")
+    print(f"{time.perf_counter() - begun:.0f} s")
+    sys.exit(0 if meets(summary, found[-1]) else 1)
+
+
+def meets(summary, found):
+    """Whether the fleet's monitors keep their promise and find no less than others that keep it; says where not."""
+    met = True
+    for days, rows in summary.groupby(level="days"):
+        rows = rows.droplevel("days")
+        fleet, others = rows.loc["fleet"], rows.drop(index="fleet")
+        keeps = others[(others["events"] <= MOST_EVENTS) & (others["within"] >= LEAST_WITHIN)]
+        if fleet["events"] > MOST_EVENTS or fleet["within"] < LEAST_WITHIN:
+            print(f"{days} days: the fleet's monitors have {fleet['events']:.2f} events a year, expected {MOST_EVENTS}")
+            met = False
+        if len(keeps) and fleet[found] < keeps[found].max():
+            best = keeps[found].idxmax()
+            print(f"{days} days, {found} of the damage: {keeps.loc[best, found]:.0%} by {best}, {fleet[found]:.0%}")
+            met = False
+    return met
+
+
+if __name__ == "__main__":
+    main()

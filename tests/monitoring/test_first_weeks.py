@@ -1,0 +1,63 @@
+"""Laws of a monitor whose baseline is a few weeks, and whose regression knows what it does not know."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring import Monitor
+from tests.bayesian import BayesianLogs, Logs, basis, weather
+
+MODES = ["f1", "f2"]
+MEAN, WIDTH, NOISE = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01]), 0.003
+EVERYWHERE = (-40.0, 60.0)
+WEEKS, YEAR = 60, 365
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+
+def records_of(seed, days=WEEKS + YEAR, damage=0.0):
+    """Daily records of a bridge that the prior of `BayesianLogs` is right for, in winter first."""
+    rng, T = np.random.default_rng(seed), weather(days, seed)
+    beta = MEAN[:, None] + WIDTH[:, None] * rng.standard_normal((4, 2))
+    F = np.exp(basis(T) @ beta) * (1 + NOISE * rng.standard_normal((days, 2)))
+    F[WEEKS + 100 :] *= 1 - damage * np.array([1.0, 0.3])
+    return T.join(pd.DataFrame(F, T.index, MODES))
+
+
+def monitor_of(regressor=BayesianLogs, **options):
+    estimator = regressor(MEAN, WIDTH, NOISE, EVERYWHERE)
+    compensator = TemperatureCompensator(estimator, targets=MODES, **options)
+    return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
+
+
+@pytest.mark.parametrize("scale", [None, "global", "local"])
+def test_any_batches_give_the_decisions_of_one_pass(scale):
+    records = records_of(0, WEEKS + 120)
+    whole, parts = (monitor_of(scale=scale).fit(records[:WEEKS]) for _ in range(2))
+    whole.update(records[WEEKS:])
+    cuts = [WEEKS, *np.sort(np.random.default_rng(1).integers(WEEKS, WEEKS + 120, 4)), WEEKS + 120]
+    for first, last in itertools.pairwise(cuts):
+        parts.update(records[first:last])
+    pd.testing.assert_frame_equal(whole.judged_, parts.judged_)
+    pd.testing.assert_frame_equal(whole.events_, parts.events_)
+
+
+def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
+    events, unaware, found = [], [], []
+    for seed in range(6):
+        records, damaged = records_of(seed), records_of(seed, damage=0.1)
+        monitor = monitor_of().fit(records[:WEEKS])
+        monitor.update(records[WEEKS:])
+        events.append(len(monitor.events_))
+        hurt = monitor_of().fit(damaged[:WEEKS])
+        hurt.update(damaged[WEEKS:])
+        found.append((hurt.events_["start"] >= damaged.index[WEEKS + 100]).any())
+        silent = monitor_of(Logs).fit(records[:WEEKS])
+        silent.update(records[WEEKS:])
+        unaware.append(len(silent.events_))
+    assert np.mean(unaware) > 1.5 > np.mean(events) + 0.5
+    assert np.mean(found) > 0.8
