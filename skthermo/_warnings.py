@@ -5,6 +5,7 @@ import re
 import sys
 import threading
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -26,6 +27,10 @@ _given: WeakKeyDictionary[Any, set[str]] = WeakKeyDictionary()
 _told: ContextVar[frozenset[str]] = ContextVar("kinds of warnings that an estimator around gives", default=frozenset())
 _found: ContextVar[dict[str, Any] | None] = ContextVar("findings of a check by content of its tables", default=None)
 ALL = "all"  # key of findings that stand for those of all records within
+_job: ContextVar[Any] = ContextVar("the job whose warnings are counted", default=None)
+_turn = threading.RLock()  # held by the job of this process whose warnings are counted
+_in_turn: threading.Thread | None = None  # that runs it
+REPORTED = (UserWarning, RuntimeWarning, FutureWarning)  # others are for developers
 Told = tuple[type[Warning], str, str, int]  # category, text, file and line of a warning
 _explained: dict[int, tuple[Any, NDArray[np.bool_]]] = {}
 """Tables by identity while they exist, and their rows without a value of which a warning has given the cause."""
@@ -50,14 +55,55 @@ def warn_user(message: str, kind: str) -> None:
         if frame.f_code is Parallel.__call__.__code__:
             jobs = frame.f_locals["self"]
         frame, level = frame.f_back, level + 1
-    if multiprocessing.parent_process() is not None:
+    if (job := _job.get()) is not None:
+        jobs = job
+    elif multiprocessing.parent_process() is not None:
         in_folds, jobs = True, multiprocessing.current_process()
     if in_folds and jobs is not None:
         kinds = _given.setdefault(jobs, set())
         if kind in kinds:
             return
         kinds.add(kind)
-    warnings.warn(message, UserWarning, stacklevel=level)
+    warning: Any = UserWarning(message)
+    warning.kind = kind
+    warnings.warn(warning, stacklevel=level)
+
+
+@contextmanager
+def counted_warnings() -> Iterator[Counter[tuple[str, str]]]:
+    """Count the warnings of a job by kind and text, in any thread; none is shown.
+
+    Jobs of one process take turns, because filters belong to the whole process. Warnings of other packages have their
+    class as their kind.
+    """
+    global _in_turn
+    counts: Counter[tuple[str, str]] = Counter()
+    with _turn:
+        token, before, _in_turn = _job.set(Counted()), _in_turn, threading.current_thread()
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("ignore")
+                for category in REPORTED:
+                    warnings.simplefilter("always", category)
+                yield counts
+        finally:
+            _job.reset(token)
+            _in_turn = before
+            counts.update((_kind(one), str(one.message)) for one in caught)
+
+
+class Counted:
+    """A job whose warnings are counted: those of its folds are given once."""
+
+
+def _kind(caught: warnings.WarningMessage) -> str:
+    kind: str = getattr(caught.message, "kind", caught.category.__name__)
+    return "repeated" if kind.startswith(("once: ", "again: ")) else kind
+
+
+def _may_filter() -> bool:
+    """Whether this thread may set filters, which belong to the whole process."""
+    return threading.current_thread() in (threading.main_thread(), _in_turn)
 
 
 def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
@@ -154,7 +200,7 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
 def warnings_of_detector(name: str | None) -> Iterator[None]:
     """Mark warnings with the detector that they come from, so that `warnings_once` can name it; without a name, and
     outside the main thread, they pass as they are."""
-    if name is None or threading.current_thread() is not threading.main_thread():
+    if name is None or not _may_filter():
         yield
         return
     with warnings.catch_warnings(record=True) as caught:
@@ -173,7 +219,7 @@ def recorded() -> Iterator[list[Told]]:
     """Keep the warnings of what runs inside in a list, for `give_again`; outside the main thread they pass as they are,
     because filters belong to the whole process."""
     told: list[Told] = []
-    if threading.current_thread() is not threading.main_thread():
+    if not _may_filter():
         yield told
         return
     try:
@@ -196,7 +242,7 @@ def give_again(told: Iterable[Told]) -> None:
 @contextmanager
 def without_warnings() -> Iterator[None]:
     """Ignore warnings, unless this is a thread beside the main one: filters belong to the whole process."""
-    if threading.current_thread() is not threading.main_thread():
+    if not _may_filter():
         yield
         return
     with warnings.catch_warnings():

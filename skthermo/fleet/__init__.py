@@ -1,5 +1,7 @@
 """Many bridges: fitted side by side, learning together."""
 
+from skthermo.fleet._fit_fleet import fit_fleet
+from skthermo.fleet._fleet import Fleet
 from skthermo.fleet.prior import FleetMapper, FleetPrior
 
-__all__ = ["FleetMapper", "FleetPrior"]
+__all__ = ["Fleet", "FleetMapper", "FleetPrior", "fit_fleet"]

@@ -35,7 +35,7 @@ from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._in_words import in_words
 from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
+from skthermo.monitoring._promise import YEAR, EventRule, Promise, promised_rule, release_level
 from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
 from skthermo.monitoring._stages import Stages
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
@@ -92,6 +92,8 @@ class Monitor(SavesFrames, Estimator):
     promise_ : object
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
+    promises_ : tuple of (Timestamp, object)
+        The promises of all detectors that were in charge, and since when.
     threshold_ : float
         A damage event opens with an index above it.
     release_ : float
@@ -262,6 +264,7 @@ class Monitor(SavesFrames, Estimator):
         charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
         charge.bench.judge.check_memory(cleaned)
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
+        self.promises_: tuple[tuple[pd.Timestamp, Promise], ...] = ()
         self._put_in_charge(charge, cleaned, Course.of(charge.bench, baseline, EventLog(charge.rules)))
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
@@ -322,6 +325,65 @@ class Monitor(SavesFrames, Estimator):
         if self.course_.log.is_open("damage"):
             return "alarm"
         return self.judged_["state"].iloc[-1] if len(self.judged_) else "not judged"
+
+    def years_watched(self, since: Any = None) -> float:
+        """Time in which records were judged.
+
+        Parameters
+        ----------
+        since : str or Timestamp, optional
+            Its beginning; by default the end of the baseline.
+
+        Returns
+        -------
+        float
+            In years. Of a gap, only a day or the usual step counts.
+        """
+        check_is_fitted(self)
+        days = self.days_
+        judged = days.index[days["n_judged"] > 0]
+        if since is not None:
+            judged = judged[judged >= pd.Timestamp(since).floor("D")]
+        if not len(judged):
+            return 0.0
+        steps = np.diff(judged.as_unit("ns").asi8) / ONE_DAY.value
+        longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
+        return float((1 + np.minimum(steps, longest).sum()) * (ONE_DAY / YEAR))
+
+    def event_chances(self, since: Any = None) -> pd.Series:
+        """How probable so high a peak is for a healthy structure, by event.
+
+        Parameters
+        ----------
+        since : str or Timestamp, optional
+            Only events that are open, or have ended since then; by default all.
+
+        Returns
+        -------
+        Series
+            By number of the event, for those of damage: the probability that a healthy structure has so high a peak in
+            the time watched since then. NaN where the monitor is of an earlier version, which does not tell.
+
+        Notes
+        -----
+        A p value: for a healthy structure, that of its highest event is at most p with probability p, if squared peaks
+        have an exponential tail, as those of normal residuals have. It comes from the highest excursions of the
+        baseline, by which the detector in charge when the event began was given its threshold; however few these are,
+        that they are few is allowed for.
+        """
+        check_is_fitted(self)
+        events = self.events_[self.events_["kind"] == "damage"]
+        if since is not None:
+            begin = pd.Timestamp(since)
+            events = events[events["end"].isna() | (events["end"] >= begin)]
+            since = min([begin, *events.loc[events["end"].isna(), "start"]])
+        n_years = self.years_watched(since)
+        promises = getattr(self, "promises_", ((self.baseline_.index[0], self.promise_),))
+        chances = [
+            [promise for taken, promise in promises if taken <= event["start"]][-1].chance(event["peak"], n_years)
+            for _, event in events.iterrows()
+        ]
+        return pd.Series(chances, events.index, dtype=float, name="chance")
 
     def acknowledge(self, event: int, *, harmless: bool, note: str = "") -> None:
         """Record what the owner has found out about an event.
@@ -463,6 +525,7 @@ class Monitor(SavesFrames, Estimator):
             charge.bench,
         )
         self.threshold_, self.release_ = charge.promise.rule.threshold, charge.promise.rule.release
+        self.promises_ = (*self.promises_, (self.last_, charge.promise))
         self.trained_, self.course_ = trained, course
 
     def _limit(self, detector: Any, trained: pd.DataFrame) -> float:

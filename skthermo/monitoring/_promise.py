@@ -80,34 +80,6 @@ def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.Da
 
 
 @dataclass(frozen=True)
-class Promise:
-    """A rule for events, and how many of them a healthy structure has in a year.
-
-    ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
-    ``highest`` of them with a probability of 90 %, by chance and because one baseline does not tell the rate.
-    ``n_years`` is the time that the baseline's judged records cover, ``n_peaks`` the number of its highest excursions
-    that the threshold comes from, ``unseen`` the seasons that the baseline does not show, for which nothing is promised
-    ("" if there is none), ``method`` what the threshold stands on in words.
-    """
-
-    rule: EventRule
-    expected: float
-    lowest: int
-    highest: int
-    n_years: float
-    n_peaks: int
-    unseen: str
-    method: str
-
-    def __str__(self) -> str:
-        expected = counted_number(self.expected, "false alarm")
-        return (
-            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
-            + (f"; not promised for {self.unseen}" if self.unseen else "")
-        )
-
-
-@dataclass(frozen=True)
 class Tail:
     """The highest excursions of a baseline: ``k`` squared peaks above a ``base``, with excesses of ``excess`` in all.
 
@@ -137,6 +109,21 @@ class Tail:
         """The index that so many peaks exceed."""
         return float(np.sqrt(self.base + self.factor(asked) * self.excess))
 
+    def chance(self, square: float, ratio: float) -> float:
+        """Probability that a time so many times as long as the baseline has a squared peak as high.
+
+        The number of peaks above the base in that time is negative binomial, as is that of the baseline's own; each
+        exceeds the square with the probability exp(-x g), where x is its height above the base in sums of excesses, and
+        g what these leave open of the tail, gamma distributed: so that the chance of a healthy structure is uniformly
+        distributed. Integrated at the quantiles of g where exp(-x g) counts.
+        """
+        x = (square - self.base) / self.excess
+        if x < 0:
+            return 1.0
+        g = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k) / (1 + x)
+        some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
+        return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
+
     def numbers(self, asked: float, n_years: float) -> tuple[int, int]:
         """Between which numbers events in one year lie, given what the excesses tell of the tail and of its rate."""
         spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k)
@@ -148,6 +135,41 @@ class Tail:
         tail, numbers = (1 - COVERAGE) / 2, range(1_000_000)
         lowest, highest = (next(n for n in numbers if at_most(n) >= level) for level in (tail, 1 - tail))
         return lowest, highest
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A rule for events, and how many of them a healthy structure has in a year.
+
+    ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
+    ``highest`` of them with a probability of 90 %, by chance and because one baseline does not tell the rate.
+    ``n_years`` is the time that the baseline's judged records cover, ``n_peaks`` the number of its highest excursions
+    that the threshold comes from, ``unseen`` the seasons that the baseline does not show, for which nothing is promised
+    ("" if there is none), ``method`` what the threshold stands on in words.
+    """
+
+    rule: EventRule
+    expected: float
+    lowest: int
+    highest: int
+    n_years: float
+    n_peaks: int
+    unseen: str
+    method: str
+    tail: Tail | None = None  # None in files of earlier versions
+
+    def __str__(self) -> str:
+        expected = counted_number(self.expected, "false alarm")
+        return (
+            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
+            + (f"; not promised for {self.unseen}" if self.unseen else "")
+        )
+
+    def chance(self, peak: float, n_years: float) -> float:
+        """Probability that a healthy structure has an event as high in so many years; NaN where it is not known."""
+        if self.tail is None:
+            return np.nan
+        return self.tail.chance(peak**2, n_years / self.n_years)
 
 
 def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D") -> float:
@@ -195,7 +217,7 @@ def promised_rule(
         ", extrapolated" if asked < FAR else ""
     )
     _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen)
-    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method)
+    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
 
 
 def _warn_of_baseline(

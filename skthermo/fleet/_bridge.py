@@ -1,0 +1,352 @@
+"""What is done for one bridge in a worker, and what comes back from there."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+import time
+import traceback
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import joblib
+import numpy as np
+import pandas as pd
+import sklearn
+from joblib import parallel_config, wrap_non_picklable_objects
+from sklearn.base import clone
+
+import skthermo
+from skthermo._io import without_bars
+from skthermo._threads import single_blas_thread
+from skthermo._validation import seed_parts
+from skthermo._warnings import counted_warnings
+from skthermo.metrics import mape
+
+SPEED = 1  # fastest compression of zlib, which adds a checksum
+LIBRARIES = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "dask", "distributed"}
+NOT_WATCHED = {
+    "state": "",
+    "last": pd.NaT,
+    "n_judged": 0,
+    "not_judged": np.nan,
+    "alarm_rate": np.nan,
+    "n_events": 0,
+    "n_open": 0,
+    "drift": np.nan,
+    "drift_group": "",
+}
+"""What is said of a bridge without a monitor."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An error of one bridge: in which stage, its type and text, and the last line of the package's or user's code."""
+
+    stage: str
+    type: str
+    message: str
+    where: str
+
+    @classmethod
+    def of(cls, stage: str, error: BaseException) -> Failure:
+        """What there is to tell of an error that was caught."""
+        return cls(stage, type(error).__name__, str(error), _place(error))
+
+    def __str__(self) -> str:
+        return f"{self.type}: {self.message}"
+
+
+Told = tuple[str, str, int]  # kind and text of a warning, and how often it came
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that is known of a bridge, fitted or not, beside its fitted objects, which are bytes.
+
+    ``content`` tells by which records, estimator and versions it was fitted.
+    """
+
+    name: Any
+    content: str = ""
+    is_fitted: bool = False
+    facts: dict[str, Any] = field(default_factory=dict)
+    standing: dict[str, Any] = field(default_factory=lambda: dict(NOT_WATCHED))
+    events: pd.DataFrame | None = None
+    warnings: tuple[Told, ...] = ()
+    late_warnings: tuple[Told, ...] = ()  # of the last update
+    failures: tuple[Failure, ...] = ()
+    seconds: float = 0.0
+    n_bytes: int = 0
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether there is a monitor."""
+        return self.events is not None
+
+
+class Result(NamedTuple):
+    """What a worker sends back: fitted objects as bytes where they are new, and judgements of new records."""
+
+    outcome: Outcome
+    fitted: bytes | None = None
+    answers: pd.DataFrame | None = None
+    is_as_before: bool = False
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A bridge to be fitted, unless that has been done with the same content before (``known``)."""
+
+    name: Any
+    maker: Any
+    records: Any
+    monitor: Callable[[Any], Any] | None
+    seed: int
+    known: Outcome | None
+
+    def __call__(self) -> Result:
+        """What was found, and fitted objects as bytes; those of what is known stay as they were."""
+        start, stage, outcome = time.perf_counter(), _Stage("records"), Outcome(self.name)
+        with _on_its_own() as counts:
+            try:
+                T, F = pair(call(self.records), self.name)
+                outcome = replace(outcome, facts=_facts(T, F))
+                stage.name = "maker"
+                estimator = clone(call(self.maker))
+                seed_parts(estimator, np.random.RandomState(self.seed))
+                content = content_of(estimator, (T, F), self.monitor)
+                if self.known is not None and self.known.content == content:
+                    return Result(self.known, is_as_before=True)
+                outcome, stage.name = replace(outcome, content=content), "fit"
+                chain = estimator.fit(T, F)
+                outcome = replace(outcome, facts=outcome.facts | {"mape": _error(chain, T, F)})
+                outcome, watch = self._watched(outcome, chain, T, F)
+                stage.name = "saving"
+                fitted = pickled((chain, watch))
+                outcome = replace(outcome, is_fitted=True, n_bytes=len(fitted))
+            except (Exception, SystemExit) as error:
+                failure, fitted = Failure.of(stage.name, error), None
+                if not outcome.content:
+                    return self.lost(failure, outcome.facts, told(counts))
+                outcome = Outcome(self.name, facts=outcome.facts, failures=(failure,))
+        return Result(replace(outcome, warnings=told(counts), seconds=time.perf_counter() - start), fitted)
+
+    def _watched(self, outcome: Outcome, chain: Any, T: Any, F: Any) -> tuple[Outcome, Any]:
+        """The monitor of a fitted chain; where it fails, it is tried again in the next call."""
+        if self.monitor is None:
+            return outcome, None
+        try:
+            monitor = _watching(self.monitor(chain), self.seed, T, F)
+            return replace(outcome, standing=standing_of(monitor), events=monitor.events_), monitor
+        except (Exception, SystemExit) as error:
+            return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
+
+    def lost(self, failure: Failure, facts: Any = None, warnings: tuple[Told, ...] = ()) -> Result:
+        """What is known if the records or the estimator cannot be had: what was fitted before, not judged any more."""
+        if self.known is not None and self.known.is_fitted:
+            return Result(_not_judged(self.known, failure, warnings))
+        return Result(Outcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
+
+
+@dataclass(frozen=True)
+class Update:
+    """New records for the monitor of a bridge."""
+
+    name: Any
+    outcome: Outcome
+    records: Any
+    kept: Any
+    fitted: bytes = b""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What travels to a worker: fitted objects are read when it is its turn."""
+        return vars(self) | {"kept": None, "fitted": self.kept.fitted(self.name)}
+
+    def __call__(self) -> Result:
+        """What is known now, fitted objects as bytes, and judgements."""
+        stage = _Stage("new records")
+        with _on_its_own() as counts:
+            try:
+                new = call(self.records)
+                new = joined(*new) if isinstance(new, tuple) else new
+                stage.name = "update"
+                chain, monitor = unpickled(self.fitted or self.kept.fitted(self.name))
+                if monitor is None:
+                    raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
+                answers = monitor.update(new)
+                fitted = pickled((chain, monitor))
+                known: dict[str, Any] = {"standing": standing_of(monitor), "events": monitor.events_}
+            except (Exception, SystemExit) as error:
+                return self.lost(Failure.of(stage.name, error), told(counts))
+        known |= {"failures": (), "late_warnings": told(counts), "n_bytes": len(fitted)}
+        return Result(replace(self.outcome, **known), fitted, _answers(self.name, answers))
+
+    def lost(self, failure: Failure, warnings: tuple[Told, ...] = ()) -> Result:
+        """The bridge as it was, with one row that says why no new record is judged."""
+        failure = replace(failure, stage="new records" if failure.stage == "new records" else "update")
+        return Result(_not_judged(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
+
+
+def _not_judged(outcome: Outcome, failure: Failure, warnings: tuple[Told, ...]) -> Outcome:
+    """The bridge as it was; it is not healthy, because nothing is known of it."""
+    standing = dict(outcome.standing)
+    if outcome.is_watched:
+        standing["state"] = "alarm" if standing["n_open"] else "not judged"
+    return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
+
+
+@dataclass
+class _Stage:
+    """What is being done."""
+
+    name: str
+
+
+@contextmanager
+def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
+    """Work of one bridge: one core, no bar, its own warnings."""
+    with ExitStack() as stack:
+        stack.enter_context(parallel_config("sequential"))
+        stack.enter_context(single_blas_thread())
+        stack.enter_context(without_bars())
+        yield stack.enter_context(counted_warnings())
+
+
+def call(given: Any) -> Any:
+    """What a function gives; anything else is given as it is. Estimators are no functions."""
+    return given() if callable(given) and not hasattr(given, "get_params") else given
+
+
+def pair(records: Any, name: Any) -> tuple[Any, Any]:
+    """Temperatures and frequencies."""
+    if not isinstance(records, tuple | list) or len(records) != 2:
+        raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
+    return records[0], records[1]
+
+
+def joined(T: Any, F: Any) -> pd.DataFrame:
+    """Temperatures and frequencies side by side, as monitors want them."""
+    if not (isinstance(T, pd.DataFrame) and isinstance(F, pd.DataFrame) and T.index.equals(F.index)):
+        raise ValueError(
+            f"records for a monitor are {type(T).__name__} and {type(F).__name__}; expected two frames with the same "
+            "stamps"
+        )
+    return T.join(F)
+
+
+def _watching(monitor: Any, seed: int, T: Any, F: Any) -> Any:
+    """A monitor that is fitted to the records."""
+    if not hasattr(monitor, "update") or not hasattr(monitor, "fit"):
+        raise ValueError(f"monitor gave {type(monitor).__name__!r}; expected an unfitted Monitor")
+    seed_parts(monitor, np.random.RandomState(seed))
+    return monitor.fit(joined(T, F))
+
+
+def _facts(T: Any, F: Any) -> dict[str, Any]:
+    """Number of records, and share of values that are missing."""
+    missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
+    return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
+
+
+def _error(chain: Any, T: Any, F: Any) -> float:
+    """Mean absolute error of the training frequencies in percent."""
+    report = getattr(chain, "report_", None)
+    errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
+    return float(np.mean(errors))
+
+
+def standing_of(monitor: Any) -> dict[str, Any]:
+    """What a monitor says of its bridge."""
+    days, events, drift = monitor.days_, monitor.events_, monitor.drift_
+    damage = events[events["kind"] == "damage"]
+    n_judged, n_records = int(days["n_judged"].sum()), monitor.counts_["n_records"]
+    standing = NOT_WATCHED | {
+        "state": monitor.state(),
+        "last": monitor.last_ if len(monitor.records_) else pd.NaT,
+        "n_judged": n_judged,
+        "not_judged": 1 - n_judged / n_records if n_records else np.nan,
+        "alarm_rate": days["n_alarms"].sum() / n_judged if n_judged else np.nan,
+        "n_events": len(damage),
+        "n_open": int(damage["end"].isna().sum()),
+    }
+    certain = drift[drift["significant"]] if drift is not None else []
+    if len(certain):
+        group = certain["change"].abs().idxmax()
+        standing |= {"drift": float(certain.loc[group, "change"]), "drift_group": str(group)}
+    return standing
+
+
+def _answers(name: Any, judged: pd.DataFrame) -> pd.DataFrame:
+    """Judgements with the name of their bridge."""
+    judged = judged.rename_axis("time").reset_index()
+    judged.insert(0, "bridge", pd.Series([name] * len(judged), dtype=object))
+    return judged
+
+
+def _no_answer(name: Any, failure: Failure) -> pd.DataFrame:
+    """One row for a bridge of which no new record was judged."""
+    row = {"bridge": name, "time": pd.NaT, "state": "not judged", "index": np.nan, "reason": str(failure), "event": 0}
+    return pd.DataFrame([row | {"revised": False}])
+
+
+def told(counts: Counter[tuple[str, str]]) -> tuple[Told, ...]:
+    """Kind, text and number of warnings, in the order in which they first came."""
+    return tuple((kind, text, times) for (kind, text), times in counts.items())
+
+
+def pickled(fitted: Any) -> bytes:
+    """Fitted objects as bytes, also if they hold functions of a notebook."""
+    return zlib.compress(by_value(fitted), SPEED)
+
+
+def unpickled(content: bytes) -> Any:
+    """Fitted objects from bytes."""
+    return pickle.loads(zlib.decompress(content))
+
+
+def by_value(thing: Any) -> bytes:
+    """Bytes of an object, with the code of functions that no module holds."""
+    return pickle.dumps(wrap_non_picklable_objects(thing, keep_wrapper=False))
+
+
+def seed_of(base: int, name: Any) -> int:
+    """The seed of a bridge, whatever the others are."""
+    return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
+
+
+def content_of(estimator: Any, records: Any, monitor: Any) -> str:
+    """A text that is another one for other records, another estimator or monitor, or other versions."""
+    versions = (skthermo.__version__, sklearn.__version__, joblib.__version__)
+    return joblib.hash((versions, *(_content(part) for part in (estimator, records, monitor))))
+
+
+def _content(part: Any) -> str:
+    """Content of one part; functions of scripts and notebooks count with their code."""
+    code = by_value(part)
+    if b"__main__" not in code:
+        try:
+            return joblib.hash(part)
+        except pickle.PicklingError:  # a function within a function
+            pass
+    return joblib.hash(code)
+
+
+def _place(error: BaseException) -> str:
+    """File, line and function of the last line in the package or in the user's code."""
+    frames = list(traceback.walk_tb(error.__traceback__))
+    own = [one for one in frames if _package(one[0]) not in LIBRARIES | sys.stdlib_module_names]
+    if not own:
+        return ""
+    frame, line = own[-1]
+    return f"{Path(frame.f_code.co_filename).name}:{line} in {frame.f_code.co_name}"
+
+
+def _package(frame: Any) -> str:
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0]

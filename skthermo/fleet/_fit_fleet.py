@@ -1,0 +1,173 @@
+"""Many bridges fitted side by side."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skthermo._arguments import check_jobs, check_path
+from skthermo._io import with_progress
+from skthermo.fleet._bridge import Fit, seed_of, standing_of, unpickled
+from skthermo.fleet._crew import work_off
+from skthermo.fleet._fleet import Fleet, warn_of_fleet
+from skthermo.fleet._kept import Kept
+
+
+def fit_fleet(
+    makers: Mapping[Hashable, Any],
+    records: Mapping[Hashable, Any],
+    *,
+    monitor: Callable[[Any], Any] | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    n_jobs: int | None = None,
+    random_state: int | np.random.RandomState | None = 0,
+    progress: bool | None = None,
+) -> Fleet:
+    """Fit many bridges, and their monitors, side by side; each fails alone.
+
+    Parameters
+    ----------
+    makers : mapping of name to estimator or function
+        An unfitted estimator for each bridge, such as a `~skthermo.surrogate.DataInformedFEM`, or a function without
+        arguments that makes one; a worker calls it, so that its model never is in this process.
+    records : mapping of name to (T, F) or function
+        Temperatures in degrees Celsius and frequencies in Hz of the healthy bridge, or a function without arguments
+        that loads them in the worker.
+    monitor : function, optional
+        Takes a fitted estimator and gives an unfitted `~skthermo.monitoring.Monitor`, which is fitted to the same
+        records. By default there are no monitors.
+    folder : str or path, optional
+        Where each bridge is kept as soon as it is fitted, a file for each. The same call goes on where the first was
+        stopped, and fits anew what has changed. By default all is kept in memory.
+    n_jobs : int, optional
+        Number of bridges that are worked on at once; each has one core. By default that of the active
+        ``joblib.parallel_config``, else 1.
+    random_state : int, RandomState or None, default=0
+        With the name of a bridge, the seed of all its parts that have none. With None, each call fits all anew.
+    progress : bool, optional
+        Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
+
+    Returns
+    -------
+    Fleet
+        Fitted bridges, their monitors, and a row for each bridge that says what became of it.
+
+    Raises
+    ------
+    ValueError
+        If the names of makers and records differ; if a maker, records or the monitor cannot be sent to another process.
+    TimeoutError
+        If another process works on the same folder.
+
+    Warns
+    -----
+    UserWarning
+        If bridges could not be fitted: how many and why; and one that counts the warnings of all bridges by kind.
+
+    See Also
+    --------
+    Fleet : What is known of the bridges afterwards, and new records for their monitors.
+
+    Notes
+    -----
+    The result is the same, bit for bit, whatever the number of jobs, the back end of joblib (its own processes, Dask,
+    Ray) and the other bridges are. Parallel parts within a bridge run one after another.
+
+    If a process is killed, for lack of memory, say, what is finished stays, and the rest is begun again in new
+    processes. A bridge that may have killed its process twice is run alone, and given up when it does so again. With
+    one job and no such back end, all runs in this process, which nothing protects. The back end "multiprocessing" of
+    joblib hangs when a process is killed.
+
+    What has changed is told by content: records, the estimator with its model, versions, and the code of ``monitor``.
+    Code that other modules hold is not looked into: use another folder when it has changed. Files are read with
+    ``pickle``, which can run any code: use only folders of your own.
+
+    Examples
+    --------
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.fleet import fit_fleet
+    >>> years = {name: make_truss_campaign(random_state=seed) for seed, name in enumerate(["north", "south"])}
+    >>> records = {name: (year.temperatures, year.frequencies) for name, year in years.items()}
+    >>> fleet = fit_fleet(dict.fromkeys(records, LinearRegression()), records)
+    >>> fleet
+    Fleet(2 bridges, 2 fitted)
+    >>> fleet.table["n_records"].to_dict()
+    {'north': 365, 'south': 365}
+    """
+    _check_names(makers, records)
+    check_jobs(n_jobs)
+    if monitor is not None and not callable(monitor):
+        raise ValueError(
+            f"monitor is {type(monitor).__name__!r}; expected a function of a fitted estimator that gives a Monitor"
+        )
+    base = _base(random_state)
+    kept = Kept(None if folder is None else check_path(folder, "folder"))
+    with kept.alone():
+        kept.read()
+        tasks = {
+            name: Fit(name, makers[name], records[name], monitor, seed_of(base, name), kept.outcomes.get(name))
+            for name in makers
+        }
+        kept.outcomes = {name: kept.outcomes[name] for name in makers if name in kept.outcomes}
+        n_done = 0
+        try:
+            work = work_off(tasks, n_jobs)
+            for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
+                if not result.is_as_before:
+                    kept.put(result.outcome, result.fitted)
+                elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
+                    _restore(kept, name)
+                n_done += 1
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note(_where_to_go_on(n_done, len(tasks), kept.folder))
+            raise
+    kept.outcomes = {name: kept.outcomes[name] for name in makers}
+    fleet = Fleet._of(kept)
+    warn_of_fleet(fleet)
+    return fleet
+
+
+def _restore(kept: Kept, name: Hashable) -> None:
+    """Take back what was said of a bridge while its records could not be had."""
+    fitted = kept.fitted(name)
+    watch = unpickled(fitted)[1]
+    standing = {} if watch is None else {"standing": standing_of(watch)}
+    kept.put(replace(kept.outcomes[name], failures=(), **standing), fitted)
+
+
+def _base(random_state: Any) -> int:
+    """A number from which all seeds come."""
+    if isinstance(random_state, int | np.integer) and not isinstance(random_state, bool):
+        return int(random_state)
+    source = np.random.RandomState() if random_state is None else random_state
+    if not isinstance(source, np.random.RandomState):
+        raise ValueError(f"random_state is {random_state!r:.100}; expected an integer, a RandomState or None")
+    return int(source.randint(np.iinfo(np.int32).max))
+
+
+def _check_names(makers: Any, records: Any) -> None:
+    """Raise an error unless both are mappings of the same names."""
+    for what, given in (("makers", makers), ("records", records)):
+        if not isinstance(given, Mapping):
+            raise ValueError(f"{what} are {type(given).__name__!r}; expected a mapping of names of bridges")
+    missing, unknown = [n for n in makers if n not in records], [n for n in records if n not in makers]
+    if missing or unknown:
+        raise ValueError(
+            f"{len(missing)} bridges have no records ({missing!r:.200}) and {len(unknown)} have no maker "
+            f"({unknown!r:.200}); expected the same names in both"
+        )
+    if not makers:
+        raise ValueError("makers are empty; expected at least one bridge")
+
+
+def _where_to_go_on(n_done: int, total: int, folder: Path | None) -> str:
+    """What an interrupt leaves."""
+    if folder is None:
+        return f"{n_done} of {total} bridges were finished, and are lost; expected folder=... to keep them"
+    return f"{n_done} of {total} bridges are finished and kept in {folder}; the same call goes on there"

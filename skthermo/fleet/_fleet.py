@@ -1,0 +1,317 @@
+"""What is known of many bridges."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Hashable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._arguments import check_jobs, check_path
+from skthermo._formatting import counted
+from skthermo._io import with_progress
+from skthermo._warnings import warn_user
+from skthermo.fleet._bridge import NOT_WATCHED, Outcome, Update, unpickled
+from skthermo.fleet._crew import work_off
+from skthermo.fleet._discoveries import Discoveries, discover, without_zone
+from skthermo.fleet._in_words import in_words, kinds, named
+from skthermo.fleet._kept import Kept
+
+ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
+
+
+class Fleet:
+    """Fitted bridges, their monitors, and what became of each.
+
+    Parameters
+    ----------
+    folder : str or path
+        That of an earlier `fit_fleet`.
+
+    Attributes
+    ----------
+    chains, monitors : mapping of name to estimator and to Monitor
+        Those that are fitted, read when asked for, each time anew: what is done to them is not kept.
+    table : DataFrame
+        A row for each bridge, of which the columns are listed below.
+    events : DataFrame
+        Events of all monitors: ``bridge``, ``event`` (its number) and the columns of a monitor's ``events_``.
+    warnings : DataFrame
+        Warnings of the fits and of the last update: ``bridge``, ``stage`` ("fit" or "update"), ``kind``, ``message``
+        and ``times``, how often it came.
+    errors : DataFrame
+        What failed: ``bridge``, ``stage`` ("records", "maker", "fit", "monitor", "saving", "process", or "new
+        records" and "update" of the last update), ``error`` (type and text) and ``where``, the last line of this
+        package or of your code.
+
+    Raises
+    ------
+    ValueError
+        If there is no such folder, or it holds no bridge.
+
+    See Also
+    --------
+    fit_fleet : Fits the bridges.
+    FleetPrior : What bridges have in common, for those with few records; takes a fleet.
+
+    Notes
+    -----
+    Columns of ``table``: ``is_fitted``; ``error``, "" where there is none; ``n_records`` of the fit; ``gaps``, the
+    share of their values that are missing; ``mape``, mean absolute error of the training frequencies in percent,
+    in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor ("healthy",
+    "alarm", "not judged", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the newest
+    record of all bridges; ``n_judged`` records, and the share ``not_judged``; ``alarm_rate``, the share of judged
+    records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest change of
+    stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted objects.
+
+    A bridge whose new records could not be judged is "not judged", or "alarm" while an event is open.
+
+    Examples
+    --------
+    >>> from skthermo.fleet import Fleet
+    >>> Fleet("no such folder")
+    Traceback (most recent call last):
+    ...
+    ValueError: there is no folder 'no such folder'; expected that of a fit_fleet
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]):
+        path = check_path(folder, "folder")
+        if not path.is_dir():
+            raise ValueError(f"there is no folder {str(path)!r}; expected that of a fit_fleet")
+        self._kept = Kept(path)
+        self._kept.read()
+        if not self._kept.outcomes:
+            raise ValueError(f"the folder {str(path)!r} holds no bridge; expected that of a fit_fleet")
+
+    @classmethod
+    def _of(cls, kept: Kept) -> Fleet:
+        fleet = cls.__new__(cls)
+        fleet._kept = kept
+        return fleet
+
+    def __len__(self) -> int:
+        return len(self._outcomes)
+
+    def __repr__(self) -> str:
+        states = self._states()
+        watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
+        watched += [f"{states[state]} in alarm" for state in ("alarm",) if states.get(state)]
+        watched += [f"{states[state]} not judged" for state in ("not judged",) if states.get(state)]
+        parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
+        return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
+
+    @property
+    def _outcomes(self) -> dict[Hashable, Outcome]:
+        return self._kept.outcomes
+
+    @property
+    def chains(self) -> Mapping[Hashable, Any]:
+        """Fitted estimators by name, read when asked for."""
+        return ReadWhenAsked({n: (self._kept, 0) for n, one in self._outcomes.items() if one.is_fitted})
+
+    @property
+    def monitors(self) -> Mapping[Hashable, Any]:
+        """Monitors by name, read when asked for."""
+        watched = (n for n, one in self._outcomes.items() if one.is_fitted and one.is_watched)
+        return ReadWhenAsked(dict.fromkeys(watched, (self._kept, 1)))
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """A row for each bridge."""
+        rows = [_row(one) for one in self._outcomes.values()]
+        names = pd.Index(list(self._outcomes), name="bridge", tupleize_cols=False)
+        table = pd.DataFrame(rows, index=names)
+        last = pd.Series([without_zone(stamp) for stamp in table["last"]], index=names, dtype="datetime64[ns]")
+        table.insert(table.columns.get_loc("last") + 1, "days_silent", (last.max() - last) / pd.Timedelta("1D"))
+        warned = self.warnings
+        counts = warned.groupby(["bridge", "kind"], sort=False)["times"].sum().unstack(fill_value=0)
+        place = table.columns.get_loc("n_warnings") + 1
+        for kind in sorted(counts.columns)[::-1]:
+            table.insert(place, f"warnings {kind}", counts[kind].reindex(names, fill_value=0))
+        return table
+
+    @property
+    def events(self) -> pd.DataFrame:
+        """Events of all monitors."""
+        tables = []
+        for name, one in self._outcomes.items():
+            if one.is_fitted and one.events is not None and len(one.events):
+                table = one.events.reset_index()
+                table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
+                tables.append(table)
+        columns = ["bridge", "event", "kind", "start", "end", "peak", "peak_time", "modes", "n_alarms"]
+        columns += ["acknowledged", "harmless", "note"]
+        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
+
+    @property
+    def warnings(self) -> pd.DataFrame:
+        """Warnings of the fits and of the last update."""
+        rows = [
+            (name, stage, kind, text, times)
+            for name, one in self._outcomes.items()
+            for stage, told in (("fit", one.warnings), ("update", one.late_warnings))
+            for kind, text, times in told
+        ]
+        return pd.DataFrame(rows, columns=["bridge", "stage", "kind", "message", "times"])
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        """What failed."""
+        rows = [
+            (name, failure.stage, str(failure), failure.where)
+            for name, one in self._outcomes.items()
+            for failure in one.failures
+        ]
+        return pd.DataFrame(rows, columns=["bridge", "stage", "error", "where"])
+
+    def update(
+        self, records: Mapping[Hashable, Any], n_jobs: int | None = None, *, progress: bool | None = None
+    ) -> pd.DataFrame:
+        """Judge records that came since, each bridge by its own monitor; each fails alone.
+
+        Parameters
+        ----------
+        records : mapping of name to DataFrame, (T, F) or function
+            New records of some bridges: a frame in the columns of the monitor's baseline, temperatures and frequencies
+            as two frames, or a function without arguments that loads one of these in the worker.
+        n_jobs : int, optional
+            Number of bridges that are worked on at once.
+        progress : bool, optional
+            Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
+
+        Returns
+        -------
+        DataFrame
+            A row for each record that was judged: ``bridge``, ``time`` and the columns of `Monitor.update`. A bridge
+            whose records could not be judged has one row without a time: "not judged", and the error as the reason.
+
+        Raises
+        ------
+        ValueError
+            If there is no bridge of a name; if records cannot be sent to another process.
+        TimeoutError
+            If another process works on the same folder.
+
+        Warns
+        -----
+        UserWarning
+            If bridges could not be updated: how many and why; and one that counts the warnings of all bridges by kind.
+
+        Notes
+        -----
+        Monitors that were fitted in a folder are kept there as soon as they have judged their records. Records that
+        come again are known, so that an update that was stopped is simply called again.
+        """
+        check_jobs(n_jobs)
+        unknown = [name for name in records if name not in self._outcomes]
+        if unknown:
+            raise ValueError(
+                f"{len(unknown)} names of records are those of no bridge ({unknown!r:.200}); expected some of the "
+                f"{len(self)} bridges"
+            )
+        answers: dict[Hashable, pd.DataFrame] = {}
+        kept = self._kept
+        with kept.alone():
+            known = set(kept.outcomes)
+            kept.read()  # another process may have updated the folder since
+            kept.outcomes = {name: one for name, one in kept.outcomes.items() if name in known}
+            tasks = {name: Update(name, kept.outcomes[name], given, kept) for name, given in records.items()}
+            work = work_off(tasks, n_jobs)
+            for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
+                kept.put(result.outcome, result.fitted)
+                answers[name] = result.answers
+        warn_of_fleet(self, list(records), "update")
+        tables = [answers[name] for name in records if len(answers[name])]
+        joined = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+        return joined.reindex(columns=ANSWERS)
+
+    def discoveries(self, share: float = 0.1, *, days: float = 365.25) -> Discoveries:
+        """Which events stand out among those of all bridges.
+
+        Parameters
+        ----------
+        share : float, default=0.1
+            Share of false ones among the bridges that are called, on average.
+        days : float, default=365.25
+            Events that are open, or ended within so many days before the newest record of all bridges, are compared.
+
+        Returns
+        -------
+        Discoveries
+            Events with their p values, and which bridges are called.
+
+        Raises
+        ------
+        ValueError
+            If no bridge has a monitor, or the share is not between 0 and 1.
+        """
+        if not len(self.monitors):
+            raise ValueError("no bridge has a monitor; expected fit_fleet(..., monitor=function of a chain)")
+        standings = {name: self._outcomes[name].standing for name in self.monitors}
+        return discover(self.monitors, standings, share, days)
+
+    def summary(self) -> str:
+        """How many bridges were fitted, failed, and are in which state, in a few lines.
+
+        Returns
+        -------
+        str
+            Plain sentences.
+        """
+        return in_words(self)
+
+    def _states(self) -> dict[str, int]:
+        return pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts().to_dict()
+
+
+class ReadWhenAsked(Mapping):
+    """Fitted objects by name, each read from what is kept when it is asked for."""
+
+    def __init__(self, places: Mapping[Hashable, tuple[Kept, int]]):
+        self._places = places
+
+    def __getitem__(self, name: Hashable) -> Any:
+        kept, place = self._places[name]
+        return unpickled(kept.fitted(name))[place]
+
+    def __iter__(self) -> Iterator[Hashable]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} fitted objects by name, read when asked for>"
+
+
+def _row(one: Outcome) -> dict[str, Any]:
+    """One bridge in the table."""
+    facts = {"n_records": 0, "gaps": np.nan, "mape": np.nan} | one.facts
+    standing = one.standing if one.is_fitted else NOT_WATCHED
+    n_warnings = sum(times for _, _, times in (*one.warnings, *one.late_warnings))
+    error = "; ".join(str(failure) for failure in one.failures)
+    first = {"is_fitted": one.is_fitted, "error": error, **facts, "n_warnings": n_warnings}
+    return first | standing | {"seconds": one.seconds, "megabytes": one.n_bytes / 1e6}
+
+
+def warn_of_fleet(fleet: Fleet, names: list[Hashable] | None = None, stage: str = "fit") -> None:
+    """One warning for all bridges that failed, and one for all of their warnings."""
+    asked = list(fleet._outcomes) if names is None else names
+    failed = [name for name in asked if fleet._outcomes[name].failures]
+    if failed:
+        first = fleet._outcomes[failed[0]].failures[0]
+        warn_user(
+            f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}; "
+            "expected none: see fleet.errors",
+            "bridges that failed",
+        )
+    warned = fleet.warnings
+    warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
+    if len(warned):
+        warn_user(
+            f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}; see fleet.warnings",
+            "warnings of bridges",
+        )

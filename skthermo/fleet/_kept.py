@@ -1,0 +1,77 @@
+"""What is known of each bridge, in memory or in a folder."""
+
+from __future__ import annotations
+
+import pickle
+import re
+import zlib
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+
+from skthermo._io import alone_with, write_when_complete
+from skthermo.fleet._bridge import Failure, Outcome
+
+ENDING = ".bridge"
+LONGEST = 40  # letters of a name that its file shows
+SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
+
+
+@dataclass
+class Kept:
+    """Outcomes by name, at hand; fitted objects as bytes, in memory or in a folder."""
+
+    folder: Path | None = None
+    outcomes: dict[Hashable, Outcome] = field(default_factory=dict)
+    in_memory: dict[Hashable, bytes] = field(default_factory=dict)
+
+    def read(self) -> None:
+        """Read what the folder holds; a file that cannot be read is a bridge that is not fitted."""
+        if self.folder is None:
+            return
+        for file in sorted(self.folder.glob(f"*{ENDING}")):
+            try:
+                outcome = _content(file)[0]
+            except Exception as error:  # damaged files raise errors of every type
+                outcome = Outcome(file.stem, failures=(Failure.of("reading its file", error),))
+            self.outcomes[outcome.name] = outcome
+
+    def put(self, outcome: Outcome, fitted: bytes | None) -> None:
+        """Keep what is known of a bridge; without bytes, its fitted objects stay what they are."""
+        if fitted is None:
+            fitted = self.fitted(outcome.name) if outcome.is_fitted else b""
+        if self.folder is None:
+            self.in_memory[outcome.name] = fitted
+        else:
+            write_when_complete(self._file(outcome.name), zlib.compress(pickle.dumps((outcome, fitted)), level=0))
+        self.outcomes[outcome.name] = outcome
+
+    def fitted(self, name: Hashable) -> bytes:
+        """Fitted objects of a bridge as bytes."""
+        return self.in_memory[name] if self.folder is None else _content(self._file(name))[1]
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Be the only process that works on the folder; what killed processes left half written is removed."""
+        if self.folder is None:
+            yield
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with alone_with(self.folder / "fleet", SECONDS_TO_WAIT):
+            for left in self.folder.glob(f".*{ENDING}.*"):
+                left.unlink(missing_ok=True)
+            yield
+
+    def _file(self, name: Hashable) -> Path:
+        """The file of a bridge, whose name may hold any letters."""
+        assert self.folder is not None
+        shown = re.sub(r"[^\w-]+", "_", str(name))[:LONGEST]
+        return self.folder / f"{shown}-{sha256(repr(name).encode()).hexdigest()[:10]}{ENDING}"
+
+
+def _content(file: Path) -> tuple[Outcome, bytes]:
+    """What `Kept.put` wrote, with a checksum."""
+    outcome, fitted = pickle.loads(zlib.decompress(file.read_bytes()))
+    return outcome, fitted
