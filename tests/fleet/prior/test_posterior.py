@@ -118,7 +118,9 @@ def simulated(random, n_bridges, mu, Sigma, information=50.0):
         J = np.diag(information * random.uniform(0.1, 2, FUNCTIONS))
         h = J @ (b + random.normal(size=FUNCTIONS) / np.sqrt(np.diag(J)))
         zero = np.zeros(1)
-        found = Information(J, h, zero, zero, np.zeros((1, FUNCTIONS)), np.ones((1, 1)), RowNoise(np.eye(1), 1.0, zero))
+        found = Information(
+            J, h, zero, zero, np.zeros((1, FUNCTIONS)), np.ones((1, 1)), RowNoise(np.eye(1), 1.0, zero), zero
+        )
         members.append(Member(found, ["g"], np.ones(1), np.zeros((1, 1)), own))
     return members
 
