@@ -73,8 +73,8 @@ print(prior.summary())
 # ----------------
 # Mean error in percent of the frequencies of 2026, without their noise: learned from 30 days of June 2025 alone, from
 # these days and the fleet, and from an own full year. One of the four has a thermal law of its own, as one bridge in
-# twenty of this fleet has: the fleet is no help to it. The last column is the smallest probability, over its families,
-# that the bridge follows the fleet: whether 30 days of June tell that it does not.
+# twenty of this fleet has, and the fleet misleads it. The last column is the probability that a bridge follows the
+# fleet: what 30 days of June tell of that.
 
 chains, errors = {}, {}
 for name in new:
@@ -90,8 +90,8 @@ for name in new:
         for label, chain in chains[name].items()
     }
     follows = chains[name]["30 days and the fleet"].mapper_[-1].follows_
-    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_alien, "follows": min(follows.values())}
-print(pd.DataFrame(errors).T.round(2).to_string())
+    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_alien, "follows": max(follows.values())}
+print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 
 # %%
 # What the fleet adds
