@@ -19,7 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-COPIED = ("skthermo", "tests", "pyproject.toml")
+COPIED = ("skthermo", "tests", "conftest.py", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/fleet/_climate.py", "datasets/test_fleet.py"): [
