@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -120,14 +121,13 @@ class Tail:
         x = (square - self.base) / self.excess
         if x < 0:
             return 1.0
-        g = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k) / (1 + x)
+        g = _quantiles(self.k) / (1 + x)
         some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
         return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
 
     def numbers(self, asked: float, n_years: float) -> tuple[int, int]:
         """Between which numbers events in one year lie, given what the excesses tell of the tail and of its rate."""
-        spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k)
-        share = np.exp(-self.factor(asked) * spread) / n_years
+        share = np.exp(-self.factor(asked) * _quantiles(self.k)) / n_years
 
         def at_most(number: int) -> float:
             return float(nbinom.cdf(number, self.k + 1, 1 / (1 + share)).mean())
@@ -170,6 +170,12 @@ class Promise:
         if self.tail is None:
             return np.nan
         return self.tail.chance(peak**2, n_years / self.n_years)
+
+
+@cache
+def _quantiles(k: int) -> Array:
+    """Values of a gamma distribution at which what depends on it is averaged."""
+    return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
 
 
 def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D") -> float:
