@@ -10,8 +10,10 @@ import pytest
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import AffineModel
 from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.studies import DetectabilityStudy, identify_damage
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.bayesian import BayesianLogs, Logs, basis, weather
 
@@ -114,7 +116,7 @@ def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of
     seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)
     np.testing.assert_array_equal(table["from_fleet"], ~seen)
     assert list(table)[-2:] == ["outside_bounds", "from_fleet"]
-    assert not table[["T1", "T2"]].to_numpy().any()
+    np.testing.assert_array_equal((table[["T1", "T2"]] > 0).any(axis=1), ~seen)
     with pytest.warns(UserWarning, match="stand on what the fleet") as given:
         fem.predict(T)
     said = f"{(~seen).sum()} of 395 rows are in weather that the training records have not seen, and stand on what the"
@@ -140,3 +142,15 @@ def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     assert fem.predict_covariance(T).shape == (120, 2, 2)
     assert list(fem.applicability(T)) == [*fem.training_range_.names, "outside_bounds", "from_fleet"]
     assert len(fem.training_range_.names) == 4
+
+
+def test_damage_is_identified_and_studies_run_on_a_chain_that_stands_on_a_fleet():
+    fem, T, F = fitted()
+    damaged = fem.simulate(T[30:], damage={"pier": 0.15}, noise="fitted", random_state=0)
+    found = identify_damage(fem, T[30:], damaged)
+    assert found.table["probability"].idxmax() == "pier"
+    assert abs(found.table.loc["pier", "severity"] - 0.15) < 0.05
+    detector = make_pipeline(TemperatureCompensator(fem, targets=list(F)), MahalanobisDetector())
+    study = DetectabilityStudy(fem, detector, [{"pier": 0.15}], n_repeats=1, uncertainty="noise", random_state=0)
+    rates = study.run(T[:60]).groupby("measure")["rate"].mean()
+    assert rates["POD"] > 0.9

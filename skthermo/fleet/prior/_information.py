@@ -15,10 +15,12 @@ from skthermo._times import correlation_time
 from skthermo.fleet.prior._basis import FleetBasis
 from skthermo.fleet.prior._posterior import OwnPrior, posterior
 from skthermo.fleet.prior._records import BridgeRecords
+from skthermo.preprocessing import HampelFilter
 
 ROUNDS = 4  # of noise and coefficients in turn
 USUAL = 0.99  # share of the records, if normal, that count in full; others the less the farther away they are
 PSEUDO_ROWS = 20.0  # independent records as which the noise of the fleet counts beside that of a new bridge
+FAR_IN_TIME = 1e-3  # weight of such a row before it is known whether the weather explains it
 LEAST_LEFT = 0.25  # share of the records that regression leaves to the noise, at least
 SMALLEST_VARIANCE = 1e-18  # of ln y
 JITTER = 1e-9  # share of its variance that each output has of its own
@@ -73,10 +75,11 @@ class RowNoise:
 
     @classmethod
     def before(cls, z: Array, expected: Array | None, memory: float) -> RowNoise:
-        """That of the fleet, or the variances of what was measured."""
+        """That of the fleet, or the variances of what was measured; rows far from their neighbours hardly count."""
         if expected is None:
             expected = np.diag(np.maximum(np.nanvar(z, axis=0), SMALLEST_VARIANCE))
-        return cls(expected, memory, np.ones(len(z)))
+        far = ~np.isnan(z) & np.isnan(HampelFilter().fit(z).transform(z))
+        return cls(expected, memory, np.where(far.any(axis=1), FAR_IN_TIME, 1.0))
 
     def updated(
         self, residuals: Array, weights: Array, dof: float, expected: Array | None, fleet_memory: float

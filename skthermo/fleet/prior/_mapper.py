@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import RegressorMixin, clone
+from sklearn.base import RegressorMixin
 
 from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_columns
@@ -24,7 +24,7 @@ from skthermo.fleet.prior._records import BridgeRecords, usable_rows
 from skthermo.metrics import complete_r2
 from skthermo.surrogate import FrequencyCoordinates
 
-N_KNOTS = 4  # without a fleet
+N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
 
 
 class FleetMapper(RegressorMixin, Estimator):
@@ -101,11 +101,6 @@ class FleetMapper(RegressorMixin, Estimator):
         self.families = families
         self.coordinates = coordinates
 
-    def __sklearn_clone__(self) -> FleetMapper:
-        # The prior stays fitted: it is what the mapper knows, not a part that the mapper fits.
-        others = {name: value for name, value in self.get_params(deep=False).items() if name != "prior"}
-        return type(self)(self.prior, **{name: clone(value, safe=False) for name, value in others.items()})
-
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> FleetMapper:
         """Learn what the bridge's own records tell, beside the fleet.
@@ -136,6 +131,10 @@ class FleetMapper(RegressorMixin, Estimator):
         trained = usable_rows(inputs, values, weights, complete=self.coordinates is not None)
         if not trained.any():
             raise ValueError(f"none of {len(inputs)} rows has all inputs, a quantity and a weight; expected one")
+        if self.prior is None and trained.sum() < LEAST_ALONE:
+            raise ValueError(
+                f"{trained.sum()} of n_samples={len(inputs)} rows are complete; expected {LEAST_ALONE} without a prior"
+            )
         known = FleetKnowledge.none(inputs[trained], N_KNOTS) if self.prior is None else self.prior.knowledge_
         names = self._names_of(y, values.shape[1])
         given = getattr(self.prior, "families", None) if self.families is None else self.families

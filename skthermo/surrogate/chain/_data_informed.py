@@ -130,8 +130,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     sensors_ : SensorRegression
         What each temperature sensor shows, given the others: fills missing temperatures.
     training_range_ : TrainingRange
-        Lowest and highest value of each input of M2, lags included; with a mapper that has learned from a fleet, in its
-        records or in those of the fleet.
+        Lowest and highest value of each input of M2, lags included, in the training records.
     box_ : Box or None
         Bounds of the inverse.
     simulator_ : Simulator
@@ -288,10 +287,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with stages.stage("report"):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
             self.records_ = TrainingRecords(T, F, as_floats(inputs), targets, learned, weights, self.parameter_names_)
-            own = TrainingRange.of(inputs, self.records_.trained)
-            self.training_range_ = (reach_of(self.mapper_, filled) or (own,))[0]
+            self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
             self.simulator_ = simulator_of(self, learned)
-            self.report_ = report_of(self, estimates, findings, own)
+            self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
         return self
@@ -968,9 +966,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         DataFrame
             With X's index. One column for each input of M2, lags included: its distance outside the range of the
             training rows, divided by that range (0 inside). The column ``outside_bounds`` says whether a
-            parameter is outside the bounds of the inverse. Where the mapper has learned from a fleet, the range is that
-            of the fleet and of the training rows together, and a last column, ``from_fleet``, is True in weather that
-            only the fleet has seen.
+            parameter is outside the bounds of the inverse. Where the mapper has learned from a fleet, a last column,
+            ``from_fleet``, is True in weather that the fleet has seen, and the training rows have not.
         """
         T = self._temperatures(X)[0]
         inputs = inputs_of_last_step(self.mapper_, T)
@@ -1089,7 +1086,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         T, deviations = self._temperatures(X)
         inputs = inputs_of_last_step(self.mapper_, T)
         warn_each(gap_warnings(T, deviations, as_floats(inputs)))
-        outside = self.training_range_.warning(inputs)
+        reach = reach_of(self.mapper_, T)
+        outside = self.training_range_.warning(inputs) if reach is None else reach[0].warning(reach[1])
         if outside:
             warn_user(outside, "weather outside the training range")
         warn_of_fleet(self._from_fleet(T), "standard deviations and intervals say how uncertain that is")

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from skthermo._arguments import seem_rad_per_s
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._frames import column_names, columns_by_sensor
-from skthermo._regressors import offers
+from skthermo._regressors import offers, reach_of
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import last_step
-from skthermo._weather import SensorRegression, TrainingRange
+from skthermo._weather import SensorRegression
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
@@ -270,8 +270,8 @@ class FitReport(SavesFrames):
             )
 
 
-def report_of(chain: Any, estimates: Estimates, findings: RecordFindings, own: TrainingRange) -> FitReport:
-    """The report of a chain that is fitted otherwise, to records in some weather of their own."""
+def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> FitReport:
+    """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
@@ -305,23 +305,18 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings, own: T
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
         findings=findings,
-        fleet=weather_of_fleet(chain, own),
+        fleet=weather_of_fleet(chain),
         follows=getattr(last_step(chain.mapper_), "follows_", None),
     )
 
 
-def weather_of_fleet(chain: Any, own: TrainingRange) -> pd.DataFrame | None:
+def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
     """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
-    if not offers(chain.mapper_, "from_fleet"):
+    if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
-    known = chain.training_range_
-    columns = {
-        "lowest": own.lowest,
-        "highest": own.highest,
-        "fleet lowest": known.lowest,
-        "fleet highest": known.highest,
-    }
-    return pd.DataFrame(columns, index=list(own.names))
+    own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
+    limits = np.column_stack([own.lowest, own.highest, fleet.lowest, fleet.highest])
+    return pd.DataFrame(limits, index=list(own.names), columns=["lowest", "highest", "fleet lowest", "fleet highest"])
 
 
 def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
