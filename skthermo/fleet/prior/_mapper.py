@@ -17,10 +17,10 @@ from skthermo._validation import Estimator, HasMethods, _fit_context, check_arra
 from skthermo._weather import TrainingRange, parts
 from skthermo.fleet.prior._basis import steady_changes
 from skthermo.fleet.prior._bridges import families_by_name
-from skthermo.fleet.prior._information import Information
+from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._knowledge import FleetKnowledge
 from skthermo.fleet.prior._posterior import Mixture
-from skthermo.fleet.prior._records import BridgeRecords, usable_rows
+from skthermo.fleet.prior._records import BridgeRecords, days_of, usable_rows
 from skthermo.metrics import complete_r2
 from skthermo.surrogate import FrequencyCoordinates
 
@@ -58,6 +58,8 @@ class FleetMapper(RegressorMixin, Estimator):
         Posterior mean of the level and of the coefficients of the fleet's basis, of ln y.
     covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
         Their posterior covariance.
+    misfit_ : ndarray of shape (n_outputs,)
+        Variances of what ln y does with the weather that the basis cannot follow, as bridges of the fleet show it.
     centre_ : ndarray of shape (n_functions,)
         Mean of the basis in the bridge's own records, to which the level belongs.
     parameter_names_ : list or None
@@ -139,12 +141,13 @@ class FleetMapper(RegressorMixin, Estimator):
         names = self._names_of(y, values.shape[1])
         given = getattr(self.prior, "families", None) if self.families is None else self.families
         self.families_ = families_by_name(given, names)
-        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates)
+        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates, days_of(X))
         families = list(self.families_.values())
         found, state = known.posterior(records, families, self.covariates)
         self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
         self.basis_, self.centre_ = known.basis, found.centre
         self.coefficients_, self.covariance_ = with_levels(found, state)
+        self.misfit_ = (FleetNoise() if known.noise is None else known.noise).misfit(found, families)
         self.own_range_ = TrainingRange.of(frame_like(X, inputs), trained)
         own, fleet = self.own_range_, known.basis.reach
         lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)
@@ -166,7 +169,7 @@ class FleetMapper(RegressorMixin, Estimator):
         y : ndarray or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
             Exponential of the posterior mean, the median of the posterior.
         std : ndarray or DataFrame of the same shape
-            Only with ``return_std``: what the records and the fleet leave open, without the noise of a measurement.
+            Only with ``return_std``: roots of the diagonal of `predict_covariance`.
         """
         values, covariance = self._posterior_at(X, check_flag(return_std, "return_std"))
         if not return_std:
@@ -175,7 +178,7 @@ class FleetMapper(RegressorMixin, Estimator):
         return self._as_targets(X, values), self._as_targets(X, std)
 
     def predict_covariance(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Covariance of the quantities, because their coefficients are uncertain.
+        """Covariance of the clean quantities: what coefficients leave open, and what no function of the basis follows.
 
         Parameters
         ----------
@@ -315,7 +318,7 @@ class FleetMapper(RegressorMixin, Estimator):
             values[rows] = np.exp(x @ self.coefficients_.T)
             if with_covariance:
                 half = np.einsum("ti,aibj->tabj", x, self.covariance_)
-                logs = np.einsum("tabj,tj->tab", half, x)
+                logs = np.einsum("tabj,tj->tab", half, x) + np.diag(self.misfit_)
                 covariance[rows] = values[rows][:, :, np.newaxis] * values[rows][:, np.newaxis] * logs
         return values, covariance
 
