@@ -11,7 +11,7 @@ from skthermo.monitoring._promise import Tail
 N_PEAKS, RATIO = 60, 0.7
 
 
-def healthy(random, n=1, common=0.0):
+def healthy(random, n=1, common=0.0, is_exponential=False):
     """P values of healthy bridges: squared peaks with an exponential tail, of a baseline and of a time like it.
 
     The highest new peaks share a normal factor with this correlation.
@@ -23,13 +23,18 @@ def healthy(random, n=1, common=0.0):
         number = random.poisson(RATIO * N_PEAKS)
         z = np.sqrt(common) * shared + np.sqrt(1 - common) * random.normal()
         highest = 3.0 * -np.log(-np.expm1(norm.logcdf(z) / max(number, 1)))  # of so many exponential peaks
-        chances.append(Tail.of(base, 1.0).chance(highest, RATIO) if number else 1.0)
+        tail = Tail.of(base, 1.0)
+        tail = Tail(tail.k, tail.base, tail.excess) if is_exponential else tail
+        chances.append(tail.chance(highest, RATIO) if number else 1.0)
     return np.array(chances)
 
 
 def test_chances_of_healthy_bridges_are_p_values():
-    p = healthy(np.random.default_rng(0), 2000)
+    p = healthy(np.random.default_rng(0), 2000, is_exponential=True)
     assert kstest(p[p < 0.99], "uniform", (0, 0.99)).pvalue > 0.01
+    careful = healthy(np.random.default_rng(0), 2000)
+    assert (careful >= p).all()
+    assert 0.5 < (careful == p).mean() < 0.95
 
 
 @pytest.mark.parametrize("x", [0.3, 1.0, 3.0])
@@ -69,3 +74,11 @@ def test_a_fleet_of_one_is_called_by_its_p_value():
     assert _limits(np.array([0.11]), 0.1) == (-1.0, 0.1)
     assert _limits(np.array([]), 0.1) == (-1.0, 0.0)
     assert pd.Series(_limits(np.r_[0.001, 0.9, 0.9, 0.9], 0.1)).tolist() == [0.001, 0.025]
+
+
+def test_a_baseline_with_an_outlier_makes_chances_larger():
+    squares = np.sort(np.random.default_rng(3).exponential(3.0, 60))[::-1]
+    odd = Tail.of(np.r_[200.0, squares[1:]], 1.0)
+    plain = Tail(odd.k, odd.base, odd.excess)
+    for height in (200.0, 400.0, 2000.0):
+        assert odd.chance(height, 1.0) > 10 * plain.chance(height, 1.0)
