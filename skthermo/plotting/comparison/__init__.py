@@ -1,4 +1,4 @@
-"""Several detectors beside each other."""
+"""Detectors beside each other, and bridges beside a fleet."""
 
 from skthermo.plotting.comparison._agreement import AgreementDisplay
 from skthermo.plotting.comparison._fleet_prior import FleetPriorDisplay
