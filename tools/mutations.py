@@ -22,6 +22,19 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("datasets/fleet/_climate.py", "datasets/test_fleet.py"): [
+        ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
+    ],
+    ("datasets/fleet/_laws.py", "datasets/test_fleet.py"): [
+        ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
+    ],
+    ("preprocessing/_sensors.py", "preprocessing/test_sensors.py"): [
+        (
+            "a failing sensor that moves the mean",
+            "level = values - self.offsets_",
+            "level = values - 0 * self.offsets_",
+        ),
+    ],
     ("_gaussian.py", "detection/test_known_errors.py"): [
         (
             "known errors that count as scatter",

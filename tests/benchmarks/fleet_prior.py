@@ -327,6 +327,18 @@ def table(rows, by=("start", "days"), what="error", how="mean"):
     return found[[way for way in order if way in found]]
 
 
+def losses(rows):
+    """What the prior costs against alone, in percent of alone's mean error, with its standard error over bridges."""
+    errors = table(rows, by=("start", "days", "bridge"))
+    by = ["start", "days"]
+    cost, level = (errors["prior"] - errors["alone"]).groupby(by, sort=False), errors["alone"].groupby(by, sort=False)
+    worse = (errors["prior"] > LOSS * errors["alone"]).groupby(by, sort=False).mean()
+    columns = {"cost, %": cost.mean(), "standard error": cost.std() / np.sqrt(cost.count())}
+    return pd.DataFrame(
+        {name: 100 * column / level.mean() for name, column in columns.items()} | {"share worse": worse}
+    )
+
+
 def shown(title, frame):
     print(f"\n{title}\n{frame.round(3).to_string()}", flush=True)
 
@@ -361,7 +373,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bridges", type=int, default=50)
     parser.add_argument("--groups", type=int, default=10, help="left out in turn; as many as bridges: one by one")
-    parser.add_argument("--newcomers", type=int, default=12, help="bridges with laws of their own")
+    parser.add_argument("--newcomers", type=int, default=15, help="bridges with laws of their own")
     parser.add_argument("--days", type=int, nargs="+", default=DAYS)
     parser.add_argument("--starts", nargs="+", choices=list(STARTS), default=list(STARTS))
     parser.add_argument("--worlds", nargs="+", choices=["frequencies", "chains"], default=["frequencies", "chains"])
@@ -384,6 +396,7 @@ def main():
             rows, seconds, prior = campaign_rows(world, fleet, options.groups, options.days, options.starts)
             shown(f"{label}: mean error, % ({len(fleet)} bridges, {options.groups} groups)", table(rows))
             shown(f"{label}: median error, %", table(rows, how="median"))
+            shown(f"{label}: what the fleet costs (negative: gives)", losses(rows))
             shown(f"{label}: mean error by kind, %", table(rows, by=("kind", "start", "days")))
             shown(f"{label}: share of records in 90 % intervals", table(rows, what="inside"))
             if (rows["alien"] != "").any():
@@ -393,6 +406,7 @@ def main():
             missed += misses_of(label, rows)
             rows, *_ = campaign_rows(world, fleet, 1, options.days, options.starts, strangers)
             shown(f"{label}: new bridges with thermal laws of their own, mean error, %", table(rows))
+            shown(f"{label}: what the fleet costs them", losses(rows))
             shown(f"{label}: the same by law", table(rows, by=("alien", "days")))
             missed += losses_of(f"{label}, aliens", rows)
             groups = min(options.groups, 5)

@@ -43,7 +43,9 @@ class FleetBasis:
         scale = np.where(varying, deviations, np.inf)
         variances, vectors = np.linalg.eigh(np.atleast_2d(np.cov((pooled - middle) / scale, rowvar=False, bias=True)))
         shares, vectors = variances[::-1] / max(variances.sum(), 1e-300), vectors[:, ::-1]
-        vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(shares))])
+        vectors = vectors * np.where(
+            np.linspace(2, 1, len(vectors)) @ vectors < 0, -1.0, 1.0
+        )  # eigenvectors have no sign
         components = vectors[:, shares > SMALLEST].T / scale
         places = (pooled - middle) @ components.T
         n_breaking = max(int((shares > BREAKING).sum()), 1)

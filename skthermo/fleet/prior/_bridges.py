@@ -12,7 +12,7 @@ import pandas as pd
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, check_is_fitted, last_step
-from skthermo.fleet.prior._records import BridgeRecords
+from skthermo.fleet.prior._records import BridgeRecords, days_of
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,14 @@ class ReadBridge:
     input_names: list[Any] | None
     weights: Array | None = None
     coordinates: Any = None
+    times: Array | None = None
 
     def records(self, order: Sequence[Any] | None) -> BridgeRecords:
         """Its records, inputs in a common order."""
         inputs = self.inputs
         if order is not None and self.input_names is not None and self.inputs.shape[1] > 1:
             inputs = inputs[:, [self.input_names.index(name) for name in order]]
-        return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.coordinates)
+        return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.coordinates, self.times)
 
 
 def bridges_of(bridges: Any) -> dict[Hashable, Any]:
@@ -62,7 +63,15 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
     input_names = list(bridge.training_range_.names) if hasattr(bridge, "feature_names_in_") else None
     coordinates = getattr(last_step(bridge.mapper_), "coordinates", None)
     weights = records.weights if records.weights is None else np.where(records.counted, records.weights, 0.0)
-    return ReadBridge(records.inputs, records.targets, list(bridge.parameter_names_), input_names, weights, coordinates)
+    return ReadBridge(
+        records.inputs,
+        records.targets,
+        list(bridge.parameter_names_),
+        input_names,
+        weights,
+        coordinates,
+        days_of(records.temperatures),
+    )
 
 
 def read_pair(T: Any, Y: Any) -> ReadBridge:
@@ -80,7 +89,8 @@ def read_pair(T: Any, Y: Any) -> ReadBridge:
         names = ["f1" if Y.name is None else Y.name]
     else:
         names = column_names(Y, "f") if np.ndim(Y) == 2 else ["f1"]
-    return ReadBridge(inputs, values, list(names), list(T.columns) if hasattr(T, "columns") else None, None, None)
+    input_names = list(T.columns) if hasattr(T, "columns") else None
+    return ReadBridge(inputs, values, list(names), input_names, times=days_of(T))
 
 
 def common_inputs(read: Mapping[Hashable, ReadBridge]) -> list[Any] | None:

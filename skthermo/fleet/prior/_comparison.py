@@ -10,14 +10,15 @@ import pandas as pd
 from scipy.stats import t as student
 
 from skthermo._arrays import Array
-from skthermo.fleet.prior._families import Family, Member, learn_families
-from skthermo.fleet.prior._posterior import Mixture, mixture, posterior
+from skthermo.fleet.prior._families import Family, Member, expect, learn_families
+from skthermo.fleet.prior._posterior import ALIENS, Mixture, follow_chance, mixture, posterior
 
 LEAST_BRIDGES = 3
+LEAST_DEVIATION = 1.0  # of a bridge's gain: that a few are alike is chance
 LEVEL = 0.95  # probability with which a gain must be one
-ALIENS, COUNT = 0.05, 10.0  # share of aliens before any is seen, and bridges as which it counts
+COUNT = 10.0  # bridges as which it counts that few are aliens
 MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
-WARM_STEPS, FEW = 3, 60  # steps of the iteration without a bridge, the more the fewer bridges there are
+FEW = 60  # bridges of which one changes little of what is known of the others: fewer take more steps without it
 FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: an alien, among at least so many
 SETTLED = 0.05
 ROUNDS = 3  # in which aliens are found, and the families learned without them
@@ -38,13 +39,13 @@ def left_out(
 ) -> list[Mixture]:
     """Every bridge's posterior by families that are learned without it."""
     found: dict[int, Mixture] = {}
+    moments, n_steps = expect(members, families), FEW // len(members)
     for group in groups(len(members)):
         kept = [i for i in range(len(members)) if i not in group]
         others = {(place, name): follows.get((i, name), 1.0) for place, i in enumerate(kept) for name in names}
         rest = [members[i] for i in kept]
         known = [name for name in names if sum(name in member.families for member in rest) > 0]
-        n_steps = max(WARM_STEPS, FEW // max(len(members), 1))
-        without = learn_families(rest, known, others, {name: families[name] for name in known}, n_steps)
+        without = learn_families(rest, known, others, [moments[i] for i in kept], n_steps)
         for i in group:
             member = members[i]
             prior = member.prior(without, predictive=True)
@@ -80,11 +81,11 @@ class Comparison:
             for name in several:
                 shares = [follows[i, name] for i, member in enumerate(members) if name in member.families]
                 probabilities[name] = (sum(shares) + (1 - ALIENS) * COUNT) / (len(shares) + COUNT)
-            families = learn_families(members, names, follows, families)
+            families = learn_families(members, names, follows, expect(members, families))
             if max((abs(share - before.get(key, 1.0)) for key, share in follows.items()), default=0.0) < SETTLED:
                 break
         table = by_bridge(found, bridges, probabilities)
-        comparison = by_family(table, members, names, len(covariance))
+        comparison = by_family(table, members, names)
         pooled = {name: families[name] for name in names if comparison.loc[name, "is_pooled"]}
         chances = {name: probabilities[name] for name in pooled}
         coefficients = {
@@ -120,16 +121,14 @@ def by_bridge(
     rows = []
     for bridge, one in zip(bridges, found, strict=True):
         for name, share in one.follows.items():
-            alone, chance = one.without_family[name], probabilities[name]
+            alone, chance = one.without_family[name], follow_chance(probabilities[name])
             pooled = float(np.logaddexp(np.log(chance) + one.with_family[name], np.log1p(-chance) + alone))
             rows.append((bridge, name, alone, pooled, pooled - alone, share))
     columns = ["bridge", "family", "alone", "pooled", "gain", "follows"]
     return pd.DataFrame(rows, columns=columns).set_index(["bridge", "family"])
 
 
-def by_family(
-    table: pd.DataFrame, members: Sequence[Member], names: Sequence[Hashable], n_functions: int
-) -> pd.DataFrame:
+def by_family(table: pd.DataFrame, members: Sequence[Member], names: Sequence[Hashable]) -> pd.DataFrame:
     """Sums over bridges; a family is pooled where its gain is clearly positive and enough bridges have it."""
     rows = []
     for name in names:
@@ -137,8 +136,7 @@ def by_family(
         part = table[table.index.get_level_values("family") == name]
         gain, error = float(part["gain"].sum()), np.nan
         if n_bridges > 1:
-            own = np.sqrt(n_functions / 2)  # deviation of the log of a ratio of normal densities
-            error = float(max(part["gain"].std(), own) * np.sqrt(n_bridges))
+            error = float(max(part["gain"].std(), LEAST_DEVIATION) * np.sqrt(n_bridges))
         is_pooled = n_bridges >= LEAST_BRIDGES and gain > student.ppf(LEVEL, n_bridges - 1) * error
         rows.append((name, n_bridges, part["alone"].sum(), part["pooled"].sum(), gain, error, bool(is_pooled)))
     columns = ["family", "n_bridges", "alone", "pooled", "gain", "standard_error", "is_pooled"]

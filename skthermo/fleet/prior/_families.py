@@ -75,21 +75,25 @@ def penalty(n_columns: int) -> Array:
     return COVARIATE_PENALTY * np.diag(np.arange(n_columns) > 0).astype(float)
 
 
+Moments = Sequence[tuple[Array, Array]]  # mean and covariance of each bridge's coefficients
+
+
 def learn_families(
     members: Sequence[Member],
     names: Sequence[Hashable],
     follows: Mapping[tuple[int, Hashable], float],
-    start: Mapping[Hashable, Family] | None = None,
+    start: Moments | None = None,
     n_steps: int = STEPS,
 ) -> dict[Hashable, Family]:
-    """Expectation maximisation on the bridges' information, each weighed by its probability of following a family."""
-    families = first_guess(members, names, follows) if start is None else dict(start)
+    """Expectation maximisation on the bridges' information, each weighed by its probability of following a family.
+
+    It starts from moments of their coefficients, by default those that each learns on its own.
+    """
+    if start is None:
+        start = [posterior(member.information.J, member.information.h, *member.own)[1:] for member in members]
+    families = maximise(members, names, follows, start)
     for _ in range(n_steps):
-        found = []
-        for member in members:
-            state = posterior(member.information.J, member.information.h, *member.prior(families))
-            found.append((state.mean, state.covariance))
-        updated = maximise(members, names, follows, found)
+        updated = maximise(members, names, follows, expect(members, families))
         changes = [abs(np.log(np.trace(updated[n].Sigma) / np.trace(families[n].Sigma))) for n in names]
         families = updated
         if max(changes, default=0.0) < TOLERANCE:
@@ -97,19 +101,16 @@ def learn_families(
     return families
 
 
-def first_guess(
-    members: Sequence[Member], names: Sequence[Hashable], follows: Mapping[tuple[int, Hashable], float]
-) -> dict[Hashable, Family]:
-    """Families from what each bridge learns on its own."""
-    found = [posterior(member.information.J, member.information.h, *member.own)[1:] for member in members]
-    return maximise(members, names, follows, found)
+def expect(members: Sequence[Member], families: Mapping[Hashable, Family]) -> Moments:
+    """Posterior moments of the bridges' coefficients, given the families."""
+    return [posterior(one.information.J, one.information.h, *one.prior(families))[1:] for one in members]
 
 
 def maximise(
     members: Sequence[Member],
     names: Sequence[Hashable],
     follows: Mapping[tuple[int, Hashable], float],
-    found: Sequence[tuple[Array, Array]],
+    found: Moments,
 ) -> dict[Hashable, Family]:
     """The most likely families given posterior moments of the bridges' coefficients."""
     families = {}

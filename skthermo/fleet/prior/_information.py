@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,13 @@ from skthermo._times import correlation_time
 from skthermo.fleet.prior._basis import FleetBasis
 from skthermo.fleet.prior._posterior import OwnPrior, posterior
 from skthermo.fleet.prior._records import BridgeRecords
+from skthermo.preprocessing import HampelFilter
 
 ROUNDS = 4  # of noise and coefficients in turn
 USUAL = 0.99  # share of the records, if normal, that count in full; others the less the farther away they are
 PSEUDO_ROWS = 20.0  # independent records as which the noise of the fleet counts beside that of a new bridge
+SLOW_DAYS, FEWEST = (2.0, 3.0), 30  # lags of residuals that weather leaves, and rows that tell of them
+FAR_IN_TIME = 1e-3  # weight of such a row before it is known whether the weather explains it
 LEAST_LEFT = 0.25  # share of the records that regression leaves to the noise, at least
 SMALLEST_VARIANCE = 1e-18  # of ln y
 JITTER = 1e-9  # share of its variance that each output has of its own
@@ -26,9 +29,13 @@ JITTER = 1e-9  # share of its variance that each output has of its own
 
 @dataclass(frozen=True)
 class FleetNoise:
-    """How records of a fleet scatter: variances of ln y by family, of what chains measure, and the memory of both."""
+    """How records of a fleet scatter: variances of ln y by family, or of what chains measure, and the memory of both.
+
+    ``misfits`` are variances, by family, of what no function of the basis can follow.
+    """
 
     variances: Mapping[Any, float] = field(default_factory=dict)
+    misfits: Mapping[Any, float] = field(default_factory=dict)
     measured: float | None = None
     memory: float = 1.0
 
@@ -38,17 +45,27 @@ class FleetNoise:
     ) -> FleetNoise:
         """Medians over bridges."""
         by_family: dict[Any, list[float]] = {}
+        misfits: dict[Any, list[float]] = {}
         measured = []
         for one, of_output, given in zip(found, families, records, strict=True):
             variances = np.diag(one.noise.scatter)
+            for family, misfit in zip(of_output, one.misfit, strict=True):
+                misfits.setdefault(family, []).append(float(misfit))
             if given.seen is not None:
                 measured.append(float(variances.mean()))
                 continue
             for family, variance in zip(of_output, variances, strict=True):
                 by_family.setdefault(family, []).append(float(variance))
-        medians = {family: float(np.median(variances)) for family, variances in by_family.items()}
+        medians, slow = (
+            {family: float(np.median(values)) for family, values in kind.items()} for kind in (by_family, misfits)
+        )
         memory = float(np.median([one.noise.memory for one in found]))
-        return cls(medians, float(np.median(measured)) if measured else None, memory)
+        return cls(medians, slow, float(np.median(measured)) if measured else None, memory)
+
+    def misfit(self, found: Information, families: Sequence[Any]) -> Array:
+        """Variances of what a bridge does that the basis cannot follow, from the fleet where it has the family."""
+        expected = [self.misfits.get(family, own) for family, own in zip(families, found.misfit, strict=True)]
+        return np.maximum(expected, 0.0)
 
     def scatter(self, records: BridgeRecords, families: Sequence[Any]) -> Array | None:
         """Expected covariance of what a bridge measures; None where the fleet does not tell."""
@@ -73,10 +90,11 @@ class RowNoise:
 
     @classmethod
     def before(cls, z: Array, expected: Array | None, memory: float) -> RowNoise:
-        """That of the fleet, or the variances of what was measured."""
+        """That of the fleet, or the variances of what was measured; rows far from their neighbours hardly count."""
         if expected is None:
             expected = np.diag(np.maximum(np.nanvar(z, axis=0), SMALLEST_VARIANCE))
-        return cls(expected, memory, np.ones(len(z)))
+        far = ~np.isnan(z) & np.isnan(HampelFilter().fit(z).transform(z))
+        return cls(expected, memory, np.where(far.any(axis=1), FAR_IN_TIME, 1.0))
 
     def updated(
         self, residuals: Array, weights: Array, dof: float, expected: Array | None, fleet_memory: float
@@ -109,6 +127,7 @@ class Information:
 
     b holds the coefficients of the basis u(T) of one output after the other. A row is N(level + B'(u - centre), S / w),
     its precision divided by the memory of the noise. Given b, levels are ``level - gain b`` with ``level_covariance``.
+    ``misfit`` are variances of residuals that last for days.
     """
 
     J: Array
@@ -118,6 +137,7 @@ class Information:
     gain: Array
     level_covariance: Array
     noise: RowNoise
+    misfit: Array
 
     @property
     def n_outputs(self) -> int:
@@ -146,9 +166,11 @@ class Information:
             found = cls.given(noise, records, X, y, level, centre)
             state = posterior(found.J, found.h, *own.fitted(found.J, found.h, families))
             dof = 1 + np.einsum("ij,ji->", found.J, state.covariance) / q
-            residuals = z - records.measured(X[:, 1:] @ state.mean.reshape(q, -1).T)
-            noise = noise.updated(residuals, records.weights, dof, expected, memory)
-        return cls.given(noise, records, X, y, level, centre)
+            left = y - X[:, 1:] @ state.mean.reshape(q, -1).T
+            noise = noise.updated(records.measured(left), records.weights, dof, expected, memory)
+        usual = np.where(noise.robust[:, np.newaxis] >= 1, left, np.nan)
+        found = cls.given(noise, records, X, y, level, centre)
+        return replace(found, misfit=slow_variance(usual - _mean(usual), records.step))
 
     @classmethod
     def given(
@@ -183,7 +205,18 @@ class Information:
             gain,
             level_covariance,
             noise,
+            np.zeros(q),
         )
+
+
+def slow_variance(residuals: Array, step: float) -> Array:
+    """Mean autocovariance of columns over some days, which noise has forgotten, and weather has not."""
+    found = []
+    for days in SLOW_DAYS:
+        lag = max(round(days / step), 1)
+        products = residuals[lag:] * residuals[:-lag]
+        found.append(_mean(products) if len(products) > FEWEST else np.zeros(residuals.shape[1]))
+    return np.mean(found, axis=0)
 
 
 def _mean(values: Array, weights: Array | None = None) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import RegressorMixin, clone
+from sklearn.base import RegressorMixin
 
 from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_columns
@@ -17,14 +17,14 @@ from skthermo._validation import Estimator, HasMethods, _fit_context, check_arra
 from skthermo._weather import TrainingRange, parts
 from skthermo.fleet.prior._basis import steady_changes
 from skthermo.fleet.prior._bridges import families_by_name
-from skthermo.fleet.prior._information import Information
+from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._knowledge import FleetKnowledge
 from skthermo.fleet.prior._posterior import Mixture
-from skthermo.fleet.prior._records import BridgeRecords, usable_rows
+from skthermo.fleet.prior._records import BridgeRecords, days_of, usable_rows
 from skthermo.metrics import complete_r2
 from skthermo.surrogate import FrequencyCoordinates
 
-N_KNOTS = 4  # without a fleet
+N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
 
 
 class FleetMapper(RegressorMixin, Estimator):
@@ -58,6 +58,8 @@ class FleetMapper(RegressorMixin, Estimator):
         Posterior mean of the level and of the coefficients of the fleet's basis, of ln y.
     covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
         Their posterior covariance.
+    misfit_ : ndarray of shape (n_outputs,)
+        Variances of what ln y does with the weather that the basis cannot follow, as bridges of the fleet show it.
     centre_ : ndarray of shape (n_functions,)
         Mean of the basis in the bridge's own records, to which the level belongs.
     parameter_names_ : list or None
@@ -101,11 +103,6 @@ class FleetMapper(RegressorMixin, Estimator):
         self.families = families
         self.coordinates = coordinates
 
-    def __sklearn_clone__(self) -> FleetMapper:
-        # The prior stays fitted: it is what the mapper knows, not a part that the mapper fits.
-        others = {name: value for name, value in self.get_params(deep=False).items() if name != "prior"}
-        return type(self)(self.prior, **{name: clone(value, safe=False) for name, value in others.items()})
-
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> FleetMapper:
         """Learn what the bridge's own records tell, beside the fleet.
@@ -136,16 +133,21 @@ class FleetMapper(RegressorMixin, Estimator):
         trained = usable_rows(inputs, values, weights, complete=self.coordinates is not None)
         if not trained.any():
             raise ValueError(f"none of {len(inputs)} rows has all inputs, a quantity and a weight; expected one")
+        if self.prior is None and trained.sum() < LEAST_ALONE:
+            raise ValueError(
+                f"{trained.sum()} of n_samples={len(inputs)} rows are complete; expected {LEAST_ALONE} without a prior"
+            )
         known = FleetKnowledge.none(inputs[trained], N_KNOTS) if self.prior is None else self.prior.knowledge_
         names = self._names_of(y, values.shape[1])
         given = getattr(self.prior, "families", None) if self.families is None else self.families
         self.families_ = families_by_name(given, names)
-        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates)
+        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates, days_of(X))
         families = list(self.families_.values())
         found, state = known.posterior(records, families, self.covariates)
         self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
         self.basis_, self.centre_ = known.basis, found.centre
         self.coefficients_, self.covariance_ = with_levels(found, state)
+        self.misfit_ = (FleetNoise() if known.noise is None else known.noise).misfit(found, families)
         self.own_range_ = TrainingRange.of(frame_like(X, inputs), trained)
         own, fleet = self.own_range_, known.basis.reach
         lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)
@@ -167,7 +169,7 @@ class FleetMapper(RegressorMixin, Estimator):
         y : ndarray or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
             Exponential of the posterior mean, the median of the posterior.
         std : ndarray or DataFrame of the same shape
-            Only with ``return_std``: what the records and the fleet leave open, without the noise of a measurement.
+            Only with ``return_std``: roots of the diagonal of `predict_covariance`.
         """
         values, covariance = self._posterior_at(X, check_flag(return_std, "return_std"))
         if not return_std:
@@ -176,7 +178,7 @@ class FleetMapper(RegressorMixin, Estimator):
         return self._as_targets(X, values), self._as_targets(X, std)
 
     def predict_covariance(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Covariance of the quantities, because their coefficients are uncertain.
+        """Covariance of the clean quantities: what coefficients leave open, and what no function of the basis follows.
 
         Parameters
         ----------
@@ -316,7 +318,7 @@ class FleetMapper(RegressorMixin, Estimator):
             values[rows] = np.exp(x @ self.coefficients_.T)
             if with_covariance:
                 half = np.einsum("ti,aibj->tabj", x, self.covariance_)
-                logs = np.einsum("tabj,tj->tab", half, x)
+                logs = np.einsum("tabj,tj->tab", half, x) + np.diag(self.misfit_)
                 covariance[rows] = values[rows][:, :, np.newaxis] * values[rows][:, np.newaxis] * logs
         return values, covariance
 

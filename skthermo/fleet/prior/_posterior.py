@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,9 @@ START = 0.1  # deviation of coefficients of ln y where nothing else is known
 SMALLEST = 1e-8
 SETTLED = 0.03  # relative change of tau^2 that ends the iteration
 JITTER = 1e-9
-MOST_COMBINED = 6  # families of which all combinations are weighed
+NEGLIGIBLE = 1e-9  # share of a combination
+ALIENS, ALIEN_FOLLOWS = 0.05, 0.2  # share of bridges of another kind, and of the families that one follows by chance
+MOST_TYPICAL = 5.0  # times the typical deviation of its family that coefficients of a bridge on its own have at most
 
 
 class CoefficientPrior(NamedTuple):
@@ -42,25 +43,44 @@ class Posterior(NamedTuple):
     covariance: Array
 
 
-def posterior(J: Array, h: Array, mean: Array, root: Array) -> Posterior:
-    """N(mean, C C') times exp(-b'J b / 2 + h'b), normalised; C is block diagonal with the roots.
+class Update:
+    """N(mean, C C') times exp(-b'J b / 2 + h'b); C is block diagonal with the roots.
 
-    With K = I + C'J C and e = h - J m: b ~ N(m + C K^-1 C'e, C K^-1 C'), and the log evidence is
-    m'h - m'J m / 2 - log|K| / 2 + e'C K^-1 C'e / 2.
+    With K = I + C'J C = L L' and e = h - J m: b ~ N(m + C K^-1 C'e, C K^-1 C').
     """
-    n_outputs, n_functions = mean.shape
-    m = mean.ravel()
-    half = np.einsum("xai,aij->xaj", J.reshape(-1, n_outputs, n_functions), root)  # J C
-    e = h - J @ m
-    whole = np.einsum("aij,aiy->ajy", root, half.reshape(n_outputs, n_functions, -1)).reshape(J.shape)
-    L = np.linalg.cholesky(np.eye(len(m)) + (whole + whole.T) / 2)
-    w = np.einsum("aij,ai->aj", root, e.reshape(mean.shape)).ravel()
-    shift = np.einsum("aij,aj->ai", root, cho_solve((L, True), w).reshape(mean.shape)).ravel()
-    transposed = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
-    transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = root.transpose(0, 2, 1)
-    B = solve_triangular(L, transposed.reshape(J.shape), lower=True)
-    evidence = m @ h - m @ J @ m / 2 - np.log(np.diag(L)).sum() + e @ shift / 2
-    return Posterior(float(evidence), m + shift, B.T @ B)
+
+    def __init__(self, J: Array, h: Array, mean: Array, root: Array):
+        n_outputs, n_functions = mean.shape
+        m = mean.ravel()
+        half = J.reshape(-1, n_outputs, n_functions).transpose(1, 0, 2) @ root  # J C by columns of outputs
+        whole = root.transpose(0, 2, 1) @ half.transpose(1, 0, 2).reshape(n_outputs, n_functions, -1)
+        whole = whole.reshape(J.shape)
+        self.root, self.m = root, m
+        self.L = np.linalg.cholesky(np.eye(len(m)) + (whole + whole.T) / 2)
+        e = h - J @ m
+        self.shift = cho_solve((self.L, True), self._transposed(e), check_finite=False)
+        self.evidence = float(
+            m @ h - m @ J @ m / 2 - np.log(np.diag(self.L)).sum() + self._transposed(e) @ self.shift / 2
+        )
+
+    def _transposed(self, e: Array) -> Array:
+        """C'e."""
+        return np.einsum("aij,ai->aj", self.root, e.reshape(len(self.root), -1)).ravel()
+
+    @property
+    def posterior(self) -> Posterior:
+        """Log evidence, up to a constant of the records, mean and covariance."""
+        n_outputs, n_functions = self.root.shape[:2]
+        transposed = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
+        transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = self.root.transpose(0, 2, 1)
+        B = solve_triangular(self.L, transposed.reshape(self.L.shape), lower=True, check_finite=False)
+        shift = np.einsum("aij,aj->ai", self.root, self.shift.reshape(n_outputs, -1)).ravel()
+        return Posterior(self.evidence, self.m + shift, B.T @ B)
+
+
+def posterior(J: Array, h: Array, mean: Array, root: Array) -> Posterior:
+    """Log evidence, mean and covariance of a Gaussian prior times a bridge's information."""
+    return Update(J, h, mean, root).posterior
 
 
 @dataclass(frozen=True)
@@ -107,6 +127,7 @@ class OwnPrior:
             squares, left_open = scaled.sum(axis=2)
             known = np.maximum(n_functions - left_open / variances, JITTER)  # coefficients that the records determine
             updated = np.maximum((squares + count * start) / (known + count), SMALLEST**2)
+            updated = np.minimum(updated, MOST_TYPICAL**2 * start) if self.typical else updated
             settled = np.abs(np.log(updated / variances)).max() < SETTLED
             variances = updated
             if settled:
@@ -139,38 +160,38 @@ def mixture(
 ) -> Mixture:
     """Average over combinations of families that follow the fleet or are on their own, weighed by their evidence.
 
+    Combinations are all following, none, and what is met on the way from either to a combination that no single family
+    can improve.
+
     ``families`` are those of the outputs; ``probabilities`` those of following, before any record, of pooled families.
     """
     pooled = [family for family in probabilities if family in families]
-    flags = combinations(len(pooled))
-    found, weights = [], []
-    for row in flags:
-        followed = {family for family, flag in zip(pooled, row, strict=True) if flag}
-        is_followed = np.array([family in followed for family in families])
-        found.append(
-            posterior(
-                J,
-                h,
-                np.where(is_followed[:, np.newaxis], fleet.mean, own.mean),
-                np.where(is_followed[:, np.newaxis, np.newaxis], fleet.root, own.root),
-            )
-        )
-        chances = [probabilities[f] if flag else 1 - probabilities[f] for f, flag in zip(pooled, row, strict=True)]
-        weights.append(np.log(np.maximum(chances, 1e-300)).sum())
-    evidences = np.array([one.evidence for one in found])
-    logs = np.array(weights) + evidences
+    chances = np.array([probabilities[family] for family in pooled])
+    place = {family: i for i, family in enumerate(pooled)}
+    known: dict[tuple[bool, ...], tuple[float, Update]] = {}
+
+    def weight(flags: tuple[bool, ...]) -> float:
+        """Log evidence of a combination, and its probability before any record."""
+        if flags not in known:
+            is_followed = np.array([family in place and flags[place[family]] for family in families])
+            mean = np.where(is_followed[:, np.newaxis], fleet.mean, own.mean)
+            root = np.where(is_followed[:, np.newaxis, np.newaxis], fleet.root, own.root)
+            update = Update(J, h, mean, root)
+            known[flags] = log_chance(flags, chances) + update.evidence, update
+        return known[flags][0]
+
+    for start in (True, False):
+        climb(weight, (start,) * len(pooled))
+    flags = np.array(list(known), dtype=bool).reshape(len(known), len(pooled))
+    logs = np.array([log for log, _ in known.values()])
     total = float(logsumexp(logs))
     shares = np.exp(logs - total)
-    means = np.array([one.mean for one in found])
-    mean = shares @ means
-    covariance = sum(
-        share * (one.covariance + np.outer(one.mean - mean, one.mean - mean))
-        for share, one in zip(shares, found, strict=True)
-        if share > 1e-12
-    )
+    found = [(s, update.posterior) for s, (_, update) in zip(shares, known.values(), strict=True) if s > NEGLIGIBLE]
+    mean = sum(share * one.mean for share, one in found)
+    covariance = sum(share * (one.covariance + np.outer(one.mean - mean, one.mean - mean)) for share, one in found)
     with_family, without_family = (
         {
-            family: float(logsumexp(logs[flags[:, i] == flag]) - np.log(max(chance(probabilities[family]), 1e-300)))
+            family: float(logsumexp(logs[flags[:, i] == flag]) - np.log(chance(follow_chance(probabilities[family]))))
             for i, family in enumerate(pooled)
         }
         for flag, chance in ((True, lambda p: p), (False, lambda p: 1 - p))
@@ -179,9 +200,22 @@ def mixture(
     return Mixture(total, mean, covariance, follows, with_family, without_family)
 
 
-def combinations(number: int) -> Array:
-    """Rows that say which of some families follow: all combinations of few; else none, all, all but one, only one."""
-    if number <= MOST_COMBINED:
-        return np.array(list(product([True, False], repeat=number)), dtype=bool).reshape(2**number, number)
-    eye = np.eye(number, dtype=bool)
-    return np.vstack([np.ones((1, number), dtype=bool), ~eye, eye, np.zeros((1, number), dtype=bool)])
+def log_chance(flags: Sequence[bool], chances: Array) -> float:
+    """Log probability of a combination before any record; an alien as a whole follows few of its families."""
+    usual, alien = (np.log(np.where(flags, p, 1 - p)).sum() for p in (chances, np.full(len(chances), ALIEN_FOLLOWS)))
+    return float(np.logaddexp(np.log1p(-ALIENS) + usual, np.log(ALIENS) + alien))
+
+
+def follow_chance(chance: float) -> float:
+    """Probability of following a family before any record, be the bridge an alien or not."""
+    return (1 - ALIENS) * chance + ALIENS * ALIEN_FOLLOWS
+
+
+def climb(weight: Callable[[tuple[bool, ...]], float], flags: tuple[bool, ...]) -> None:
+    """Weigh a combination and all that differ in one family, and go on from the best while it is a better one."""
+    while True:
+        others = [flags[:i] + (not flag,) + flags[i + 1 :] for i, flag in enumerate(flags)]
+        best = max(others, key=weight, default=flags)
+        if weight(best) <= weight(flags):
+            return
+        flags = best

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from skthermo._formatting import counted
 from skthermo._validation import Estimator, Interval, check_is_fitted
 from skthermo.fleet.prior._basis import FleetBasis, steady_changes
 from skthermo.fleet.prior._bridges import bridges_of, common_inputs, families_by_name, read_bridge
@@ -78,6 +79,10 @@ class FleetPrior(Estimator):
     def __init__(self, n_knots: int = 4, families: Mapping[Hashable, Any] | None = None):
         self.n_knots = n_knots
         self.families = families
+
+    def __sklearn_clone__(self) -> FleetPrior:
+        # A mapper's clones share what the fleet knows: it is not theirs to learn.
+        return self if hasattr(self, "knowledge_") else super().__sklearn_clone__()
 
     def fit(
         self, bridges: Mapping[Hashable, Any] | Sequence[Any], covariates: pd.DataFrame | None = None
@@ -203,16 +208,15 @@ class FleetPrior(Estimator):
         check_is_fitted(self)
         lines = []
         for name, row in self.comparison_.iterrows():
-            n = f"{row['n_bridges']} bridges" if row["n_bridges"] != 1 else "1 bridge"
+            n_bridges = counted(row["n_bridges"], "bridge")
+            gain = f"{row['gain']:+.3g} +- {row['standard_error']:.2g}"
             if row["is_pooled"]:
-                gain = f"{row['gain']:.3g} +- {row['standard_error']:.2g}"
-                text = f"{name}: pooled over {n}; log likelihood better by {gain}"
+                lines.append(f"{name}: pooled over {n_bridges}, a gain of {gain} in log likelihood")
             elif row["n_bridges"] < LEAST_BRIDGES:
-                text = f"{name}: not pooled: {n}; expected at least {LEAST_BRIDGES}"
+                lines.append(f"{name}: not pooled, {n_bridges}; expected at least {LEAST_BRIDGES}")
             else:
-                text = (
-                    f"{name}: not pooled over {n}: other bridges do not foretell its response to the weather (log "
-                    f"likelihood {row['gain']:+.3g} +- {row['standard_error']:.2g}); a new bridge learns it alone"
+                lines.append(
+                    f"{name}: not pooled: what {n_bridges} say of each other cannot be told from chance (a gain of "
+                    f"{gain} in log likelihood); a new bridge learns it alone"
                 )
-            lines.append(text)
         return "\n".join(lines)

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from skthermo._arrays import Array, spread_evenly
+from skthermo._times import has_stamps, row_times
 
 MOST_ROWS = 20_000
 UNSEEN = 1e-8  # size of a direction of ln theta in the frequencies, beside the largest, below which none sees it
 ROWS_PER_EFFECTIVE_ROW = 10.0  # by which the damping of a chain exceeds the precision of its inverse's prior, per row
+DAY = 86_400e9  # nanoseconds
 LEAST_PRECISION = 1e-9  # of levels, beside that of one record
 
 
@@ -22,7 +24,7 @@ class BridgeRecords:
 
     ``seen``, (r, q), turns ln theta into what was measured in deviations of the noise: z = A ln theta, rotated, without
     directions that no frequency sees; None where the quantities themselves were measured. ``level_precision``, (q,),
-    is what is known of the levels without any record.
+    is what is known of the levels without any record. ``step`` is the usual time from row to row, in days.
     """
 
     inputs: Array
@@ -31,12 +33,19 @@ class BridgeRecords:
     weights: Array
     seen: Array | None
     level_precision: Array
+    step: float = 1.0
 
     @classmethod
     def of(
-        cls, inputs: Array, values: Array, names: Sequence[Any], weights: Array | None = None, coordinates: Any = None
+        cls,
+        inputs: Array,
+        values: Array,
+        names: Sequence[Any],
+        weights: Array | None = None,
+        coordinates: Any = None,
+        times: Array | None = None,
     ) -> BridgeRecords:
-        """The usable rows, evenly spread where there are very many."""
+        """The usable rows, evenly spread where there are very many; without times in days, rows are days."""
         weights = np.ones(len(inputs)) if weights is None else weights
         usable = usable_rows(inputs, values, weights, complete=coordinates is not None)
         rows = spread_evenly(np.flatnonzero(usable), MOST_ROWS)
@@ -49,7 +58,10 @@ class BridgeRecords:
             seen = sizes[kept, np.newaxis] * vectors[kept]
             level_precision = coordinates.damping * len(rows) / ROWS_PER_EFFECTIVE_ROW
             level_precision = np.maximum(level_precision, LEAST_PRECISION * (seen**2).sum())
-        return cls(inputs[rows], np.log(values[rows]), list(names), weights[rows], seen, level_precision)
+        steps = np.diff(np.arange(len(inputs)) if times is None else times)[: len(rows)]
+        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+        step *= usable.sum() / max(len(rows), 1)
+        return cls(inputs[rows], np.log(values[rows]), list(names), weights[rows], seen, level_precision, step)
 
     @property
     def n_outputs(self) -> int:
@@ -59,6 +71,11 @@ class BridgeRecords:
     def measured(self, logs: Array) -> Array:
         """What was measured where the quantities have these logarithms."""
         return logs if self.seen is None else logs @ self.seen.T
+
+
+def days_of(table: Any) -> Array | None:
+    """Days since the first row of a frame with stamps; None for other tables."""
+    return row_times(table) / DAY if has_stamps(table) else None
 
 
 def usable_rows(inputs: Array, values: Array, weights: Array | None, *, complete: bool = False) -> Array:
