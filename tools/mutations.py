@@ -143,6 +143,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/sampling/_linearise.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
+    ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
+        (
+            "bridges of a killed process are begun again",
+            "suspects = [name for name in begun if name in left]",
+            "suspects = [left.pop(name) and name for name in begun if name in left]",
+        ),
+    ],
+    ("monitoring/_promise.py", "fleet/test_discoveries.py"): [
+        ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
+    ],
     ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
     ],
