@@ -511,7 +511,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("called alarms among the others", "CALLED if called & set(opened.index) else OPEN", "OPEN"),
         ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
     ],
-    ("plotting/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
+    ("plotting/comparison/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
         ("where own records end", "ends[0].max()), float(ends[1].min())", "ends[0].min()), float(ends[1].max())"),
     ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
