@@ -144,11 +144,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
     ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
-        (
-            "bridges of a killed process are begun again",
-            "suspects = [name for name in begun if name in left]",
-            "suspects = [left.pop(name) and name for name in begun if name in left]",
-        ),
+        ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
     ],
     ("monitoring/_promise.py", "fleet/test_discoveries.py"): [
         ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
