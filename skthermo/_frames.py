@@ -26,6 +26,13 @@ def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = Non
     return pd.DataFrame(values, index=X.index, columns=X.columns if columns is None else list(columns), copy=False)
 
 
+def like_targets(X: Any, values: Array, names: Iterable[Hashable] | None, *, is_vector: bool) -> Any:
+    """Predictions, (n_samples, n_targets), as a vector or a frame if the targets that were learned were."""
+    if is_vector:
+        return values[:, 0]
+    return values if names is None else frame_like(X, values, names)
+
+
 def column_names(X: Any, default: str) -> list[Hashable]:
     """Names of X's columns, for messages and outputs: a frame's own, else default1, default2, ..."""
     if hasattr(X, "columns"):

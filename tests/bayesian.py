@@ -6,6 +6,12 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from skthermo._weather import TrainingRange
 
+MEAN, WIDTH = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01])
+"""Of the coefficients of a fleet's bridges."""
+
+NOISE = 0.003
+EVERYWHERE = (-40.0, 60.0)
+
 
 def basis(X, knots=(5.0, 15.0)):
     """A constant and broken lines of the mean temperature, in units of ten degrees."""
@@ -67,3 +73,11 @@ def weather(days, seed=0, start="2025-01-01"):
         spells[day] = 0.8 * spells[day - 1] + 2.0 * rng.standard_normal()
     both = season + spells
     return pd.DataFrame({"T1": both, "T2": both + rng.standard_normal(days)}, index=stamps)
+
+
+def records_of(seed, days, root):
+    """Daily records of a bridge of that fleet, with noise of some root of its covariance; in winter first."""
+    rng, T = np.random.default_rng(seed), weather(days, seed)
+    beta = MEAN[:, None] + WIDTH[:, None] * rng.standard_normal((4, len(root)))
+    F = np.exp(basis(T) @ beta) * (1 + NOISE * rng.standard_normal((days, len(root))) @ root.T)
+    return T.join(pd.DataFrame(F, T.index, [f"f{mode + 1}" for mode in range(len(root))]))

@@ -12,6 +12,7 @@ from sklearn.model_selection import GridSearchCV, KFold
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import CallableModel, sample
+from skthermo.fleet import fit_fleet
 from skthermo.metrics import frequency_scorer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.fem.frames import FRAME
@@ -92,3 +93,19 @@ def test_a_grid_search_is_that_of_one_process():
         np.testing.assert_array_equal(there.cv_results_[scores], here.cv_results_[scores])
     weather = make_truss_campaign(samples_per_year=100, random_state=1).temperatures
     np.testing.assert_array_equal(there.predict(weather), here.predict(weather))
+
+
+def test_a_fleet_is_that_of_one_process():
+    years = {name: make_truss_campaign(samples_per_year=100, random_state=seed) for seed, name in enumerate("ab")}
+    chain = DataInformedFEM(
+        TRUSS, inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=100), mapper=TemperatureMapper()
+    )
+    given = dict.fromkeys(years, chain), {n: (one.temperatures, one.frequencies) for n, one in years.items()}
+    here = fit_fleet(*given)
+    with joblib.parallel_config("dask"):
+        there = fit_fleet(*given)
+    for name, year in years.items():
+        first, other = (fleet.chains[name].predict(year.temperatures) for fleet in (here, there))
+        np.testing.assert_array_equal(other, first)
+    assert there.warnings.equals(here.warnings)
+    assert there.table["is_fitted"].all()

@@ -22,6 +22,23 @@ ROOT = Path(__file__).parents[1]
 COPIED = ("skthermo", "tests", "conftest.py", "pyproject.toml")
 
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
+    ("fleet/prior/_information.py", "fleet/prior/test_posterior.py"): [
+        (
+            "levels that count as known",
+            "J[:, 1:, :, 1:].reshape(size, size) - cross.T @ gain",
+            "J[:, 1:, :, 1:].reshape(size, size) + 0 * cross.T @ gain",
+        ),
+    ],
+    ("fleet/prior/_families.py", "fleet/prior/test_posterior.py"): [
+        (
+            "a fleet that knows its spread",
+            "scatter = left.T @ (r[:, np.newaxis] * left) + covariances",
+            "scatter = covariances",
+        ),
+    ],
+    ("fleet/prior/_comparison.py", "fleet/prior/test_posterior.py"): [
+        ("a bridge that foretells itself", " if i not in group]", "]"),
+    ],
     ("datasets/fleet/_climate.py", "datasets/test_fleet.py"): [
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
     ],
@@ -125,6 +142,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("fem/sampling/_linearise.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
+    ],
+    ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
+        ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
+    ],
+    ("monitoring/_promise.py", "fleet/test_discoveries.py"): [
+        ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
     ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
@@ -494,7 +517,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("called alarms among the others", "CALLED if called & set(opened.index) else OPEN", "OPEN"),
         ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
     ],
-    ("plotting/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
+    ("plotting/comparison/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
         ("where own records end", "ends[0].max()), float(ends[1].min())", "ends[0].min()), float(ends[1].max())"),
     ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [

@@ -220,8 +220,9 @@ def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
 
 
 def call(given: Any) -> Any:
-    """What a function gives; anything else is given as it is. Estimators are no functions."""
-    return given() if callable(given) and not hasattr(given, "get_params") else given
+    """What a function or a class gives; anything else is given as it is. Estimators are no functions."""
+    is_function = callable(given) and (isinstance(given, type) or not hasattr(given, "get_params"))
+    return given() if is_function else given
 
 
 def pair(records: Any, name: Any) -> tuple[Any, Any]:

@@ -13,6 +13,7 @@ from joblib import Parallel, delayed, effective_n_jobs
 from skthermo.fleet._bridge import Failure, by_value
 
 MOST_LOST = 2  # processes that were killed while a task may have run in them, before it is run alone
+KILLED = ("TerminatedWorkerError", "BrokenProcessPool", "KilledWorker", "WorkerCrashedError", "OutOfMemoryError")
 WAVE = 4  # tasks for each worker of a back end that gives all results at the end
 
 
@@ -86,5 +87,8 @@ def _refuse_what_cannot_travel(tasks: Mapping[Hashable, Any], error: Exception) 
 def _killed(error: Exception) -> Failure:
     """What is said of a task whose process was killed each time."""
     first = str(error).strip().partition("\n")[0].partition(". ")[0]
+    kind = type(error).__name__
     text = "its process was killed each time, also when it was alone: was it out of memory?"
-    return Failure("process", type(error).__name__, f"{text} ({first})", "")
+    if kind not in KILLED:
+        text = "the back end failed each time, also when it was alone"
+    return Failure("process", kind, f"{text} ({first})", "")

@@ -366,8 +366,10 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        A p value: for a healthy structure, that of its highest event is at most p with probability p, if squared peaks
-        have an exponential tail, as those of normal residuals have. It comes from the highest excursions of the
+        A p value: for a healthy structure, that of its highest event is at most p with probability p or less, if
+        squared peaks have an exponential tail, as those of normal residuals have. Single outliers make heavier tails. A
+        detector that needs several records, such as ``WindowedAlarm("5D", rule="m-of-n")``, is not moved by them, and
+        where the baseline shows one, a heavier tail is taken. The chance comes from the highest excursions of the
         baseline, by which the detector in charge when the event began was given its threshold; however few these are,
         that they are few is allowed for.
         """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -21,6 +22,7 @@ COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie betwee
 NEAR = 15  # days of the year, up to which a record stands for the season around it
 FEWEST_PEAKS = 3
 DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
+HEAVY = 0.2  # the same share, from which on chances are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
 
@@ -94,12 +96,15 @@ class Tail:
     k: int
     base: float
     excess: float
+    largest: float = 0.0  # the highest excess
+    logs: float = np.nan  # the sum of ln(square / base)
 
     @classmethod
     def of(cls, squares: Array, asked: float) -> Tail:
         """That of squared peaks, highest first, from which as many as are asked for are to be exceeded."""
         k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
-        return cls(k, float(squares[k]), float((squares[:k] - squares[k]).sum()))
+        excesses, logs = squares[:k] - squares[k], np.log(squares[:k] / squares[k])
+        return cls(k, float(squares[k]), float(excesses.sum()), float(excesses[0]), float(logs.sum()))
 
     def factor(self, asked: float) -> float:
         """The excess that so many peaks exceed, in sums of all excesses."""
@@ -116,18 +121,23 @@ class Tail:
         exceeds the square with the probability exp(-x g), where x is its height above the base in sums of excesses, and
         g what these leave open of the tail, gamma distributed: so that the chance of a healthy structure is uniformly
         distributed. Integrated at the quantiles of g where exp(-x g) counts.
+
+        Outliers make tails that are not exponential. Where the highest excess of the baseline is as far beyond the
+        others as in one healthy baseline of five, their logarithms are taken in their place: a Pareto tail, by which
+        chances are larger.
         """
-        x = (square - self.base) / self.excess
-        if x < 0:
+        if square <= self.base:
             return 1.0
-        g = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k) / (1 + x)
+        x = (square - self.base) / self.excess
+        if self.largest > _largest_share(self.k, HEAVY) * self.excess:
+            x = min(x, np.log(square / self.base) / self.logs)
+        g = _quantiles(self.k) / (1 + x)
         some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
         return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
 
     def numbers(self, asked: float, n_years: float) -> tuple[int, int]:
         """Between which numbers events in one year lie, given what the excesses tell of the tail and of its rate."""
-        spread = gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, self.k)
-        share = np.exp(-self.factor(asked) * spread) / n_years
+        share = np.exp(-self.factor(asked) * _quantiles(self.k)) / n_years
 
         def at_most(number: int) -> float:
             return float(nbinom.cdf(number, self.k + 1, 1 / (1 + share)).mean())
@@ -170,6 +180,12 @@ class Promise:
         if self.tail is None:
             return np.nan
         return self.tail.chance(peak**2, n_years / self.n_years)
+
+
+@cache
+def _quantiles(k: int) -> Array:
+    """Values of a gamma distribution at which what depends on it is averaged."""
+    return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
 
 
 def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D") -> float:
@@ -238,7 +254,7 @@ def _warn_of_baseline(
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
-    if (highest**2 - tail.base) / tail.excess > _largest_share(tail.k):
+    if (highest**2 - tail.base) / tail.excess > _largest_share(tail.k, DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked).threshold(asked)
         warn_user(
             f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
@@ -255,9 +271,9 @@ def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:
     return float(np.minimum(steps, max(hold.value, np.median(steps))).sum() / YEAR.value) if len(steps) else 0.0
 
 
-def _largest_share(k: int) -> float:
-    """Share that the largest of k exponential excesses has of their sum once in so many baselines (Fisher, Cochran)."""
-    return 1.0 - (DOUBTFUL / k) ** (1 / (k - 1)) if k > 1 else 1.0
+def _largest_share(k: int, probability: float) -> float:
+    """Share that the largest of k exponential excesses has of their sum with a probability (Fisher, Cochran)."""
+    return 1.0 - (probability / k) ** (1 / (k - 1)) if k > 1 else 1.0
 
 
 def _unseen_season(stamps: pd.DatetimeIndex) -> str:

@@ -2,7 +2,6 @@
 
 from skthermo.plotting._damage_index import DamageIndexDisplay
 from skthermo.plotting._fit_report import FitReportDisplay
-from skthermo.plotting._fleet_prior import FleetPriorDisplay
 from skthermo.plotting._frequency_temperature import FrequencyTemperatureDisplay
 from skthermo.plotting._history import HistoryDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
@@ -11,7 +10,7 @@ from skthermo.plotting._parameter_history import ParameterHistoryDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._sensitivity import SensitivityDisplay
-from skthermo.plotting.comparison import AgreementDisplay, RankingDisplay, ROCDisplay
+from skthermo.plotting.comparison import AgreementDisplay, FleetPriorDisplay, RankingDisplay, ROCDisplay
 from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
 
 __all__ = [

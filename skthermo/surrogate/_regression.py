@@ -14,7 +14,7 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 
 from skthermo._arguments import check_flag, columns_by_name
 from skthermo._arrays import Array, as_columns
-from skthermo._frames import check_same_rows, column_names, frame_like, row_weights
+from skthermo._frames import check_same_rows, column_names, like_targets, row_weights
 from skthermo._regressors import fit_outputs, predict_with_std
 from skthermo._threads import single_blas_thread
 from skthermo._validation import Estimator, check_array, seed_parts, validate_data
@@ -163,9 +163,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
 
     def _as_targets(self, X: Any, values: Array) -> Any:
         """Predictions as a vector or a frame if the training targets were."""
-        if self.y_is_vector_:
-            return values[:, 0]
-        return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
+        return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

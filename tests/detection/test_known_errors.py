@@ -9,16 +9,24 @@ from sklearn.pipeline import make_pipeline
 from skthermo._gaussian import Gaussian
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
-from tests.bayesian import BayesianLogs, Logs, basis, weather
+from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
 
 MODES = ["f1", "f2", "f3"]
 SCALES = [None, "global", "local"]
-MEAN, WIDTH, NOISE = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01]), 0.003
-EVERYWHERE = (-40.0, 60.0)
 ROOT = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, -0.3, 0.7]])
 """Of the covariance of the scatter."""
 
-pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+pytestmark = [
+    pytest.mark.filterwarnings(f"ignore:.*{message}")
+    for message in (
+        "stand on what the fleet",
+        "of fold",
+        "far outside those of the training",
+        "far from their neighbours in time",
+        "independent",
+        "were filled",
+    )
+]
 
 
 class Known(RegressorMixin, BaseEstimator):
@@ -48,11 +56,7 @@ def of_known_errors(n_rows, seed):
 
 
 def bridge(seed, days):
-    """Daily records of a bridge that the prior of `BayesianLogs` is right for."""
-    rng, T = np.random.default_rng(seed), weather(days, seed)
-    beta = MEAN[:, None] + WIDTH[:, None] * rng.standard_normal((4, 3))
-    F = np.exp(basis(T) @ beta) * (1 + NOISE * rng.standard_normal((days, 3)) @ ROOT.T)
-    return T.join(pd.DataFrame(F, T.index, MODES))
+    return records_of(seed, days, ROOT)
 
 
 def knowing(share=1.0, **options):

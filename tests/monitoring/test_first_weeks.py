@@ -9,23 +9,27 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from tests.bayesian import BayesianLogs, Logs, basis, weather
+from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
 
 MODES = ["f1", "f2"]
-MEAN, WIDTH, NOISE = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01]), 0.003
-EVERYWHERE = (-40.0, 60.0)
 WEEKS, YEAR = 60, 365
 
-pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+pytestmark = [
+    pytest.mark.filterwarnings(f"ignore:.*{message}")
+    for message in (
+        "the baseline has no record of",
+        "is extrapolated",
+        "of fold",
+        "independent",
+        "far beyond the others",
+    )
+]
 
 
-def records_of(seed, days=WEEKS + YEAR, damage=0.0):
-    """Daily records of a bridge that the prior of `BayesianLogs` is right for, in winter first."""
-    rng, T = np.random.default_rng(seed), weather(days, seed)
-    beta = MEAN[:, None] + WIDTH[:, None] * rng.standard_normal((4, 2))
-    F = np.exp(basis(T) @ beta) * (1 + NOISE * rng.standard_normal((days, 2)))
-    F[WEEKS + 100 :] *= 1 - damage * np.array([1.0, 0.3])
-    return T.join(pd.DataFrame(F, T.index, MODES))
+def served(seed, days=WEEKS + YEAR, damage=0.0):
+    records = records_of(seed, days, np.eye(2))
+    records.loc[records.index[WEEKS + 100 :], MODES] *= 1 - damage * np.array([1.0, 0.3])
+    return records
 
 
 def monitor_of(regressor=BayesianLogs, **options):
@@ -36,7 +40,7 @@ def monitor_of(regressor=BayesianLogs, **options):
 
 @pytest.mark.parametrize("scale", [None, "global", "local"])
 def test_any_batches_give_the_decisions_of_one_pass(scale):
-    records = records_of(0, WEEKS + 120)
+    records = served(0, WEEKS + 120)
     whole, parts = (monitor_of(scale=scale).fit(records[:WEEKS]) for _ in range(2))
     whole.update(records[WEEKS:])
     cuts = [WEEKS, *np.sort(np.random.default_rng(1).integers(WEEKS, WEEKS + 120, 4)), WEEKS + 120]
@@ -49,7 +53,7 @@ def test_any_batches_give_the_decisions_of_one_pass(scale):
 def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
     events, unaware, found = [], [], []
     for seed in range(6):
-        records, damaged = records_of(seed), records_of(seed, damage=0.1)
+        records, damaged = served(seed), served(seed, damage=0.1)
         monitor = monitor_of().fit(records[:WEEKS])
         monitor.update(records[WEEKS:])
         events.append(len(monitor.events_))

@@ -69,7 +69,8 @@ class Regression:
         """Errors of the predictions that the estimator tells; none where it does not."""
         if not self.tells_errors:
             return PredictionError.of_rows(np.zeros((0, 1, 1)))
-        return PredictionError.of_rows(self.rest.predict_covariance(self._quiet_inputs(X)))
+        with without_warnings():  # which predictions have given, here and below
+            return PredictionError.of_rows(self.rest.predict_covariance(self._inputs(X)))
 
     def out_of_fold(self, X: Any, y: Any, folds: Folds) -> tuple[Any, PredictionError]:
         """Predictions by clones of the rest that are fitted on other rows, and their errors.
@@ -88,21 +89,20 @@ class Regression:
 
     def reach(self, X: Any) -> tuple[TrainingRange, Any] | None:
         """The weather that the estimator stands on, and X as it is given to its last step; None without ``reach_``."""
-        known = offers(self.rest.regressor_, "reach_")
-        return reach_of(self.rest.regressor_, self._quiet_inputs(X)) if known else None
+        if not offers(self.rest.regressor_, "reach_"):
+            return None
+        with without_warnings():
+            return reach_of(self.rest.regressor_, self._inputs(X))
 
     def from_fleet(self, X: Any) -> NDArray[np.bool_]:
         """Rows in weather that only a fleet has shown."""
         if not offers(self.rest.regressor_, "from_fleet"):
             return np.zeros(len(X), dtype=bool)
-        return self.rest.from_fleet(self._quiet_inputs(X))
+        with without_warnings():
+            return self.rest.from_fleet(self._inputs(X))
 
     def _inputs(self, X: Any) -> Any:
         return X if self.head is None else self.head.transform(X)
-
-    def _quiet_inputs(self, X: Any) -> Any:
-        with without_warnings():  # which predictions have given
-            return self._inputs(X)
 
 
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):

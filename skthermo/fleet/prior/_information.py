@@ -31,7 +31,7 @@ JITTER = 1e-9  # share of its variance that each output has of its own
 class FleetNoise:
     """How records of a fleet scatter: variances of ln y by family, or of what chains measure, and the memory of both.
 
-    ``misfits`` are variances, by family, of what no function of the basis can follow.
+    ``misfits`` are variances, by family, of what no function of the basis can follow, less their standard errors.
     """
 
     variances: Mapping[Any, float] = field(default_factory=dict)
@@ -56,9 +56,11 @@ class FleetNoise:
                 continue
             for family, variance in zip(of_output, variances, strict=True):
                 by_family.setdefault(family, []).append(float(variance))
-        medians, slow = (
-            {family: float(np.median(values)) for family, values in kind.items()} for kind in (by_family, misfits)
-        )
+        medians = {family: float(np.median(values)) for family, values in by_family.items()}
+        slow = {
+            family: float(np.median(values) - np.std(values) / np.sqrt(len(values)))
+            for family, values in misfits.items()
+        }
         memory = float(np.median([one.noise.memory for one in found]))
         return cls(medians, slow, float(np.median(measured)) if measured else None, memory)
 

@@ -12,7 +12,7 @@ from sklearn.base import RegressorMixin
 
 from skthermo._arguments import check_flag
 from skthermo._arrays import Array, as_columns
-from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, row_weights
+from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, like_targets, row_weights
 from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
 from skthermo._weather import TrainingRange, parts
 from skthermo.fleet.prior._basis import steady_changes
@@ -323,9 +323,7 @@ class FleetMapper(RegressorMixin, Estimator):
         return values, covariance
 
     def _as_targets(self, X: Any, values: Array) -> Any:
-        if self.y_is_vector_:
-            return values[:, 0]
-        return values if self.parameter_names_ is None else frame_like(X, values, self.parameter_names_)
+        return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

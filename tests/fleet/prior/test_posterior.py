@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from skthermo.fleet.prior._basis import FleetBasis
+from skthermo.fleet.prior._comparison import left_out
 from skthermo.fleet.prior._families import Member, learn_families
 from skthermo.fleet.prior._information import Information, RowNoise
 from skthermo.fleet.prior._posterior import CoefficientPrior, OwnPrior, mixture, posterior
@@ -175,3 +176,14 @@ def test_basis_goes_on_straight_beyond_the_fleet():
     far = basis.steady(np.array([80.0, 90.0, 100.0]))
     assert_allclose(np.diff(far, n=2, axis=0), 0, atol=1e-9)
     assert np.abs(np.diff(far, axis=0)).max() > 0
+
+
+def test_a_bridge_that_is_left_out_has_no_say():
+    random = np.random.default_rng(8)
+    members = simulated(random, 4, np.zeros(FUNCTIONS), 0.01 * np.eye(FUNCTIONS), information=1e4)
+    odd = simulated(random, 1, np.full(FUNCTIONS, 2.0), 1e-6 * np.eye(FUNCTIONS), information=1e4)
+    everybody = [*members, *odd]
+    found = left_out(everybody, ["g"], {}, learn_families(everybody, ["g"], {}), {"g": 0.5})[-1]
+    prior = odd[0].prior(learn_families(members, ["g"], {}), predictive=True)
+    expected = posterior(odd[0].information.J, odd[0].information.h, *prior).evidence
+    assert_allclose(found.with_family["g"], expected, atol=3)

@@ -1,0 +1,304 @@
+"""Many bridges side by side: each fails alone, killed processes lose no others, and all have the same bits."""
+
+import os
+import signal
+import threading
+import warnings
+from collections import Counter
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+
+from skthermo._warnings import warn_user
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.fleet import Fleet, fit_fleet
+from skthermo.fleet._bridge import by_value
+from skthermo.monitoring import Monitor
+
+MODES = ["f1", "f2"]
+pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ bridges:UserWarning")
+
+
+def year(seed, n=365, start="2025-01-01", step=0.0):
+    """Temperatures and two frequencies that follow them; a step in the second makes an alarm."""
+    random = np.random.default_rng(seed)
+    stamps = pd.date_range(start, periods=n, freq="D")
+    warm = 10 - 15 * np.cos(2 * np.pi * stamps.day_of_year.to_numpy() / 365) + random.normal(0, 3, n)
+    F = np.column_stack([2 - 0.002 * warm, 5 - 0.004 * warm]) * (1 + random.normal(0, 0.002, (n, 2)))
+    F[:, 1] *= 1 - step
+    return pd.DataFrame({"air": warm}, stamps), pd.DataFrame(F, stamps, MODES)
+
+
+def watch(chain):
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
+    return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
+
+
+class Warns(LinearRegression):
+    """Warns twice as a part of the package does, and once in a class of its own, and keeps where it was fitted."""
+
+    def fit(self, X, y):
+        self.process_ = os.getpid()
+        for _ in range(2):
+            warn_user(f"{len(X)} records look odd", "odd records")
+        warnings.warn("slow", RuntimeWarning, stacklevel=1)
+        return super().fit(X, y)
+
+
+def lose_process(flag=None):
+    """End the process like a lack of memory; with a flag, only the first time."""
+    if flag is None or not Path(flag).exists():
+        if flag is not None:
+            Path(flag).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return LinearRegression()
+
+
+class KilledWorker(Exception):
+    """What Dask raises."""
+
+
+def missing_file():
+    raise FileNotFoundError("no records of this bridge")
+
+
+def asked(**changed):
+    """Makers and records of four bridges."""
+    makers = {name: LinearRegression() for name in "abcd"}
+    records = {name: partial(year, seed) for seed, name in enumerate("abcd")}
+    for name, (maker, record) in changed.items():
+        makers[name] = maker or LinearRegression()
+        records[name] = record or partial(year, 7)
+    return makers, records
+
+
+def bits(fleet, names=None):
+    """All that was fitted, as one text; functions of this module count by their names."""
+    return [
+        joblib.hash((fleet.chains[n].coef_, fleet.chains[n].intercept_, fleet.monitors[n].threshold_))
+        for n in names or fleet.chains
+    ]
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """Fitted in this process; one bridge has no records, and one warns."""
+    makers, records = asked(broken=(None, missing_file), odd=(Warns(), None))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = fit_fleet(makers, records, monitor=watch)
+    made.caught = [str(one.message) for one in caught if one.category is UserWarning]
+    return made
+
+
+def test_a_bridge_fails_alone_and_is_named(fleet):
+    assert list(fleet.table.index) == ["a", "b", "c", "d", "broken", "odd"]
+    assert fleet.table["is_fitted"].tolist() == [True] * 4 + [False, True]
+    assert fleet.table.loc["broken", "error"] == "FileNotFoundError: no records of this bridge"
+    assert (fleet.table["error"] == "").sum() == 5
+    (row,) = fleet.errors.itertuples()
+    assert (row.bridge, row.stage) == ("broken", "records")
+    assert row.where.startswith("test_fit_fleet.py:")
+    assert row.where.endswith("in missing_file")
+    assert "broken" not in fleet.chains
+    assert "broken" not in fleet.monitors
+
+
+def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
+    told = fleet.warnings.set_index(["bridge", "kind"])["times"].to_dict()
+    assert told == {("odd", "odd records"): 2, ("odd", "RuntimeWarning"): 1}
+    assert fleet.table["warnings odd records"].to_dict() == dict.fromkeys("abcd", 0) | {"broken": 0, "odd": 2}
+    failed, warned = fleet.caught
+    assert failed.startswith("1 of 6 bridges have failed (broken), the first with FileNotFoundError: no records")
+    assert warned.startswith("1 of 6 bridges gave warnings: ")
+    assert "'odd records' of 1 bridge" in warned
+
+
+def test_nothing_known_is_never_healthy(fleet):
+    assert set(fleet.table["state"]) == {"not judged", ""}
+    text = fleet.summary()
+    assert "5 of 6 bridges are fitted." in text
+    assert "Not fitted: broken." in text
+    assert "0 are in alarm, 5 cannot judge, 0 saw no change" in text
+    assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not judged)"
+
+
+@pytest.mark.parametrize("backend", ["loky", "threading"])
+def test_other_processes_of_which_one_is_killed_and_other_bridges_give_the_same_bits(fleet, backend, tmp_path):
+    lost = partial(lose_process, tmp_path / "flag") if backend == "loky" else LinearRegression
+    makers, records = asked(odd=(Warns(), None))
+    makers, some = makers | {"a": lost}, ("odd", "c", "a")
+    with joblib.parallel_config(backend):
+        other = fit_fleet({n: makers[n] for n in some}, {n: records[n] for n in some}, monitor=watch, n_jobs=2)
+    assert bits(other) == bits(fleet, some)
+    pd.testing.assert_frame_equal(other.warnings, fleet.warnings)
+    assert (tmp_path / "flag").exists() == (other.chains["odd"].process_ != os.getpid()) == (backend == "loky")
+
+
+def test_a_seed_depends_on_the_name_alone():
+    network, records = MLPRegressor(hidden_layer_sizes=3, max_iter=20), year(0, 50)
+    both = fit_fleet({"a": network, "b": network}, {"a": records, "b": records})
+    alone = fit_fleet({"b": network}, {"b": records})
+    other = fit_fleet({"b": network}, {"b": records}, random_state=1)
+    weights = [one.coefs_[0].tolist() for one in (both.chains["a"], both.chains["b"])]
+    assert weights[0] != weights[1] == alone.chains["b"].coefs_[0].tolist() != other.chains["b"].coefs_[0].tolist()
+    assert network.random_state is None
+
+
+@pytest.mark.parametrize("n_workers", [1, 2, 5])
+def test_a_bridge_that_always_kills_its_process_loses_no_other(fleet, monkeypatch, n_workers):
+    """The back end is one of this process, that ends all work of so many workers at once."""
+    runs, pools = Counter(), []
+
+    def results(tasks, begun, n_jobs):
+        waiting = dict(tasks)
+        pools.append(list(tasks))
+        while waiting:
+            together = dict(islice(waiting.items(), n_workers))
+            begun.extend(together)
+            runs.update(list(together))
+            if "killer" in together:
+                raise KilledWorker("a worker ended. More is not known")
+            for name, task in together.items():
+                yield name, task()
+                del waiting[name]
+
+    monkeypatch.setattr("skthermo.fleet._crew._results", results)
+    makers, records = asked(killer=(None, None))
+    order = ["a", "killer", "b", "c", "d"]
+    other = fit_fleet({n: makers[n] for n in order}, {n: records[n] for n in order}, monitor=watch)
+    assert list(other.table.index) == order
+    assert bits(other) == bits(fleet, list("abcd"))
+    assert runs["killer"] == 3
+    assert ["killer"] in pools
+    killed = "its process was killed each time, also when it was alone: was it out of memory? (a worker ended)"
+    assert other.table.loc["killer", "error"] == f"KilledWorker: {killed}"
+    assert other.errors["stage"].tolist() == ["process"]
+
+
+def test_a_back_end_that_does_not_work_is_an_error(monkeypatch):
+    def results(tasks, begun, n_jobs):
+        raise ConnectionError("no cluster")
+        yield
+
+    monkeypatch.setattr("skthermo.fleet._crew._results", results)
+    with pytest.raises(ConnectionError, match="no cluster"):
+        fit_fleet(*asked())
+
+
+def test_a_second_call_fits_only_what_has_changed(tmp_path, fleet):
+    makers, records = asked(killed=(Warns(), missing_file))
+    first = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
+    first.update({"a": year(20, 100, "2026-01-01")})
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("*.bridge")}
+    makers["b"] = LinearRegression(positive=True)
+    records |= {"c": partial(year, 9), "killed": partial(year, 5)}
+    makers["e"], records["e"] = LinearRegression(), partial(year, 6)
+    again = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
+    after = {path.name: path.read_bytes() for path in tmp_path.glob("*.bridge")}
+    same = {name[0] for name in after if after[name] == before.get(name)}
+    assert same == {"a", "d"}
+    assert again.table["is_fitted"].all()
+    assert again.table.loc["a", "n_judged"] == 100  # a monitor goes on with what it has seen
+    pd.testing.assert_frame_equal(Fleet(tmp_path).table.loc[again.table.index], again.table)
+
+
+def test_records_that_cannot_be_had_leave_what_was_fitted_and_an_alarm(tmp_path):
+    makers, records = asked()
+    fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01", step=0.1)})
+    lost = fit_fleet(makers, records | {"a": missing_file, "b": missing_file}, monitor=watch, folder=tmp_path)
+    assert lost.table["state"].to_dict() == {"a": "alarm", "b": "not judged", "c": "not judged", "d": "not judged"}
+    assert lost.table["is_fitted"].all()
+    assert lost.errors["bridge"].tolist() == ["a", "b"]
+    found = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
+    assert not len(found.errors)
+    assert found.table.loc["a", "state"] == "alarm"
+
+
+def test_a_damaged_file_is_fitted_anew(tmp_path):
+    makers, records = asked()
+    first = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
+    file = next(tmp_path.glob("a-*.bridge"))
+    file.write_bytes(file.read_bytes()[:-100])
+    assert Fleet(tmp_path).table["is_fitted"].sum() == 3
+    assert bits(fit_fleet(makers, records, monitor=watch, folder=tmp_path)) == bits(first)
+
+
+def test_an_interrupt_keeps_what_is_finished(tmp_path):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    makers, records = asked(stop=(interrupt, None), late=(None, None))
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fit_fleet(makers, records, folder=tmp_path)
+    assert caught.value.__notes__ == [
+        f"4 of 6 bridges are finished and kept in {tmp_path}; the same call goes on there"
+    ]
+    assert len(Fleet(tmp_path).chains) == 4
+
+
+def test_functions_of_a_notebook_count_with_their_code():
+    def source(number):
+        names = {"__name__": "__main__"}
+        exec(f"def law(x):\n    return {number} * x", names)
+        return names["law"]
+
+    assert by_value(source(1)) != by_value(source(2))
+
+
+def test_monitors_judge_new_records_each_alone(fleet):
+    made = joblib.load(_dumped(fleet))  # also a pickled fleet goes on
+    new = {"a": year(31, 60, "2026-01-01"), "b": partial(year, 32, 60, "2026-01-01", step=0.05), "c": missing_file}
+    answers = made.update(new | {"d": year(33, 60, "2026-01-01")[1]})
+    states = answers.groupby(["bridge", "state"]).size().to_dict()
+    assert states[("b", "alarm")] > 50
+    assert states[("c", "not judged")] == states[("d", "not judged")] == 1
+    assert answers.loc[answers["bridge"] == "c", "reason"].item() == "FileNotFoundError: no records of this bridge"
+    alone = fleet.monitors["b"]
+    alone.update(new["b"]()[0].join(new["b"]()[1]))
+    pd.testing.assert_frame_equal(made.monitors["b"].events_, alone.events_)
+    table = made.table
+    assert table["state"].to_dict() | {"a": ""} == {
+        "a": "", "b": "alarm", "c": "not judged", "d": "not judged", "broken": "", "odd": "not judged"
+    }  # fmt: skip
+    assert table.loc["b", ["n_events", "n_open"]].tolist() == [1, 1]
+    assert table.loc["b", "alarm_rate"] == alone.days_["n_alarms"].sum() / alone.days_["n_judged"].sum()
+    assert made.events.loc[made.events["bridge"] == "b", "event"].tolist() == [1]
+    found = made.discoveries()
+    assert found.called == ["b"]
+    assert {"c", "d", "odd"} == set(found.not_judged)
+    assert found.promised_false_per_year == 5.0
+
+
+def _dumped(fleet):
+    import io
+
+    stream = io.BytesIO()
+    joblib.dump(fleet, stream)
+    stream.seek(0)
+    return stream
+
+
+def test_wrong_arguments_are_named(fleet, tmp_path):
+    makers, records = asked()
+    with pytest.raises(ValueError, match=r"1 bridges have no records \(\['e'\]\) and 0 have no maker"):
+        fit_fleet(makers | {"e": LinearRegression()}, records)
+    with pytest.raises(ValueError, match="expected a mapping of names"):
+        fit_fleet(list(makers), records)
+    with pytest.raises(ValueError, match="expected a function of a fitted estimator"):
+        fit_fleet(makers, records, monitor=3)
+    with pytest.raises(ValueError, match="those of no bridge"):
+        fleet.update({"nowhere": year(0)})
+    with pytest.raises(ValueError, match="holds no bridge"):
+        Fleet(tmp_path)
+    with pytest.raises(ValueError, match=r"maker of bridge 'a' cannot be pickled.*or n_jobs=1"):
+        fit_fleet(makers | {"a": partial(print, threading.Lock())}, records, n_jobs=2)
+    assert len(fit_fleet({"a": LinearRegression()}, {"a": ([[1.0]], 2, 3)}).errors) == 1
