@@ -266,10 +266,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "spread of the same period",
-            "self._spread(self.weather[test], ~test)",
-            "self._spread(self.weather[test], test)",
+            "self._spread(weather, ~test, beyond)",
+            "self._spread(weather, test, beyond)",
         ),
-        ("spread beyond the range", " * (1 + excess)[:, np.newaxis]", ""),
+        ("spread beyond the range", " * (1 + beyond)[:, np.newaxis]", ""),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
         ("runs of noise", "record += 1", "record += 2"),
         (
@@ -325,7 +325,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("_gaussian.py", "detection/test_gaps.py"): [
         ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),
-        ("mean of modes with gaps", "[[mean + step], (updated", "[[mean], (updated"),
+        (
+            "mean of modes with gaps",
+            "counts.sum() - np.outer(step, step)\n    return np.concatenate([[mean + step], (updated",
+            "counts.sum() - np.outer(step, step)\n    return np.concatenate([[mean], (updated",
+        ),
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
         ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
     ],
