@@ -229,6 +229,12 @@ def pair(records: Any, name: Any) -> tuple[Any, Any]:
     """Temperatures and frequencies."""
     if not isinstance(records, tuple | list) or len(records) != 2:
         raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
+    shapes = [np.shape(table) for table in records]
+    if not all(shape and shape[0] for shape in shapes):
+        raise ValueError(
+            f"records of {name!r} have the shapes {shapes[0]} and {shapes[1]}; expected tables of temperatures and "
+            "frequencies, a row for each record"
+        )
     return records[0], records[1]
 
 

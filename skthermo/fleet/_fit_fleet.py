@@ -12,9 +12,11 @@ import numpy as np
 
 from skthermo._arguments import check_jobs, check_path
 from skthermo._io import with_progress
-from skthermo.fleet._bridge import Fit, seed_of, standing_of, unpickled
+from skthermo._warnings import warn_user
+from skthermo.fleet._bridge import Fit, Outcome, seed_of, standing_of, unpickled
 from skthermo.fleet._crew import work_off
 from skthermo.fleet._fleet import Fleet, warn_of_fleet
+from skthermo.fleet._in_words import named
 from skthermo.fleet._kept import Kept
 
 
@@ -67,7 +69,8 @@ def fit_fleet(
     Warns
     -----
     UserWarning
-        If bridges could not be fitted: how many and why; and one that counts the warnings of all bridges by kind.
+        If bridges could not be fitted: how many and why; one that counts the warnings of all bridges by kind; if a
+        monitor that has judged records is replaced, because its bridge has changed.
 
     See Also
     --------
@@ -115,11 +118,14 @@ def fit_fleet(
             for name in makers
         }
         kept.outcomes = {name: kept.outcomes[name] for name in makers if name in kept.outcomes}
-        n_done = 0
+        n_done, begun_again = 0, []
         try:
             work = work_off(tasks, n_jobs)
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 if not result.is_as_before:
+                    if begins_again(tasks[name].known, result.outcome):
+                        kept.set_aside(name)
+                        begun_again.append(name)
                     kept.put(result.outcome, result.fitted)
                 elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
                     _restore(kept, name)
@@ -130,7 +136,20 @@ def fit_fleet(
     kept.outcomes = {name: kept.outcomes[name] for name in makers}
     fleet = Fleet._of(kept)
     warn_of_fleet(fleet)
+    if begun_again:
+        warn_user(
+            f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "
+            f"monitor have changed ({named(begun_again)}): their monitors begin again, without the records that they had "
+            "judged and their events; files ending in .replaced hold these: expected Fleet(folder) to go on with them "
+            "as they were",
+            "monitors that begin again",
+        )
     return fleet
+
+
+def begins_again(before: Outcome | None, now: Outcome) -> bool:
+    """Whether a monitor that has judged records is replaced by another."""
+    return before is not None and before.standing["n_judged"] > 0 and before.content != now.content
 
 
 def _restore(kept: Kept, name: Hashable) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from skthermo._arguments import check_jobs, check_path
 from skthermo._formatting import counted
 from skthermo._io import with_progress
 from skthermo._warnings import warn_user
-from skthermo.fleet._bridge import NOT_WATCHED, Outcome, Update, unpickled
+from skthermo.fleet._bridge import NOT_WATCHED, Outcome, Update, pickled, unpickled
 from skthermo.fleet._crew import work_off
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
 from skthermo.fleet._in_words import in_words, kinds, named
@@ -98,8 +99,8 @@ class Fleet:
     def __repr__(self) -> str:
         states = self._states()
         watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
-        watched += [f"{states[state]} in alarm" for state in ("alarm",) if states.get(state)]
-        watched += [f"{states[state]} not judged" for state in ("not judged",) if states.get(state)]
+        told = {"alarm": "in alarm", "not judged": "not judged"}
+        watched += [f"{states[state]} {words}" for state, words in told.items() if states.get(state)]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
 
@@ -227,6 +228,37 @@ class Fleet:
         tables = [answers[name] for name in records if len(answers[name])]
         joined = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
         return joined.reindex(columns=ANSWERS)
+
+    def acknowledge(self, bridge: Hashable, event: int, *, harmless: bool, note: str = "") -> None:
+        """Record what the owner has found out about an event, and keep it.
+
+        Parameters
+        ----------
+        bridge : str
+            Name of the bridge.
+        event : int
+            Number of the event, as in ``events``.
+        harmless : bool
+            Whether the bridge is as before. Harmless events are not among `discoveries`.
+        note : str, default=""
+            What was found.
+
+        Raises
+        ------
+        ValueError
+            If there is no monitor of that name, or no such event.
+        TimeoutError
+            If another process works on the same folder.
+        """
+        if bridge not in self.monitors:
+            raise ValueError(
+                f"{bridge!r:.100} is no bridge with a monitor; expected one of {list(self.monitors)!r:.200}"
+            )
+        kept = self._kept
+        with kept.alone():
+            chain, monitor = unpickled(kept.fitted(bridge))
+            monitor.acknowledge(event, harmless=harmless, note=note)
+            kept.put(replace(kept.outcomes[bridge], events=monitor.events_), pickled((chain, monitor)))
 
     def discoveries(self, share: float = 0.1, *, days: float = 365.25) -> Discoveries:
         """Which events stand out among those of all bridges.

@@ -14,7 +14,7 @@ from pathlib import Path
 from skthermo._io import alone_with, write_when_complete
 from skthermo.fleet._bridge import Failure, Outcome
 
-ENDING = ".bridge"
+ENDING, REPLACED = ".bridge", ".replaced"
 LONGEST = 40  # letters of a name that its file shows
 SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
 
@@ -47,6 +47,11 @@ class Kept:
         else:
             write_when_complete(self._file(outcome.name), zlib.compress(pickle.dumps((outcome, fitted)), level=0))
         self.outcomes[outcome.name] = outcome
+
+    def set_aside(self, name: Hashable) -> None:
+        """Keep a bridge as it was beside what follows it; nothing reads that again."""
+        if self.folder is not None:
+            self._file(name).replace(self._file(name).with_suffix(REPLACED))
 
     def fitted(self, name: Hashable) -> bytes:
         """Fitted objects of a bridge as bytes."""

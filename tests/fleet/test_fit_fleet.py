@@ -302,3 +302,33 @@ def test_wrong_arguments_are_named(fleet, tmp_path):
     with pytest.raises(ValueError, match=r"maker of bridge 'a' cannot be pickled.*or n_jobs=1"):
         fit_fleet(makers | {"a": partial(print, threading.Lock())}, records, n_jobs=2)
     assert len(fit_fleet({"a": LinearRegression()}, {"a": ([[1.0]], 2, 3)}).errors) == 1
+
+
+def test_a_monitor_that_is_replaced_is_kept_beside_and_told(tmp_path):
+    makers, records = asked()
+    fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01")})
+    judged = next(tmp_path.glob("a-*.bridge")).read_bytes()
+    makers = dict.fromkeys(makers, LinearRegression(positive=True))
+    with pytest.warns(UserWarning, match=r"^1 of 4 bridges were fitted anew.*\(a\): their monitors begin again"):
+        again = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
+    assert again.table["n_judged"].eq(0).all()
+    assert [file.read_bytes() for file in tmp_path.glob("*.replaced")] == [judged]
+    assert len(Fleet(tmp_path)) == 4
+
+
+def test_what_the_owner_found_is_kept(tmp_path):
+    fleet = fit_fleet(*asked(), monitor=watch, folder=tmp_path)
+    fleet.update({name: year(seed, 30, "2026-01-01", 0.1 * (name == "a")) for seed, name in enumerate("abcd")})
+    assert fleet.discoveries().called == ["a"]
+    fleet.acknowledge("a", 1, harmless=True, note="a train stood on it")
+    for known in (fleet, Fleet(tmp_path)):
+        assert known.events["note"].tolist() == ["a train stood on it"]
+        assert known.discoveries().called == []
+    with pytest.raises(ValueError, match="'x' is no bridge with a monitor"):
+        fleet.acknowledge("x", 1, harmless=True)
+
+
+def test_records_that_are_no_tables_are_told():
+    makers, records = asked(n=(None, lambda: (1, 2)))
+    fleet = fit_fleet(makers, records)
+    assert "shapes () and (); expected tables" in fleet.table.loc["n", "error"]
