@@ -140,8 +140,8 @@ def fit_fleet(
         warn_user(
             f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "
             f"monitor have changed ({named(begun_again)}): their monitors begin again, without the records that they "
-            "had judged and their events; files ending in .replaced hold these: expected Fleet(folder) to go on with them "
-            "as they were",
+            "had judged and their events; files ending in .replaced hold these: expected Fleet(folder) to go on with "
+            "them as they were",
             "monitors that begin again",
         )
     return fleet
