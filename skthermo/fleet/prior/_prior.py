@@ -126,9 +126,9 @@ class FleetPrior(Estimator):
         Parameters
         ----------
         bridges : mapping or sequence
-            Of each bridge's name a fitted `DataInformedFEM`, or a pair (T, Y) of temperatures, (n_samples, n_inputs),
-            and positive quantities such as frequencies in Hz, (n_samples, n_outputs); NaN is allowed. A sequence is
-            named 0, 1, ...; a `Fleet` counts as the mapping of its fitted chains.
+            Of each bridge's name a fitted `~skthermo.surrogate.DataInformedFEM`, or a pair (T, Y) of temperatures,
+            (n_samples, n_inputs), and positive quantities such as frequencies in Hz, (n_samples, n_outputs); NaN is
+            allowed. A sequence is named 0, 1, ...; a `Fleet` counts as the mapping of its fitted chains.
         covariates : DataFrame, optional
             A row for each bridge's name: numbers (span) and categories (material).
 
