@@ -186,8 +186,9 @@ class Fleet:
         Returns
         -------
         DataFrame
-            A row for each record that was judged: ``bridge``, ``time`` and the columns of `~skthermo.monitoring.Monitor.update`. A bridge
-            whose records could not be judged has one row without a time: "not judged", and the error as the reason.
+            A row for each record that was judged: ``bridge``, ``time`` and the columns of
+            `~skthermo.monitoring.Monitor.update`. A bridge whose records could not be judged has one row without a
+            time: "not judged", and the error as the reason.
 
         Raises
         ------

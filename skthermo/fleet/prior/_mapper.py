@@ -40,7 +40,7 @@ class FleetMapper(RegressorMixin, Estimator):
     families : mapping of str to str, optional
         Family of each parameter or mode by name; by default as for the fleet. None is never pooled.
     coordinates : FrequencyCoordinates, optional
-        Set by `~skthermo.surrogate.DataInformedFEM` where its inverse refines: what the frequencies see of the parameters.
+        Set by `~skthermo.surrogate.DataInformedFEM` where its inverse refines: what frequencies see of the parameters.
 
     Attributes
     ----------
