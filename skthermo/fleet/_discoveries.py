@@ -79,8 +79,8 @@ class Discoveries:
         names = ", ".join(map(str, self.called))
         lines = [
             f"{len(self.called)} of {self.n_judged} judged bridges stand out{f': {names}' if names else ''}.",
-            f"Of those called so, {percent(self.share)} are false on average; about {left} a year over all bridges, "
-            f"where single monitors promise {promised}.",
+            f"Where p values hold, {percent(self.share)} of those called are false on average, and about {left} a year "
+            f"over all bridges, where single monitors promise {promised}. Outliers and new weather make more.",
         ]
         if self.not_judged:
             lines.append(f"Not judged, and so not known to be healthy: {', '.join(map(str, self.not_judged))}.")
