@@ -29,6 +29,14 @@ def _sentences(fleet: Any) -> Iterator[str]:
     if len(watched) < len(fitted):
         yield f"{len(fitted) - len(watched)} fitted bridges have no monitor: nothing is known of their state."
     if len(watched):
+        begun = watched["last"].notna()
+        if not begun.all():
+            yield (
+                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted: nothing is "
+                "known of their bridges."
+            )
+        watched = watched[begun]
+    if len(watched):
         state = watched["state"]
         yield (
             f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not judged').sum()} "
