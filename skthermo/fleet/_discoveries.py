@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,8 +12,6 @@ from scipy.stats import false_discovery_control
 
 from skthermo._arguments import check_size
 from skthermo._formatting import counted_number, percent, significant
-
-METHOD: Literal["bh", "by"] = "bh"
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,14 +119,13 @@ def discover(
     return Discoveries(share, table, p, not_judged, false, promised)
 
 
-def _limits(p_values: Any, share: float, method: Literal["bh", "by"] = METHOD) -> tuple[float, float]:
+def _limits(p_values: Any, share: float) -> tuple[float, float]:
     """The highest p value that is called, negative if none is, and the level at which p values are called."""
     n = len(p_values)
     if not n:
         return -1.0, 0.0
-    called = p_values[false_discovery_control(p_values, method=method) <= share]
-    weight = (1 / np.arange(1, n + 1)).sum() if method == "by" else 1.0
-    return (float(called.max()) if len(called) else -1.0), share * max(len(called), 1) / (n * weight)
+    called = p_values[false_discovery_control(p_values) <= share]
+    return (float(called.max()) if len(called) else -1.0), share * max(len(called), 1) / n
 
 
 def _compared(monitor: Any, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:

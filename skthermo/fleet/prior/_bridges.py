@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,12 +28,22 @@ class ReadBridge:
     coordinates: Any = None
     times: Array | None = None
 
-    def records(self, order: Sequence[Any] | None) -> BridgeRecords:
-        """Its records, inputs in a common order."""
+    def records(self, name: Hashable, order: Sequence[Any] | None) -> BridgeRecords:
+        """Its records, inputs in a common order; errors name the bridge."""
         inputs = self.inputs
         if order is not None and self.input_names is not None and self.inputs.shape[1] > 1:
             inputs = inputs[:, [self.input_names.index(name) for name in order]]
-        return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.coordinates, self.times)
+        with errors_of(name):
+            return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.coordinates, self.times)
+
+
+@contextmanager
+def errors_of(name: Hashable) -> Iterator[None]:
+    """Put the bridge's name before errors of its tables."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"bridge {name!r}: {error}") from error
 
 
 def bridges_of(bridges: Any) -> dict[Hashable, Any]:
@@ -51,14 +62,12 @@ def bridges_of(bridges: Any) -> dict[Hashable, Any]:
 
 def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
     """Inputs, values and names of a chain's mapper, or of a pair of tables."""
-    try:
+    with errors_of(name):
         if isinstance(bridge, tuple | list):
             return read_pair(*bridge)
         if not hasattr(bridge, "predict_parameters"):
             raise ValueError(f"it is {bridge!r:.100}; expected a fitted DataInformedFEM, or a pair (T, Y) of tables")
         check_is_fitted(bridge)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"bridge {name!r}: {error}") from error
     records = bridge.records_
     input_names = list(bridge.training_range_.names) if hasattr(bridge, "feature_names_in_") else None
     coordinates = getattr(last_step(bridge.mapper_), "coordinates", None)

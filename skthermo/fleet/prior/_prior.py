@@ -145,7 +145,7 @@ class FleetPrior(Estimator):
         self._validate_params()
         read = {name: read_bridge(name, bridge) for name, bridge in bridges_of(bridges).items()}
         inputs = common_inputs(read)
-        records = [one.records(inputs) for one in read.values()]
+        records = [one.records(name, inputs) for name, one in read.items()]
         of_bridge = {
             bridge: families_by_name(self.families, one.names, bridge)
             for bridge, one in zip(read, records, strict=True)

@@ -49,8 +49,11 @@ class BridgeRecords:
         weights = np.ones(len(inputs)) if weights is None else weights
         usable = usable_rows(inputs, values, weights, complete=coordinates is not None)
         rows = spread_evenly(np.flatnonzero(usable), MOST_ROWS)
-        if (values[rows] <= 0).any():
-            raise ValueError(f"a quantity falls to {np.nanmin(values[rows]):g}; expected positive numbers")
+        for name, column in zip(names, values[rows].T, strict=True):
+            if np.isnan(column).all():
+                raise ValueError(f"quantity {name!r} is NaN in all {len(rows)} rows that can be used; expected values")
+            if (column <= 0).any():
+                raise ValueError(f"quantity {name!r} falls to {np.nanmin(column):g}; expected positive numbers")
         seen, level_precision = None, np.zeros(values.shape[1])
         if coordinates is not None:
             _, sizes, vectors = np.linalg.svd(coordinates.sensitivities, full_matrices=False)

@@ -242,7 +242,8 @@ def test_a_vector_with_a_name_belongs_to_its_family(prior):
             {"a": FLEET["bridge 0"], "b": (np.arange(9.0)[:, np.newaxis], np.ones((9, 2)))},
             "has 2 inputs and bridge 'b' 1",
         ),
-        ({"a": (np.arange(9.0), -np.ones(9))}, "falls to -1"),
+        ({"a": (np.arange(9.0), -np.ones(9))}, "bridge 'a': quantity 'f1' falls to -1"),
+        ({"a": (np.arange(9.0), np.full(9, np.nan))}, "bridge 'a': quantity 'f1' is NaN in all 0 rows"),
     ],
 )
 def test_what_is_no_fleet_is_refused(bridges, message):
@@ -256,3 +257,9 @@ def test_inputs_have_the_names_of_the_fleet(prior):
         prior.mapper().fit(T.set_axis(["a", "b"], axis=1), F)
     with pytest.raises(ValueError, match="y has 1 columns without names"):
         prior.mapper().fit(T, F["f1"].to_numpy())
+
+
+def test_a_quantity_without_any_value_is_refused(prior):
+    T, F, _ = records(50, 20)
+    with pytest.raises(ValueError, match="quantity 'f2' is NaN in all 20 rows that can be used; expected values"):
+        prior.mapper().fit(T, F.assign(f2=np.nan))
