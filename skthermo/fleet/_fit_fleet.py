@@ -15,7 +15,7 @@ from skthermo._io import with_progress
 from skthermo._warnings import warn_user
 from skthermo.fleet._bridge import Fit, Outcome, seed_of, standing_of, unpickled
 from skthermo.fleet._crew import work_off
-from skthermo.fleet._fleet import Fleet, warn_of_fleet
+from skthermo.fleet._fleet import Fleet, warn_of_bridges
 from skthermo.fleet._in_words import named
 from skthermo.fleet._kept import Kept
 
@@ -135,7 +135,7 @@ def fit_fleet(
             raise
     kept.outcomes = {name: kept.outcomes[name] for name in makers}
     fleet = Fleet._of(kept)
-    warn_of_fleet(fleet)
+    warn_of_bridges(fleet)
     if begun_again:
         warn_user(
             f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "

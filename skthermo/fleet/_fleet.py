@@ -225,7 +225,7 @@ class Fleet:
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 kept.put(result.outcome, result.fitted)
                 answers[name] = result.answers
-        warn_of_fleet(self, list(records), "update")
+        warn_of_bridges(self, list(records), "update")
         tables = [answers[name] for name in records if len(answers[name])]
         joined = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
         return joined.reindex(columns=ANSWERS)
@@ -330,7 +330,7 @@ def _row(one: Outcome) -> dict[str, Any]:
     return first | standing | {"seconds": one.seconds, "megabytes": one.n_bytes / 1e6}
 
 
-def warn_of_fleet(fleet: Fleet, names: list[Hashable] | None = None, stage: str = "fit") -> None:
+def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: str = "fit") -> None:
     """One warning for all bridges that failed, and one for all of their warnings."""
     asked = list(fleet._outcomes) if names is None else names
     failed = [name for name in asked if fleet._outcomes[name].failures]
