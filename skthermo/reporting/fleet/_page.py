@@ -159,9 +159,9 @@ def _promise(found: Any) -> Html:
     )
     rule = (
         "Bridges are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
-        f"most {percent(found.share)} are expected to be healthy. An event of another bridge is not proved to be "
-        "false: it only cannot be told from the false ones that so many bridges give. Of damage that is missed, the "
-        "rule says nothing."
+        f"most {percent(found.share)} are expected to be healthy, and more where single records are wrong or the "
+        "weather is unlike that of the baseline. An event of another bridge is not proved to be false: it only cannot "
+        "be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
     )
     return section("promise", title, paragraphs(meaning, rule))
 
