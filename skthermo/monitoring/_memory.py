@@ -14,7 +14,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._arguments import is_model
 from skthermo.detection import WindowedAlarm
-from skthermo.preprocessing import HampelFilter, LagFeatures
+from skthermo.preprocessing import ExponentialMeans, HampelFilter, LagFeatures
 
 Path = tuple[tuple[int, int], ...]
 """Reaches of the steps on one way through a detector, the last step first: (rows, nanoseconds), one of them zero."""
@@ -79,6 +79,8 @@ def _paths(part: Any, seen: set[int]) -> set[Path]:
             return {((lags, 0),)} if lags else {()}
         nanoseconds = lags * part.freq_ + part.tolerance_
         return {((0, int(nanoseconds.astype("timedelta64[ns]").astype(np.int64))),)} if lags else {()}
+    if isinstance(part, ExponentialMeans) and hasattr(part, "time_constants_"):
+        return {((0, part.reach_) if part.stamps_ is not None else (part.reach_, 0),)}
     if isinstance(part, WindowedAlarm) and hasattr(part, "law_"):
         if isinstance(part.window, str):
             return {((0, pd.Timedelta(part.window).as_unit("ns").value),)}

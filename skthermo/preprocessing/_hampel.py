@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
-from skthermo._arrays import Array, as_floats
+from skthermo._arrays import NORMAL, Array, as_floats, robust_deviation
 from skthermo._frames import check_positions_are_names, frame_like, positions_of
 from skthermo._times import has_stamps, row_times
 from skthermo._validation import (
@@ -24,7 +24,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.preprocessing._stamps import as_duration
-from skthermo.preprocessing._weather_regression import NORMAL, WeatherRegression, robust_deviation
+from skthermo.preprocessing._weather_regression import WeatherRegression
 
 LEAST_WINDOW = 3  # rows
 

@@ -13,26 +13,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._frames import frame_like
 from skthermo._validation import (
-    Estimator,
     Interval,
     StrOptions,
-    TransformerMixin,
     _check_feature_names_in,
     _fit_context,
     check_is_fitted,
-    validate_data,
 )
 from skthermo._warnings import explain_rows, warn_user
-from skthermo.preprocessing._stamps import as_duration, as_stamps
+from skthermo.preprocessing._past import PastFeatures, in_words
+from skthermo.preprocessing._stamps import as_duration
 
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row
 MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end the interpreter
-EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
 LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
 
 
-class LagFeatures(TransformerMixin, Estimator):
+class LagFeatures(PastFeatures):
     """Current and earlier values of every sensor: a structure follows the temperature with delay.
 
     Parameters
@@ -178,8 +175,8 @@ class LagFeatures(TransformerMixin, Estimator):
         """Read the lags, store the records; their values and stamps."""
         values = self._validated(X, reset=True)
         self.lags_ = _read_lags(self.lags, len(values))
-        self.freq_ = self.tolerance_ = self.history_ = self.stamps_ = self.time_zone_ = None
-        stamps = _stamps(X)
+        self.freq_ = self.tolerance_ = None
+        stamps = self._remember(X, values)
         if stamps is None:
             for name in ("freq", "tolerance"):
                 if getattr(self, name) is not None:
@@ -196,9 +193,6 @@ class LagFeatures(TransformerMixin, Estimator):
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
-            self.history_ = values.copy()
-            self.stamps_ = stamps.as_unit("ns").asi8.view("datetime64[ns]")
-            self.time_zone_ = _time_zone(stamps)
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
         return values, stamps
 
@@ -233,12 +227,7 @@ class LagFeatures(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         values = self._validated(X, reset=False)
-        stamps = _stamps(X)
-        if (stamps is None) != (self.freq_ is None):
-            kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
-            had, has = kinds if stamps is None else kinds[::-1]
-            raise ValueError(f"X has {has}; expected {had}, as in fit")
-        return self._lagged(X, values, stamps)
+        return self._lagged(X, values, self._stamps_as_in_fit(X))
 
     def _lagged(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> Any:
         """Lagged values, as a frame if X is one."""
@@ -268,9 +257,6 @@ class LagFeatures(TransformerMixin, Estimator):
     def _lag_names(self, sensors: Iterable[Any]) -> list[str]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
 
-    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
-
     def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:
         """Warn of first rows whose lags are not known, unless they are those of `fit`; which rows these are."""
         reach, n_rows = max(self.lags_), len(values)
@@ -290,7 +276,7 @@ class LagFeatures(TransformerMixin, Estimator):
         rows these are."""
         is_told = bool(2 * unknown.sum() > len(unknown))
         if is_told:
-            reach = _in_words(max(self.lags_) * self.freq_)
+            reach = in_words(max(self.lags_) * self.freq_)
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
@@ -309,19 +295,14 @@ class LagFeatures(TransformerMixin, Estimator):
 
     def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
         """Lagged values, and the rows of which a warning says that they lack lags."""
-        if (self.time_zone_ is None) != (stamps.tz is None):
-            raise ValueError(f"X has stamps in time zone {_time_zone(stamps)}; expected {self.time_zone_}, as in fit")
         own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
             return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), np.False_
-        earliest = int(own.min()) - max(self.lags_) * freq - tolerance
-        found = (old >= max(earliest, EARLIEST)) & (old <= own.max())
+        found = self._found(own, max(self.lags_) * freq + tolerance)
         found[old.argmin()] = True  # the padding of what is before the first record of all
-        only_old = np.flatnonzero(found)
-        only_old = only_old[~np.isin(old[only_old], own)]
-        known = np.concatenate([old[only_old], own])
+        known, records = self._joined(found, own, values)
         order = np.argsort(known)
         ascending = known[order]
         sources, unknown = [], np.zeros(len(own), dtype=bool)
@@ -334,7 +315,7 @@ class LagFeatures(TransformerMixin, Estimator):
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
         told = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old[found]).all() else np.False_
-        return _rows_by_lag(np.concatenate([self.history_[only_old], values]), sources), told
+        return _rows_by_lag(records, sources), told
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
@@ -372,35 +353,9 @@ def _read_lags(lags: Any, n_rows: int) -> list[int]:
     return [int(lag) for lag in explicit]
 
 
-def _stamps(X: Any) -> pd.DatetimeIndex | None:
-    """Stamps of the rows, or None where rows have none and are consecutive."""
-    index = as_stamps(X.index) if isinstance(X, pd.DataFrame) else None
-    if index is None:
-        return None
-    if index.hasnans:
-        raise ValueError(f"X has a missing stamp (NaT) in row {np.flatnonzero(index.isna())[0]}")
-    if index.has_duplicates:
-        repeated = index[index.duplicated()]
-        raise ValueError(
-            f"X has {len(repeated)} duplicate stamps, the first {repeated[0]} in row "
-            f"{np.flatnonzero(index.duplicated())[0]}; expected each stamp once"
-        )
-    return index
-
-
 def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
     steps = np.diff(np.sort(stamps.as_unit("ns").asi8))
     if not steps.size:
         raise ValueError("X has 1 sample, whose stamp gives no step between records; expected freq, such as '1h'")
     lengths, counts = np.unique(steps, return_counts=True)
     return np.timedelta64(lengths[counts.argmax()], "ns")
-
-
-def _in_words(duration: np.timedelta64) -> str:
-    """A duration in hours, or in days from two days on."""
-    hours = duration / np.timedelta64(1, "h")
-    return f"{hours:.3g} h" if hours < 48 else f"{hours / 24:.3g} days"
-
-
-def _time_zone(stamps: pd.DatetimeIndex) -> str | None:
-    return None if stamps.tz is None else str(stamps.tz)

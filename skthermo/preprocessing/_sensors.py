@@ -20,6 +20,7 @@ from skthermo._validation import (
 )
 
 EVERYWHERE = "ambient"
+SINGULAR = 1e-9  # eigenvalue beside the largest that counts as zero
 
 
 class SensorMeans(TransformerMixin, Estimator):
@@ -168,7 +169,8 @@ def offsets_between(values: NDArray[np.float64]) -> NDArray[np.float64]:
     means = mean_of_known(values)[:, np.newaxis]
     shares = known / np.maximum(known.sum(axis=1, keepdims=True), 1)
     normal = np.diag(known.sum(axis=0)) - known.T @ shares
-    return np.linalg.lstsq(normal, np.where(known, values - means, 0.0).sum(axis=0), rcond=None)[0]
+    # singular, because only differences are known: its zero eigenvalues are rounding errors of any size
+    return np.linalg.lstsq(normal, np.where(known, values - means, 0.0).sum(axis=0), rcond=SINGULAR)[0]
 
 
 def mean_of_known(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats, broken_lines, median, spread_evenly
+from skthermo._arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
 
 MOST_COORDINATES = 3  # principal components of the weather
 EXPLAINED = 0.99  # share of its variance that is enough
@@ -17,13 +17,6 @@ KNOTS = (0.25, 0.5, 0.75)  # quantiles at which lines may break
 MOST_LEARNED = 20_000  # rows, evenly spread, from which anything is learned
 PENALTY = 1e-4  # of the ridge, per row
 TRIMMED = 5.0  # robust deviations beyond which a row does not train a second time
-NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
-
-
-def robust_deviation(values: Array) -> Array:
-    """Standard deviations of columns that outliers hardly move, NaN ignored; from the median of the distances."""
-    distances = np.abs(values - median(values))
-    return NORMAL * median(distances)
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,21 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, as_floats, spread_evenly
 from skthermo._changes import Changes
-from skthermo._frames import check_same_rows
+from skthermo._frames import check_same_rows, frame_like
 from skthermo._frequency_effects import FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import has_stamps
 from skthermo._validation import check_is_fitted
-from skthermo._warnings import warnings_once
+from skthermo._warnings import warnings_once, without_warnings
 from skthermo.monitoring.drift._daily import DailyMeans, WeatherBasis, calendar
 from skthermo.monitoring.drift._kalman import DailySteps, Observation, State, absorb
 from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.preprocessing import ExponentialMeans
 
 YEAR = pd.Timedelta(days=365.25)
 RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
@@ -118,18 +121,34 @@ class DailyRecords:
     @classmethod
     def of(cls, fem: Any, T: Any, freq: str) -> DailyRecords:
         """Learn the weather, and the frequencies in it."""
-        return cls(fem, WeatherBasis.of(filled(fem, T)), ResponseSurface.of(fem, parameters(fem, T)), freq)
+        return cls(fem, WeatherBasis.of(weather(fem, T)), ResponseSurface.of(fem, parameters(fem, T)), freq)
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
-        predicted = self.surface(parameters(self.fem, T)[-len(F) :])
+        predicted = (self.surface(parameters(self.fem, T)) + self.fem.discrepancy_(T))[-len(F) :]
         ratios = np.log(as_floats(F)) - predicted
-        return DailyMeans.of(ratios, filled(self.fem, T)[-len(F) :], F.index, self.basis, days, before)
+        lacking = without_past(self.fem, T)[-len(F) :]
+        ratios[lacking & ~lacking.all()] = np.nan  # their predictions would pass for drift
+        return DailyMeans.of(ratios, weather(self.fem, T)[-len(F) :], F.index, self.basis, days, before)
 
 
-def filled(fem: Any, T: Any) -> Array:
-    """Temperatures with gaps filled from the other sensors."""
-    return fem.sensors_.fill(T)[0]
+def weather(fem: Any, T: Any) -> Array:
+    """Temperatures with gaps filled from the other sensors, and the means of earlier ones that the mapper is given."""
+    filled = frame_like(T, fem.sensors_.fill(T)[0])
+    with without_warnings():  # the chain tells of records without a past
+        means = [as_floats(step.transform(filled))[:, filled.shape[1] :] for step in means_of(fem)]
+    return np.hstack([as_floats(filled), *means])
+
+
+def without_past(fem: Any, T: Any) -> NDArray[np.bool_]:
+    """Which records lack the weather before them that the mapper is given means of."""
+    return np.any([np.zeros(len(T), dtype=bool), *(step.lacks_past(T) for step in means_of(fem))], axis=0)
+
+
+def means_of(fem: Any) -> list[ExponentialMeans]:
+    """Steps of a chain's mapper that give it means of earlier temperatures."""
+    steps = fem.mapper_[:-1] if isinstance(fem.mapper_, Pipeline) else []
+    return [step for step in steps if isinstance(step, ExponentialMeans)]
 
 
 def parameters(fem: Any, T: Any) -> Array:

@@ -10,13 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats, median, spread_evenly
+from skthermo._arrays import Array, as_floats, median, robust_deviation, spread_evenly
 from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
 from skthermo._saved_frames import SavesFrames
 from skthermo._times import row_times
+from skthermo.preprocessing._exponential import trailing_means
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
-from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold, robust_deviation
+from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of
+from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
 from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
 from skthermo.preprocessing.checks._stuck import stuck_runs
 from skthermo.preprocessing.checks._swaps import swapped_modes
@@ -49,6 +51,10 @@ class RecordFindings(SavesFrames):
         nothing was found.
     n_rows : int
         Number of records.
+    outliers : DataFrame of bool of shape (n_records, n_modes), optional
+        Which frequencies are outliers, on the records' index.
+    memory : MemoryFindings, optional
+        What `find_memory` has found; None where nothing was looked for.
 
     Examples
     --------
@@ -63,6 +69,8 @@ class RecordFindings(SavesFrames):
 
     table: pd.DataFrame
     n_rows: int
+    outliers: pd.DataFrame | None = None
+    memory: MemoryFindings | None = None
 
     def summary(self) -> str:
         """A line for each finding.
@@ -108,6 +116,12 @@ class RecordFindings(SavesFrames):
                     f"frequencies are far from their neighbours in time and from what the weather explains: {details}; "
                     "expected NaN where a value is wrong: HampelFilter puts it there",
                 )
+            elif kind == "memory":
+                yield (
+                    kind,
+                    f"frequencies follow the weather of weeks, as soil and large concrete do: {details}; append these "
+                    "means to the inputs of the regression",
+                )
             elif kind == "step":
                 yield (
                     kind,
@@ -122,8 +136,8 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
     It looks for sensors and modes that are stuck, weather that explains nothing, temperatures of another time, modes
-    exchanged in some rows, outliers, steps and trends. A finding is a reason to look at the records, no proof of a
-    fault.
+    exchanged in some rows, outliers, memory, steps and trends. A finding is a reason to look at the records, no proof
+    of a fault.
 
     Parameters
     ----------
@@ -147,6 +161,7 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
+    find_memory : Means of earlier temperatures that explain the frequencies, also those of hours.
     residual_trend : The trend of residuals of any regression.
 
     Notes
@@ -164,6 +179,8 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
       of the other column, and ordering them at least halves what it leaves.
     - *Outliers*: values more than eight robust standard deviations away from the median of the 25 rows around, and from
       what the weather explains.
+    - *Memory*: an exponentially weighted mean of a sensor with a time constant of five days or more lowers the
+      out-of-fold error clearly, as `find_memory` finds it. Steps and trends are looked for beside this mean.
     - *Step*: the level of a frequency beside what the weather explains changes at once, by at least five standard
       errors, and this leaves at least a tenth less of its variance than a straight line does; not in fewer than 90
       days, nor beside a stuck sensor. The row is the best of a hundred places.
@@ -188,7 +205,11 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
     records = _Records.of(temperatures, frequencies, f" {unit}" if unit else "")
     findings = [*_stuck(records)]  # its rows then are NaN, and so on
     findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _absurd(records)
-    return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(records.order))
+    far = np.zeros_like(records.outliers)
+    far[records.order] = records.outliers
+    index = frequencies.index if isinstance(frequencies, pd.DataFrame) else None
+    outliers = pd.DataFrame(far, index, records.modes)
+    return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(outliers), outliers, records.memory)
 
 
 @dataclass
@@ -202,7 +223,9 @@ class _Records:
     order: NDArray[np.intp]
     index: Any
     unit: str
+    outliers: NDArray[np.bool_]
     has_stuck_sensors: bool = False
+    memory: MemoryFindings | None = None
 
     @classmethod
     def of(cls, temperatures: Any, frequencies: Any, unit: str) -> _Records:
@@ -210,7 +233,8 @@ class _Records:
         index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
         T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
         T, F = (np.where(np.isin(table, MARKERS), np.nan, table) for table in (T, F))  # others tell of these
-        return cls(T, F, columns_by_sensor(temperatures), column_names(frequencies, "f"), order, index[order], unit)
+        sensors, modes = columns_by_sensor(temperatures), column_names(frequencies, "f")
+        return cls(T, F, sensors, modes, order, index[order], unit, np.zeros(F.shape, dtype=bool))
 
     @property
     def n_usable(self) -> int:
@@ -269,7 +293,8 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
     folds = BlockedKFold().fold_of(_with_stamps(records))
     yield from _exchanged(records, lines, folds)
     yield from _outliers(records, lines, folds)
-    changes, level = _changes(records, np.hstack([lines, past]))
+    slow = list(_slow_means(records, now))
+    changes, level = _changes(records, np.hstack([lines, past, *(inputs for _, inputs in slow)]))
     F = records.F - level  # a step or a trend would pass for a season of another time
     share = explained(lines, F, folds)
     usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
@@ -284,11 +309,35 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
         )
         yield records.finding("weather", "", usable, detail)
         return
+    yield from (finding for finding, _ in slow)
     yield from changes
 
 
 def _with_stamps(records: _Records) -> Any:
     return pd.DataFrame(index=records.index) if isinstance(records.index, pd.DatetimeIndex) else records.T
+
+
+def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[Any], Array]]:
+    """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
+    if records.has_stuck_sensors:
+        return
+    names = list(records.sensors)
+    found = find_memory(pd.DataFrame(now, records.index, names), pd.DataFrame(records.F, records.index, records.modes))
+    records.memory = found
+    chosen = found.table[found.table["chosen"].astype(bool)]
+    usable = np.flatnonzero(~np.isnan(records.F).all(axis=1))
+    for (constant, sensor), part in chosen.groupby(["time_constant", "sensor"], sort=False):
+        duration = pd.Timedelta(constant)
+        if duration >= WEEKS:
+            times, length = records.index.as_unit("ns").asi8, duration.as_unit("ns").value
+            mean = trailing_means(times, now[:, [names.index(sensor)]], length)
+            before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
+            detail = (
+                f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the out-of-fold error by "
+                f"{part['fall'].mean():.0%}: ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
+            )
+            inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
+            yield records.finding("memory", sensor, usable, detail), inputs
 
 
 def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[Any]]:
@@ -333,6 +382,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[
             )
             yield records.finding("outliers", name, rows, detail)
     F[far] = np.nan
+    records.outliers |= far
 
 
 def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:

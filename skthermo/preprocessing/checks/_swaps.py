@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, median
-from skthermo.preprocessing._weather_regression import NORMAL, out_of_fold
+from skthermo._arrays import NORMAL, Array, median
+from skthermo.preprocessing._weather_regression import out_of_fold
 
 LEAST_ROWS = 3
 LEAST_SHARE = 0.002  # of the records that have both modes

@@ -1,0 +1,341 @@
+"""Whether frequencies remember the weather of days or weeks, decided by out-of-fold errors."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
+from skthermo._frames import check_same_rows, column_names, columns_by_sensor
+from skthermo._saved_frames import SavesFrames
+from skthermo._times import has_stamps
+from skthermo.preprocessing._exponential import PAST, ExponentialMeans, trailing_means
+from skthermo.preprocessing._weather_regression import (
+    KNOTS,
+    Grams,
+    WeatherBasis,
+    out_of_fold,
+    without_far,
+)
+
+TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
+MOST_CHOSEN = 2  # time constants that are put in
+LEAST_SPANS = 4  # time constants that the records last
+DAY = 86400e9  # nanoseconds
+N_FOLDS = 5  # contiguous ones, so that a season is predicted from others
+LEAST_ROWS = 100
+MOST_ROWS = 3000  # evenly spread, from which errors are computed
+MOST_SENSORS = 8  # evenly spread, of which means are tried
+N_PLACES = 24  # of a step that competes with memory
+LEAST_FALL = 0.05  # share by which the error falls
+WEEKS = pd.Timedelta(days=5)  # time constants from which a mean can follow a season, a trend or a step
+LEAST_FALL_OF_WEEKS = 0.15
+ALL_SEASONS = pd.Timedelta(days=270)  # of records; in shorter ones a mean over days extrapolates to other seasons
+LEAST_FALL_WITHOUT_SEASONS = 0.25  # by a mean over more than a day, in such records
+LEAST_BESIDE = 0.5  # of that share, beside a trend and a step
+WORST = 1.0  # ratio of errors in the fold that gains least
+COLUMNS = ["time_constant", "sensor", "mode", "error_without", "error_with", "fall", "chosen"]
+
+
+@dataclass(frozen=True, repr=False)
+class MemoryFindings(SavesFrames):
+    """What `find_memory` has found.
+
+    Parameters
+    ----------
+    table : DataFrame
+        A row for each ``time_constant`` and ``mode``: the ``sensor`` whose mean explains most, mean absolute
+        out-of-fold errors of the frequencies without and with this mean (``error_without``, ``error_with``, in their
+        unit), the share by which they ``fall``, and whether the mean is ``chosen``.
+    features : ExponentialMeans or None
+        The transformer to put before a `~skthermo.surrogate.TemperatureMapper`; None where nothing is gained.
+    fall : float
+        Share by which the out-of-fold error falls by the chosen means, on average over the modes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> from skthermo.preprocessing import ExponentialMeans, find_memory
+    >>> random, days = np.random.default_rng(0), pd.date_range("2023-01-01", periods=1000)
+    >>> season = 10 - 10 * np.cos(2 * np.pi * np.arange(1000) / 365.25)
+    >>> air = pd.DataFrame({"air": season + 4 * random.standard_normal(1000)}, days)
+    >>> soil = ExponentialMeans(["40D"]).fit_transform(air)["air_mean40D"]
+    >>> f = pd.DataFrame({"f1": 4 - 0.004 * air["air"] - 0.008 * soil + 0.01 * random.standard_normal(1000)})
+    >>> memory = find_memory(air[270:], f[270:])
+    >>> round(memory.fall, 1)
+    0.7
+    """
+
+    table: pd.DataFrame
+    features: ExponentialMeans | None
+    fall: float
+
+    def summary(self) -> str:
+        """What was found, in a sentence.
+
+        Returns
+        -------
+        str
+            The means that explain the frequencies, and by how much the error falls.
+        """
+        if self.features is None:
+            return "No memory found: means of earlier temperatures do not explain the frequencies clearly better."
+        means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
+        return (
+            f"The frequencies remember the weather: with exponentially weighted means over {means}, the out-of-fold "
+            f"error falls by {self.fall:.0%}."
+        )
+
+    @property
+    def _sensors(self) -> str:
+        return " and ".join(repr(one) for one in self.features.sensors)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+
+def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindings:
+    """Look whether exponentially weighted means of earlier temperatures explain frequencies.
+
+    Parameters
+    ----------
+    temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
+        In degrees Celsius; NaN is allowed.
+    frequencies : array-like or DataFrame of shape (n_samples, n_modes)
+        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed.
+
+    Returns
+    -------
+    MemoryFindings
+        Its ``features`` is the transformer to put in, or None; ``summary()`` is a sentence.
+
+    Raises
+    ------
+    ValueError
+        If the tables differ in length or index, or hold something that is no number.
+
+    See Also
+    --------
+    ExponentialMeans : The transformer.
+    check_records : Names memory of weeks among other findings.
+
+    Notes
+    -----
+    Errors are those of piecewise-linear ridge regression on up to three principal components of the temperatures, with
+    a mean of one sensor beside them, out of fold in five contiguous parts of the records; values far from what the
+    weather explains are left out. A mean is chosen if it lowers the mean absolute error by 5 % on average over the
+    modes, by 15 % if its time constant is five days or more, and by 25 % if it is more than a day and the records last
+    less than nine months; if it raises the error in no part; and if it lowers the error beside a trend and a step by
+    half as much. Time constants are at most a quarter of the records. A second mean of the same sensor is chosen by the
+    same rules beside the first.
+
+    Records of the first two time constants do not count, because their means lack the weather before. Nothing is looked
+    for in records without a DatetimeIndex.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> from skthermo.preprocessing import ExponentialMeans, find_memory
+    >>> random, days = np.random.default_rng(0), pd.date_range("2023-01-01", periods=1000)
+    >>> season = 10 - 10 * np.cos(2 * np.pi * np.arange(1000) / 365.25)
+    >>> air = pd.DataFrame({"air": season + 4 * random.standard_normal(1000)}, days)
+    >>> soil = ExponentialMeans(["40D"]).fit_transform(air)["air_mean40D"]
+    >>> f = pd.DataFrame({"f1": 4 - 0.004 * air["air"] - 0.008 * soil + 0.01 * random.standard_normal(1000)})
+    >>> memory = find_memory(air[270:], f[270:])
+    >>> memory.features
+    ExponentialMeans(sensors=['air'], time_constants=['40D'])
+    """
+    check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
+    nothing = MemoryFindings(pd.DataFrame(columns=COLUMNS), None, 0.0)
+    if not has_stamps(temperatures):
+        return nothing
+    stamps = temperatures.index.as_unit("ns").asi8
+    order = np.argsort(stamps, kind="stable")
+    first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
+    T, F = as_floats(temperatures)[np.ix_(order, list(first.values()))], as_floats(frequencies)[order]
+    candidates = _Candidates.of(stamps[order], T, F)
+    return nothing if candidates is None else candidates.findings(list(first), column_names(frequencies, "f"))
+
+
+class _Mean(NamedTuple):
+    """A mean that may explain frequencies: positions of its time constant and sensor."""
+
+    constant: int
+    sensor: int
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Inputs side by side: the weather, a trend and a step, and the means that are tried; their products by fold."""
+
+    inputs: Array
+    values: Array
+    scale: Array
+    ages: Array
+    folds: NDArray[np.intp]
+    grams: Grams
+    weather: NDArray[np.intp]
+    time: NDArray[np.intp]
+    means: dict[_Mean, NDArray[np.intp]]
+    has_all_seasons: bool
+
+    @classmethod
+    def of(cls, times: NDArray[np.int64], T: Array, F: Array) -> _Candidates | None:
+        """Those of records in order of time; None where these are too few."""
+        usable = np.flatnonzero(~np.isnan(T).all(axis=1) & ~np.isnan(F).all(axis=1))
+        if len(usable) < LEAST_ROWS:
+            return None
+        rows = spread_evenly(usable, MOST_ROWS)
+        folds = np.arange(len(rows)) * N_FOLDS // len(rows)
+        basis = WeatherBasis.of(T)
+        lines = basis.lines(basis.coordinates(T[rows]))
+        left = F[rows] - out_of_fold(lines, F[rows], folds)
+        scale, centre = robust_deviation(left), median(F[rows])
+        values = without_far(F[rows] - centre, left) / np.where(scale > 0, scale, np.inf)
+        blocks, means = [lines, _time_shapes(without_far(left, left))], []
+        sensors = spread_evenly(np.flatnonzero(~np.isnan(T).all(axis=0)), MOST_SENSORS)
+        for i, one in enumerate(TIME_CONSTANTS):
+            constant = pd.Timedelta(one).as_unit("ns").value
+            if not np.median(np.diff(times)) <= constant <= np.ptp(times) / LEAST_SPANS:
+                continue
+            averages = trailing_means(times, T[:, sensors], constant)[rows]
+            for sensor, column in zip(sensors, averages.T, strict=True):
+                if np.ptp(column) > 0:  # False for NaN
+                    means.append(_Mean(i, int(sensor)))
+                    blocks.append(lines_of(column))
+        ends = np.cumsum([block.shape[1] for block in blocks])
+        weather, time, *others = (np.arange(end - block.shape[1], end) for end, block in zip(ends, blocks, strict=True))
+        inputs = np.hstack(blocks)
+        grams = Grams.of(inputs, values, folds)
+        return cls(
+            inputs,
+            values,
+            scale,
+            (times[rows] - times[0]) / DAY,
+            folds,
+            grams,
+            weather,
+            time,
+            dict(zip(means, others, strict=True)),
+            pd.Timedelta(np.ptp(times), "ns") >= ALL_SEASONS,
+        )
+
+    def least_fall(self, mean: _Mean) -> float:
+        """Share by which a mean has to lower the error."""
+        constant = pd.Timedelta(TIME_CONSTANTS[mean.constant])
+        if constant > pd.Timedelta(days=1) and not self.has_all_seasons:
+            return LEAST_FALL_WITHOUT_SEASONS
+        return LEAST_FALL_OF_WEEKS if constant >= WEEKS else LEAST_FALL
+
+    def errors(self, *blocks: NDArray[np.intp], after: float = 0.0) -> Array:
+        """Mean absolute error out of fold by fold and mode, relative to the scale of the mode, after some time."""
+        columns = np.concatenate(blocks)
+        square = np.ix_(range(N_FOLDS), range(self.values.shape[1]), columns, columns)
+        grams = Grams(self.grams.inputs[square], self.grams.targets[..., columns], self.grams.counts)
+        errors = np.empty(self.grams.counts.shape)
+        for fold in range(N_FOLDS):
+            rows = (self.folds == fold) & (self.ages >= after)
+            left = np.abs(self.values[rows] - self.inputs[np.ix_(rows, columns)] @ grams.coefficients(fold).T)
+            errors[fold] = _means_of_known(left)
+        return errors
+
+    def fall(self, known: list[NDArray[np.intp]], block: NDArray[np.intp], mean: _Mean) -> tuple[float, float]:
+        """By what share a mean lowers the error, and the ratio of errors in the fold where it does so least.
+
+        Records of the first two time constants do not count: their means lack the weather before.
+        """
+        after = PAST * (pd.Timedelta(TIME_CONSTANTS[mean.constant]) / pd.Timedelta(days=1))
+        return _fall(self.errors(*known, after=after), self.errors(*known, block, after=after))
+
+    def chosen(self) -> list[_Mean]:
+        """Means that lower the error clearly, in nearly every part of the records, and beside a trend and a step."""
+        chosen: list[_Mean] = []
+        while len(chosen) < MOST_CHOSEN:
+            known = [self.weather, *(self.means[one] for one in chosen)]
+            found = []
+            for mean, block in self.means.items():
+                if chosen and (mean in chosen or mean.sensor != chosen[0].sensor):
+                    continue
+                fall, worst = self.fall(known, block, mean)
+                if fall >= self.least_fall(mean) and worst <= WORST:
+                    fall_beside, _ = self.fall([*known, self.time], block, mean)
+                    if fall_beside >= LEAST_BESIDE * fall:
+                        found.append((fall, mean))
+            if not found:
+                break
+            chosen.append(max(found)[1])
+        return chosen
+
+    def findings(self, sensors: list[Hashable], modes: list[Hashable]) -> MemoryFindings:
+        """What is chosen, as a table and a transformer."""
+        chosen = self.chosen()
+        before = _means_of_known(self.errors(self.weather))
+        table = []
+        for i, constant in enumerate(TIME_CONSTANTS):
+            errors = {
+                mean: _means_of_known(self.errors(self.weather, block))
+                for mean, block in self.means.items()
+                if mean.constant == i
+            }
+            if errors:
+                wanted = [mean for mean in chosen if mean.constant == i]
+                with np.errstate(invalid="ignore", divide="ignore"):  # of modes without an error
+                    ratios = {mean: error / before for mean, error in errors.items()}
+                best = wanted[0] if wanted else min(ratios, key=lambda mean: np.nansum(ratios[mean]))
+                columns = modes, before * self.scale, errors[best] * self.scale, 1 - ratios[best]
+                table += [[constant, sensors[best.sensor], *row, bool(wanted)] for row in zip(*columns, strict=True)]
+        after = self.errors(self.weather, *(self.means[one] for one in chosen))
+        features = None
+        if chosen:
+            constants = [TIME_CONSTANTS[i] for i in sorted(mean.constant for mean in chosen)]
+            features = ExponentialMeans(constants, sensors=[sensors[chosen[0].sensor]])
+        return MemoryFindings(
+            pd.DataFrame(table, columns=COLUMNS), features, _fall(self.errors(self.weather), after)[0]
+        )
+
+
+def lines_of(column: Array) -> Array:
+    """Piecewise-linear functions of a standardised column."""
+    standard = ((column - column.mean()) / column.std())[:, np.newaxis]
+    return broken_lines(standard, np.quantile(standard, KNOTS, axis=0))
+
+
+def _time_shapes(left: Array) -> Array:
+    """A straight line, and the step that explains most of residuals, (n_samples, 2)."""
+    place = np.arange(len(left)) / len(left)
+    shapes = (place[:, np.newaxis] >= np.arange(1, N_PLACES) / N_PLACES).astype(float)
+    shapes -= shapes.mean(axis=0)
+    deviation = robust_deviation(left)
+    standard = np.nan_to_num((left - median(left)) / np.where(deviation > 0, deviation, np.inf))
+    explained = ((shapes.T @ standard) ** 2).sum(axis=1) / (shapes**2).sum(axis=0)
+    return np.column_stack([place - 0.5, shapes[:, explained.argmax()]])
+
+
+def _means_of_known(values: Array) -> Array:
+    """Mean of the values of each column that are known; NaN where none is."""
+    counts = (~np.isnan(values)).sum(axis=0)
+    return np.divide(np.nansum(values, axis=0), counts, out=np.full(len(counts), np.nan), where=counts > 0)
+
+
+def _fall(before: Array, after: Array) -> tuple[float, float]:
+    """Share by which errors, (n_folds, n_modes), fall on average over the modes; ratio where they fall least.
+
+    What is not known in a fold is NaN in both.
+    """
+    known = ~np.isnan(before) & (before > 0)
+    ratios = np.divide(after, before, out=np.full(before.shape, np.nan), where=known)
+    in_folds = ratios[known.any(axis=1)]
+    sums = [np.where(known, errors, 0.0).sum(axis=0)[known.any(axis=0)] for errors in (before, after)]
+    if not len(in_folds):
+        return 0.0, np.inf
+    return 1 - float(np.mean(sums[1] / sums[0])), float(np.nanmean(in_folds, axis=1).max())

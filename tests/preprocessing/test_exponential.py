@@ -1,0 +1,147 @@
+"""Exponentially weighted means: their definition, order, gaps, history and names."""
+
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.preprocessing import ExponentialMeans
+
+REACH = 4
+HOURS = pd.date_range("2025-01-01", periods=400, freq="h")
+T = pd.DataFrame(np.random.default_rng(0).normal(10, 5, (400, 2)), HOURS, ["air", "deck"])
+
+
+def naive_mean(column, stamp, constant):
+    """The definition, one value at a time."""
+    column = column.set_axis((stamp - column.index) / constant)
+    used = column[(column.index >= 0) & (column.index < REACH)].dropna()
+    weights = np.exp(-used.index.to_numpy(dtype=float))
+    return (used * weights).sum() / weights.sum() if len(used) else np.nan
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.integers(0, 300), min_size=2, max_size=25, unique=True),
+    st.integers(1, 40),
+    st.lists(st.integers(0, 24), max_size=5),
+)
+def test_means_follow_their_definition(hours, constant, gaps):
+    index = pd.Timestamp("2025-03-01") + pd.to_timedelta(hours, unit="h")
+    frame = pd.DataFrame({"a": np.random.default_rng(1).normal(size=len(hours))}, index=index)
+    frame.iloc[[gap for gap in gaps if gap < len(hours)], 0] = np.nan
+    means = ExponentialMeans([f"{constant}h"]).fit_transform(frame)
+    expected = [naive_mean(frame["a"], stamp, pd.Timedelta(hours=constant)) for stamp in index]
+    np.testing.assert_allclose(means.iloc[:, 1], expected, rtol=1e-10, atol=1e-10)
+    assert means.index.equals(index)
+
+
+def test_current_values_come_first_and_names_tell_the_means():
+    means = ExponentialMeans(["6h", "2D"], sensors=["deck"]).fit(T)
+    out = means.transform(T)
+    assert list(out) == ["air", "deck", "deck_mean6h", "deck_mean2D"] == list(means.get_feature_names_out())
+    pd.testing.assert_frame_equal(out[["air", "deck"]], T)
+
+
+def test_a_lagging_body_is_the_mean_of_its_past():
+    """A body that takes up heat in proportion to the difference has the exponentially weighted mean."""
+    hours = pd.date_range("2025-01-01", periods=24 * 200, freq="h")
+    air = pd.DataFrame({"air": 10 * np.sin(np.arange(len(hours)) / 500)}, hours)
+    body = air["air"].ewm(halflife=pd.Timedelta("10D") * np.log(2), times=hours).mean()
+    mean = ExponentialMeans(["10D"]).fit_transform(air)["air_mean10D"]
+    assert np.abs(mean - body)[24 * 50 :].max() < 0.4 < np.abs(air["air"] - body)[24 * 50 :].max()
+
+
+@pytest.mark.parametrize("rows", [slice(399, 400), slice(300, 400), slice(120, 140)])
+def test_batches_have_the_means_that_they_have_among_all_records(rows):
+    whole = ExponentialMeans(["5h", "2D"]).fit_transform(T)
+    history = T.drop(T.index[rows]).sample(frac=1, random_state=0)
+    found = ExponentialMeans(["5h", "2D"]).fit(history).transform(T[rows])
+    np.testing.assert_allclose(found, whole[rows], rtol=1e-10)
+
+
+def test_shuffled_rows_come_back_in_their_own_order():
+    shuffled = T.sample(frac=1, random_state=0)
+    whole = ExponentialMeans(["1D"]).fit_transform(T)
+    np.testing.assert_allclose(ExponentialMeans(["1D"]).fit_transform(shuffled), whole.loc[shuffled.index], rtol=1e-10)
+
+
+def test_gaps_leave_no_row_out_and_only_the_current_value_missing():
+    gappy = T.copy()
+    gappy.iloc[50:60, 0] = np.nan
+    means = ExponentialMeans(["2h", "3D"]).fit_transform(gappy)
+    assert len(means) == len(T)
+    assert means["air"].isna().sum() == 10
+    assert means["air_mean2h"].isna().sum() == 3  # eight hours and more after the last value
+    assert not means["air_mean3D"].isna().any()
+    late = gappy.drop(gappy.index[50:60])
+    np.testing.assert_allclose(
+        ExponentialMeans(["3D"]).fit_transform(late)["air_mean3D"], means["air_mean3D"].drop(T.index[50:60])
+    )
+
+
+def test_rows_without_stamps_count_rows():
+    by_row = ExponentialMeans([12]).fit_transform(T.to_numpy())
+    np.testing.assert_allclose(by_row, ExponentialMeans(["12h"]).fit_transform(T))
+
+
+def test_a_new_value_at_a_known_stamp_replaces_the_old_one():
+    corrected = T.copy()
+    corrected.iloc[390] += 100
+    found = ExponentialMeans(["1D"]).fit(T).transform(corrected[390:])
+    np.testing.assert_allclose(found, ExponentialMeans(["1D"]).fit_transform(corrected)[390:])
+
+
+def test_records_after_an_outage_say_that_they_have_no_past():
+    means = ExponentialMeans(["1D"]).fit(T[:100])
+    with pytest.warns(UserWarning, match="20 of 20 rows have no record 24 h or more before") as told:
+        means.transform(T[300:320])
+    assert told[0].message.kind == "no records for means"
+    means.transform(T[100:120])
+    means.transform(T[:30])  # begin as the records of fit do
+
+
+def test_history_is_a_copy():
+    changed = T.copy()
+    means = ExponentialMeans(["1D"]).fit(changed)
+    expected = means.transform(T[390:])
+    changed.iloc[:] = 99.0
+    pd.testing.assert_frame_equal(means.transform(T[390:]), expected)
+
+
+def test_time_grows_with_the_rows():
+    long = pd.DataFrame(
+        np.random.default_rng(0).normal(size=(200_000, 1)), pd.date_range("2000", periods=200_000, freq="h"), ["air"]
+    )
+    means = ExponentialMeans(["3h", "60D"]).fit(long)
+
+    def seconds(rows):
+        start = time.process_time()
+        means.fit(long[:rows]).transform(long[:rows])
+        return time.process_time() - start
+
+    assert seconds(200_000) < 40 * max(min(seconds(20_000) for _ in range(3)), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("options", "X", "message"),
+    [
+        ({"time_constants": ["30D"]}, T.to_numpy(), "'30D' is a duration, but X has no DatetimeIndex"),
+        ({"time_constants": [3]}, T, "time constant is 3; expected a duration"),
+        ({"time_constants": ["1M"]}, T, "time constant is '1M'; expected a duration of fixed length"),
+        ({"time_constants": ["-1h"]}, T, "time constant is '-1h'"),
+        ({"time_constants": ["11000D"]}, T, "expected at most ten years"),
+        ({"time_constants": ["24h", "1D"]}, T, "expected different ones"),
+        ({"time_constants": []}, T, "time_constants is"),
+        ({"time_constants": [0]}, T.to_numpy(), "positive number of rows"),
+        ({"sensors": ["soil"]}, T, "sensors is .*'soil'.*; expected different ones of the columns"),
+        ({"sensors": []}, T, "sensors is"),
+        ({}, pd.concat([T, T[:1]]), "1 duplicate stamps"),
+    ],
+)
+def test_bad_input_is_named(options, X, message):
+    with pytest.raises(ValueError, match=message):
+        ExponentialMeans(**options).fit(X)
