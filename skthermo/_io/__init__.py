@@ -2,15 +2,18 @@
 
 from skthermo._io._damaged import read_half, read_matlab
 from skthermo._io._matrix_files import read_named_matrices
-from skthermo._io._progress import with_progress, without_bars
+from skthermo._io._progress import as_they_come, bars_of, run_jobs, with_progress, without_bars
 from skthermo._io._shared_files import alone_with, lock, write_when_complete
 
 __all__ = [
     "alone_with",
+    "as_they_come",
+    "bars_of",
     "lock",
     "read_half",
     "read_matlab",
     "read_named_matrices",
+    "run_jobs",
     "with_progress",
     "without_bars",
     "write_when_complete",

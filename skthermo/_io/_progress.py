@@ -6,8 +6,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from typing import TypeVar
+from contextlib import closing, contextmanager
+from typing import Any, TypeVar
+
+from joblib import Parallel
 
 from skthermo._arguments import check_flag
 
@@ -18,6 +20,7 @@ WIDTH = 30
 
 Part = TypeVar("Part")
 _n_open = 0  # contexts within which no bar is drawn
+_stage = ""  # what an estimator is doing, which a bar names
 
 
 def with_progress(
@@ -26,27 +29,29 @@ def with_progress(
     """Yield the results unchanged, and show on stderr how many are done; ``count`` says how many are in a part.
 
     With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides: 1 shows the bar, 0 does not. Unset, the bar
-    appears only on a terminal, after a second, and only in the main thread of the main process: bars of several workers
-    would overwrite each other, as would those of work within work.
+    appears only on a terminal or in a notebook, after a second, and only in the main thread of the main process: bars
+    of several workers would overwrite each other. Work within the parts draws none.
     """
     if shown is not None:
         check_flag(shown, "progress")
     if shown is None:
         shown = {"0": False, "1": True}.get(os.environ.get("SKTHERMO_PROGRESS", ""))
-    if shown is False or _n_open or (shown is None and not _on_terminal()):
+    if shown is False or _n_open or (shown is None and not _is_watched()):
         yield from parts
         return
+    title = f"{_stage}: " if _stage else ""
     start = time.monotonic()
     drawn, next_time, done = False, start + (0.0 if shown else SILENT_SECONDS), 0
     try:
-        for part in parts:
-            done += count(part)
-            now = time.monotonic()
-            if now >= next_time or (drawn and done == total):
-                sys.stderr.write("\r" + bar(done, total, now - start, unit))
-                sys.stderr.flush()
-                drawn, next_time = True, now + SECONDS_BETWEEN
-            yield part
+        with without_bars():
+            for part in parts:
+                done += count(part)
+                now = time.monotonic()
+                if now >= next_time or (drawn and done == total):
+                    sys.stderr.write("\r" + title + bar(done, total, now - start, unit))
+                    sys.stderr.flush()
+                    drawn, next_time = True, now + SECONDS_BETWEEN
+                yield part
     finally:
         if drawn:
             sys.stderr.write("\n")
@@ -63,6 +68,32 @@ def without_bars() -> Iterator[None]:
         _n_open -= 1
 
 
+@contextmanager
+def bars_of(stage: str) -> Iterator[None]:
+    """Bars within name the stage of the work."""
+    global _stage
+    before, _stage = _stage, stage
+    try:
+        yield
+    finally:
+        _stage = before
+
+
+def run_jobs(jobs: Iterable[Any], total: int, *, unit: str, **options: Any) -> list[Any]:
+    """Results of joblib's jobs, in their order; a bar counts them as they come."""
+    results = as_they_come(**options)(jobs)
+    with closing(with_progress(results, total, None, count=lambda _: 1, unit=unit)) as shown:
+        return list(shown)
+
+
+def as_they_come(**options: Any) -> Parallel:
+    """A joblib `Parallel` that yields results as they come, in order, where the active backend can."""
+    try:
+        return Parallel(return_as="generator", **options)
+    except ValueError:  # some backends, such as Ray's, return all results at the end
+        return Parallel(**options)
+
+
 def bar(done: int, total: int, seconds: float, unit: str = "samples") -> str:
     """One line: share, number, time passed and time left.
 
@@ -77,6 +108,9 @@ def bar(done: int, total: int, seconds: float, unit: str = "samples") -> str:
     return f"{100 * done // total:3d} % |{drawing}| {done} of {total} {unit} in {seconds:.0f} s{left}   "
 
 
-def _on_terminal() -> bool:
+def _is_watched() -> bool:
+    """Whether stderr is a terminal or the output of a notebook's cell, and not a log."""
     is_main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
-    return is_main and sys.stderr is not None and sys.stderr.isatty()
+    if not is_main or sys.stderr is None:
+        return False
+    return sys.stderr.isatty() or type(sys.stderr).__module__.startswith("ipykernel.")
