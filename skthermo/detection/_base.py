@@ -10,19 +10,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
+from sklearn.utils.metaestimators import available_if
 
 from skthermo._arrays import Array
 from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._warnings import explain_rows, explained_rows, warn_user
+from skthermo.detection._likelihood import log_volumes, mean_log_density
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
     A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes
-    may be missing, `_limit` and `_cause`.
+    may be missing, `_limit` and `_cause`. One that learns a distribution says so and has `_log_densities`.
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
@@ -46,6 +48,14 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         """Why some rows have no damage index."""
         return "no column has a value there, or what the steps before need for it is missing"
+
+    def _has_likelihood(self) -> bool:
+        """Whether the detector has learned a distribution: `_log_densities` gives the logarithm of that of each row."""
+        return False
+
+    def _log_densities(self, F: Array) -> Array:
+        """Hook: logarithm of the density of each row in the modes that it has; NaN where it has none."""
+        raise NotImplementedError
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> Self:
@@ -176,6 +186,33 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         if untold.any() and not unknown.all():  # where all are, `damage_index` has said so
             self._warn_of_not_judged(X, untold)
         return np.where(unknown, 0, np.where(decision < 0, -1, 1))
+
+    @available_if(lambda detector: detector._has_likelihood())
+    def score(self, X: ArrayLike, y: None = None) -> float:
+        """Mean log-likelihood of healthy records that `fit` has not seen, per value.
+
+        A `MahalanobisDetector` has this method, and an `OutlierDetector` of a density, such as ``GaussianMixture()`` or
+        ``KernelDensity()``. The score depends neither on ``contamination`` nor on ``threshold``.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz, or residuals, of the healthy structure.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        float
+            Natural logarithm of a density per unit of X, averaged over the values that are there: higher is better.
+            Behind a `TemperatureCompensator`, the density is per Hz of the measured frequencies, whatever ``scale`` is,
+            so that all its settings can be compared. NaN if no row has a value; a warning counts the rows scored if
+            they are fewer than half.
+        """
+        check_is_fitted(self)
+        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
+        densities = self._log_densities(F) + log_volumes(X)
+        return mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
 
     def _warn_of_not_judged(self, X: Any, rows: NDArray[np.bool_]) -> None:
         first = int(rows.argmax())

@@ -160,6 +160,12 @@ class MahalanobisDetector(DamageDetector):
     def _index(self, F: Array) -> Array:
         return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
 
+    def _has_likelihood(self) -> bool:
+        return True
+
+    def _log_densities(self, F: Array) -> Array:
+        return Gaussian(self.covariance_.location_, self.covariance_.covariance_).log_densities(F)
+
     def _of_few(self, F: Array) -> Array:
         distances, present = self._distances(F), ~np.isnan(F)
         if present.all():

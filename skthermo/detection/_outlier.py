@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import BaseEstimator, DensityMixin, clone
+from sklearn.neighbors import KernelDensity
 
 from skthermo._arrays import Array, as_floats
 from skthermo._formatting import listed
@@ -161,6 +162,12 @@ class OutlierDetector(DamageDetector):
         if complete.any():
             index[complete] = _index_of(self.estimator_, F[complete])
         return index
+
+    def _has_likelihood(self) -> bool:
+        return isinstance(self.estimator, DensityMixin | KernelDensity)
+
+    def _log_densities(self, F: Array) -> Array:
+        return -self._index(F)
 
     def _index_from(self, others: Array, rows: Array) -> Array:
         """Damage index of rows by a clone fitted on others, on the scale that the estimator itself gives those.

@@ -76,7 +76,7 @@ def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(bare):
     residuals = np.asarray(fitted.fit_transform(data))
     np.testing.assert_array_equal(np.argwhere(np.isnan(residuals)), [[20, 0], [21, 0], [130, 0]])
     expected = frequencies - clone(estimator).fit(temperatures, frequencies).predict(temperatures)
-    np.testing.assert_allclose(fitted.transform(data), expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(fitted.transform(data), expected, rtol=0, atol=1e-6)  # refinement ends by the noise
 
 
 def test_a_missing_target_is_missing_in_its_own_residual_only():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from functools import partial
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -44,6 +45,7 @@ from skthermo._weather import (
     told_unpredicted,
     warn_of_unseen,
 )
+from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.detection.compensation._complete_rows import Regression, has_lags_behind
 from skthermo.detection.compensation._folds import Folds
 from skthermo.detection.compensation._local_covariance import rows_near_in_time
@@ -300,30 +302,40 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
             foretell, as one that drifts or is stuck does; if lags find no record in most rows.
         """
-        check_is_fitted(self)
-        temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
-        filled = fill_temperatures(self.sensors_, temperatures)
-        weather = as_floats(filled)
-        reach, inputs = self._reach(filled)
-        outside = reach.warning(inputs)
-        if outside:
-            warn_user(outside, "weather outside the training range")
-        warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
-        apart = self.sensors_.warning(temperatures)
-        if apart:
-            warn_user(apart, "sensor apart from others")
-        predicted = self.regression_.predict(filled)
-        predicted[np.isnan(weather).all(axis=1)] = np.nan
-        unknown = warn_of_unpredicted(predicted, weather)
-        residuals = as_floats(frequencies) - predicted
-        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
-        errors = self.regression_.errors(filled).plus(fills, len(residuals))
-        scaled = (
-            self.spread_.shrunk(residuals, errors)
-            if self.scale is None
-            else self.spread_.whiten(weather, residuals, errors)
-        )
-        return explain_rows(frame_like(frequencies, scaled), unknown)
+        frequencies, weather, residuals, errors, unknown = self._residuals(X)
+        if self.scale is None:
+            scaled = self.spread_.shrunk(residuals, errors)
+            volumes = partial(self._log_volumes_shrunk, weather, residuals, errors)
+        else:
+            scaled = self.spread_.whiten(weather, residuals, errors)
+            volumes = partial(self.spread_.log_volumes, weather, residuals, errors)
+        return explain_rows(frame_like(frequencies, with_log_volumes(scaled, volumes)), unknown)
+
+    def score(self, X: ArrayLike, y: None = None) -> float:
+        """Mean log-likelihood of healthy records that `fit` has not seen, per value.
+
+        The distribution is the normal one with the mean and the covariance of the baseline's out-of-fold residuals,
+        with ``scale="local"`` the covariance in similar weather. It is wider where predictions are uncertain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies of the healthy structure, in the columns of `fit`.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        float
+            Natural logarithm of a density per Hz, averaged over the targets that are there: higher is better, and a
+            residual twice as small gains 0.69. Settings of all parameters, ``scale`` included, can be compared. NaN
+            if no row has a residual; a warning counts the rows scored if they are fewer than half.
+        """
+        _, weather, residuals, errors, _ = self._residuals(X)
+        residuals = self._with_spread(residuals)
+        white, present = self.spread_.whiten(weather, residuals, errors), ~np.isnan(residuals)
+        densities = self.spread_.log_volumes(weather, residuals, errors) - 0.5 * np.nansum(white**2, axis=1)
+        return mean_log_density(densities - 0.5 * np.log(2 * np.pi) * present.sum(axis=1), present)
 
     @overload
     def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -361,6 +373,37 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]
+
+    def _residuals(self, X: ArrayLike) -> tuple[Any, Array, Array, PredictionError, NDArray[np.bool_]]:
+        """Frequencies and weather of new records, residuals in Hz, errors of predictions, rows without a prediction."""
+        check_is_fitted(self)
+        temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        filled = fill_temperatures(self.sensors_, temperatures)
+        weather = as_floats(filled)
+        reach, inputs = self._reach(filled)
+        outside = reach.warning(inputs)
+        if outside:
+            warn_user(outside, "weather outside the training range")
+        warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
+        apart = self.sensors_.warning(temperatures)
+        if apart:
+            warn_user(apart, "sensor apart from others")
+        predicted = self.regression_.predict(filled)
+        predicted[np.isnan(weather).all(axis=1)] = np.nan
+        unknown = warn_of_unpredicted(predicted, weather)
+        residuals = as_floats(frequencies) - predicted
+        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
+        errors = self.regression_.errors(filled).plus(fills, len(residuals))
+        return frequencies, weather, residuals, errors, unknown
+
+    def _with_spread(self, residuals: Array) -> Array:
+        """Residuals without those of targets that had none in the baseline."""
+        return np.where(np.diag(self.spread_.overall.covariance) > 0, residuals, np.nan)
+
+    def _log_volumes_shrunk(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
+        """As `Spread.log_volumes`, of residuals in Hz that are shrunk where predictions are uncertain."""
+        known, certain = self._with_spread(residuals), PredictionError.of_rows(np.zeros((0, 1, 1)))
+        return self.spread_.log_volumes(weather, known, errors) - self.spread_.log_volumes(weather, known, certain)
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
         if isinstance(self.estimator, type):

@@ -24,7 +24,7 @@ from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
 from skthermo._warnings import explain_rows, explained_rows, told_around, without_warnings
 from skthermo._weather import PredictionError, TrainingRange
 from skthermo.detection.compensation._folds import Folds
-from skthermo.preprocessing import LagFeatures, RecordFindings
+from skthermo.preprocessing import ExponentialMeans, LagFeatures, RecordFindings
 
 TOLD = (
     "filled temperatures",
@@ -201,9 +201,9 @@ def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstim
 
 
 def has_lags_behind(estimator: BaseEstimator) -> bool:
-    """Whether lags stand behind the first transformers, where they see the rows of their folds only."""
+    """Whether lags or means stand behind the first transformers, where they see the rows of their folds only."""
     parts = split_pipeline(estimator)[1].get_params(deep=True).values()
-    return any(isinstance(part, LagFeatures) for part in parts)
+    return any(isinstance(part, LagFeatures | ExponentialMeans) for part in parts)
 
 
 def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
 from skthermo._arrays import Array, patterns, spread_evenly
-from skthermo._gaussian import Gaussian, check_invertible, whiten_by, whitenings
+from skthermo._gaussian import Gaussian, check_invertible, log_determinants, whiten_by, whitenings
 from skthermo._weather import PredictionError, TrainingRange, nearest, parts, weather_coordinates
 from skthermo.detection.compensation._local_covariance import (
     CANDIDATES,
@@ -108,6 +108,16 @@ class Spread:
             by_row = whitened(residuals[rows], self.overall, wider)[0]
             white[rows] = by_row / self._widening(weather[rows])[:, np.newaxis]
         return white
+
+    def log_volumes(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
+        """Logarithms of the factors by which `whiten` changes the volume of each row's values."""
+        volumes, present = np.zeros(len(residuals)), ~np.isnan(residuals)
+        for rows in parts(len(residuals), residuals.shape[1] ** 2):
+            volumes[rows] = log_determinants(self.covariances, self._place(weather[rows]), present[rows])
+        for rows, covariances in self._in_error(errors):
+            wider = self.covariances[self._place(weather[rows])] + covariances
+            volumes[rows] = whitenings(wider, present[rows])[1]
+        return -0.5 * volumes - present.sum(axis=1) * np.log(self._widening(weather))
 
     def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
         """Residuals with the overall covariance also where errors of predictions add to it; NaN without any."""
