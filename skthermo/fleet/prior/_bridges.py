@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._arrays import Array, as_columns
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._validation import check_array, check_is_fitted, last_step
+from skthermo._validation import check_array, check_is_fitted
 from skthermo.fleet.prior._records import BridgeRecords, days_of
 
 
@@ -25,7 +25,6 @@ class ReadBridge:
     names: list[Any]
     input_names: list[Any] | None
     weights: Array | None = None
-    coordinates: Any = None
     times: Array | None = None
 
     def records(self, name: Hashable, order: Sequence[Any] | None) -> BridgeRecords:
@@ -34,7 +33,7 @@ class ReadBridge:
         if order is not None and self.input_names is not None and self.inputs.shape[1] > 1:
             inputs = inputs[:, [self.input_names.index(name) for name in order]]
         with errors_of(name):
-            return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.coordinates, self.times)
+            return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.times)
 
 
 @contextmanager
@@ -70,7 +69,6 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
         check_is_fitted(bridge)
     records = bridge.records_
     input_names = list(bridge.training_range_.names) if hasattr(bridge, "feature_names_in_") else None
-    coordinates = getattr(last_step(bridge.mapper_), "coordinates", None)
     weights = records.weights if records.weights is None else np.where(records.counted, records.weights, 0.0)
     return ReadBridge(
         records.inputs,
@@ -78,7 +76,6 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
         list(bridge.parameter_names_),
         input_names,
         weights,
-        coordinates,
         days_of(records.temperatures),
     )
 

@@ -29,31 +29,24 @@ JITTER = 1e-9  # share of its variance that each output has of its own
 
 @dataclass(frozen=True)
 class FleetNoise:
-    """How records of a fleet scatter: variances of ln y by family, or of what chains measure, and the memory of both.
+    """How records of a fleet scatter: variances of ln y by family, and their memory.
 
     ``misfits`` are variances, by family, of what no function of the basis can follow, less their standard errors.
     """
 
     variances: Mapping[Any, float] = field(default_factory=dict)
     misfits: Mapping[Any, float] = field(default_factory=dict)
-    measured: float | None = None
     memory: float = 1.0
 
     @classmethod
-    def of(
-        cls, found: Sequence[Information], families: Sequence[Sequence[Any]], records: Sequence[BridgeRecords]
-    ) -> FleetNoise:
+    def of(cls, found: Sequence[Information], families: Sequence[Sequence[Any]]) -> FleetNoise:
         """Medians over bridges."""
         by_family: dict[Any, list[float]] = {}
         misfits: dict[Any, list[float]] = {}
-        measured = []
-        for one, of_output, given in zip(found, families, records, strict=True):
+        for one, of_output in zip(found, families, strict=True):
             variances = np.diag(one.noise.scatter)
             for family, misfit in zip(of_output, one.misfit, strict=True):
                 misfits.setdefault(family, []).append(float(misfit))
-            if given.seen is not None:
-                measured.append(float(variances.mean()))
-                continue
             for family, variance in zip(of_output, variances, strict=True):
                 by_family.setdefault(family, []).append(float(variance))
         medians = {family: float(np.median(values)) for family, values in by_family.items()}
@@ -62,17 +55,15 @@ class FleetNoise:
             for family, values in misfits.items()
         }
         memory = float(np.median([one.noise.memory for one in found]))
-        return cls(medians, slow, float(np.median(measured)) if measured else None, memory)
+        return cls(medians, slow, memory)
 
     def misfit(self, found: Information, families: Sequence[Any]) -> Array:
         """Variances of what a bridge does that the basis cannot follow, from the fleet where it has the family."""
         expected = [self.misfits.get(family, own) for family, own in zip(families, found.misfit, strict=True)]
         return np.maximum(expected, 0.0)
 
-    def scatter(self, records: BridgeRecords, families: Sequence[Any]) -> Array | None:
-        """Expected covariance of what a bridge measures; None where the fleet does not tell."""
-        if records.seen is not None:
-            return None if self.measured is None else self.measured * np.eye(len(records.seen))
+    def scatter(self, families: Sequence[Any]) -> Array | None:
+        """Expected covariance of a bridge's ln y; None where the fleet does not tell."""
         if not self.variances:
             return None
         typical = float(np.median(list(self.variances.values())))
@@ -160,16 +151,16 @@ class Information:
         centre = records.weights @ u / records.weights.sum()
         level = _mean(records.logs, records.weights)
         X, y = np.column_stack([np.ones(len(u)), u - centre]), records.logs - level
-        z, q = records.measured(y), records.n_outputs
-        expected = None if fleet is None else fleet.scatter(records, families)
+        q = records.n_outputs
+        expected = None if fleet is None else fleet.scatter(families)
         memory = 1.0 if fleet is None else fleet.memory
-        noise = RowNoise.before(z, expected, memory)
+        noise = RowNoise.before(y, expected, memory)
         for _ in range(ROUNDS):
             found = cls.given(noise, records, X, y, level, centre)
             state = posterior(found.J, found.h, *own.fitted(found.J, found.h, families))
             dof = 1 + np.einsum("ij,ji->", found.J, state.covariance) / q
             left = y - X[:, 1:] @ state.mean.reshape(q, -1).T
-            noise = noise.updated(records.measured(left), records.weights, dof, expected, memory)
+            noise = noise.updated(left, records.weights, dof, expected, memory)
         usual = np.where(noise.robust[:, np.newaxis] >= 1, left, np.nan)
         found = cls.given(noise, records, X, y, level, centre)
         return replace(found, misfit=slow_variance(usual - _mean(usual), records.step))
@@ -180,23 +171,20 @@ class Information:
     ) -> Information:
         """The information in rows X (a constant first) and y, less their level, for known noise.
 
-        Over levels and coefficients it is the sum over rows of (P kron x x') w / memory, with P = A' S^-1 A, or the
-        inverse of the part of S that a row with gaps has. The Schur complement integrates the levels out.
+        Over levels and coefficients it is the sum over rows of (P kron x x') w / memory, with the inverse P of the part
+        of S that a row has. The Schur complement integrates the levels out.
         """
         q, n_columns = y.shape[1], X.shape[1]
         weights = (records.weights * noise.robust / noise.memory)[:, np.newaxis]
         J, h = np.zeros((q, n_columns, q, n_columns)), np.zeros((q, n_columns))
         for mask, rows in rows_by_pattern(~np.isnan(y)):
             P = np.zeros((q, q))
-            if records.seen is None:
-                P[np.ix_(mask, mask)] = np.linalg.inv(noise.scatter[np.ix_(mask, mask)])
-            else:
-                P = records.seen.T @ np.linalg.solve(noise.scatter, records.seen)
+            P[np.ix_(mask, mask)] = np.linalg.inv(noise.scatter[np.ix_(mask, mask)])
             weighted = X[rows] * weights[rows]
             J += np.einsum("ab,ij->aibj", P, X[rows].T @ weighted)
             h += P @ np.nan_to_num(y[rows]).T @ weighted
         size = q * (n_columns - 1)
-        level_covariance = np.linalg.inv(J[:, 0, :, 0] + np.diag(records.level_precision))
+        level_covariance = np.linalg.inv(J[:, 0, :, 0])
         cross, own = J[:, 0, :, 1:].reshape(q, size), level_covariance @ h[:, 0]
         gain = level_covariance @ cross
         return cls(

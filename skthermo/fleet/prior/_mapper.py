@@ -22,7 +22,6 @@ from skthermo.fleet.prior._knowledge import FleetKnowledge
 from skthermo.fleet.prior._posterior import Mixture
 from skthermo.fleet.prior._records import BridgeRecords, days_of, usable_rows
 from skthermo.metrics import complete_r2
-from skthermo.surrogate import FrequencyCoordinates
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
 
@@ -39,8 +38,6 @@ class FleetMapper(RegressorMixin, Estimator):
         Covariates of this bridge; what is not given counts as unknown.
     families : mapping of str to str, optional
         Family of each parameter or mode by name; by default as for the fleet. None is never pooled.
-    coordinates : FrequencyCoordinates, optional
-        Set by `~skthermo.surrogate.DataInformedFEM` where its inverse refines: what frequencies see of the parameters.
 
     Attributes
     ----------
@@ -87,7 +84,6 @@ class FleetMapper(RegressorMixin, Estimator):
         "prior": [HasMethods(["mapper"]), None],
         "covariates": [Mapping, pd.Series, None],
         "families": [Mapping, None],
-        "coordinates": [FrequencyCoordinates, None],
     }
 
     def __init__(
@@ -96,12 +92,10 @@ class FleetMapper(RegressorMixin, Estimator):
         *,
         covariates: Mapping[Hashable, Any] | None = None,
         families: Mapping[Hashable, Any] | None = None,
-        coordinates: FrequencyCoordinates | None = None,
     ):
         self.prior = prior
         self.covariates = covariates
         self.families = families
-        self.coordinates = coordinates
 
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> FleetMapper:
@@ -128,9 +122,7 @@ class FleetMapper(RegressorMixin, Estimator):
         """
         inputs, values = self._read(X, y)
         weights = row_weights(sample_weight, X)
-        if self.coordinates is not None:
-            self.coordinates.check(values)
-        trained = usable_rows(inputs, values, weights, complete=self.coordinates is not None)
+        trained = usable_rows(inputs, values, weights)
         if not trained.any():
             raise ValueError(f"none of {len(inputs)} rows has all inputs, a quantity and a weight; expected one")
         if self.prior is None and trained.sum() < LEAST_ALONE:
@@ -141,7 +133,7 @@ class FleetMapper(RegressorMixin, Estimator):
         names = self._names_of(y, values.shape[1])
         given = getattr(self.prior, "families", None) if self.families is None else self.families
         self.families_ = families_by_name(given, names)
-        records = BridgeRecords.of(inputs, values, names, weights, self.coordinates, days_of(X))
+        records = BridgeRecords.of(inputs, values, names, weights, days_of(X))
         families = list(self.families_.values())
         found, state = known.posterior(records, families, self.covariates)
         self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}

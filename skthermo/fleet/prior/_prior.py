@@ -65,9 +65,8 @@ class FleetPrior(Estimator):
         ln y_i(t) = l_bi + beta_bi' (u(T_t) - u_b) + e_i(t),
 
     with one basis u for the fleet: principal components of the standardised inputs, lags included, and hinges of the
-    largest of them. Levels l belong to the bridge alone, so that a unit of y changes nothing else. Where a chain learns
-    in coordinates of frequencies, z = A ln theta, only A e has a likelihood: N(0, S / w), its precision divided by the
-    correlation time of the residuals. Records far from what is usual count less.
+    largest of them. Levels l belong to the bridge alone, so that a unit of y changes nothing else. Residuals are
+    N(0, S / w), their precision divided by their correlation time. Records far from what is usual count less.
 
     In family g, beta ~ N(M'z, Sigma) for covariates z: a constant, standardised numbers and indicators of categories,
     whose effects have a ridge. Expectation maximisation finds M and Sigma from the bridges' likelihoods; Sigma is drawn
@@ -162,7 +161,7 @@ class FleetPrior(Estimator):
         ]
         names = sorted({family for of_output in families for family in of_output if family is not None}, key=str)
         compared = Comparison.of(members, list(read), names, basis.covariance)
-        noise = FleetNoise.of(found, families, records)
+        noise = FleetNoise.of(found, families)
         self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities)
         self.comparison_, self.bridges_ = compared.by_family, compared.by_bridge
         self.coefficients_, self.bridge_families_ = compared.coefficients, of_bridge

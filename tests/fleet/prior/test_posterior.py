@@ -36,7 +36,7 @@ def linear_data(random, n_rows=40, gaps=0.0):
     y = X @ random.normal(size=(1 + FUNCTIONS, 2)) + random.normal(size=(n_rows, 2)) @ root.T
     y[random.random(y.shape) < gaps] = np.nan
     weights = random.uniform(0.5, 2, n_rows)
-    return X, y, root @ root.T, BridgeRecords(X[:, 1:], y, ["a", "b"], weights, None, np.zeros(2))
+    return X, y, root @ root.T, BridgeRecords(X[:, 1:], y, ["a", "b"], weights)
 
 
 @pytest.mark.parametrize("gaps", [0.0, 0.3])
