@@ -7,13 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._arrays import Array, Bounds, is_real, real_array, refuse_no_numbers
 
+Reduce: TypeAlias = bool | float | Literal["auto"]
+
+DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
 MOST_NOISE = 0.2  # largest relative noise of frequencies: more is meant in percent
 
 
@@ -260,3 +263,26 @@ def is_numbered(labels: Any) -> bool:
 def as_mapping(values: Any) -> Any:
     """A Series with different labels as a mapping; anything else unchanged."""
     return dict(values.items()) if is_labelled(values) and values.index.is_unique else values
+
+
+def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
+    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
+
+    "auto" reduces models that state by ``reduction_pays`` that it saves time for a number of solves.
+    """
+    if is_auto(reduce):
+        pays = hasattr(model, "reduced") and hasattr(model, "reduction_pays") and model.reduction_pays(n_solves)
+        return DEFAULT_TOLERANCE if pays else None
+    if not reduce:
+        return None
+    if not hasattr(model, "reduced"):
+        raise ValueError(
+            f"reduce is {reduce}, but {model!r} has no method 'reduced'; expected a model with one, such as "
+            "AffineModel, or reduce=False"
+        )
+    return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
+
+
+def is_auto(reduce: Reduce) -> bool:
+    """Whether the model decides whether it is reduced."""
+    return isinstance(reduce, str)

@@ -25,6 +25,7 @@ NO_NUMBERS = {
 }
 KINDS = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
 HUGE = 1e150  # squares of larger numbers are infinite
+NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 
 
 def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
@@ -145,6 +146,11 @@ def median(values: Array) -> Array:
         return np.median(values, axis=0)
     known = (column[~gaps] for column, gaps in zip(values.T, missing.T, strict=True))
     return np.array([np.median(column) if len(column) else np.nan for column in known])
+
+
+def robust_deviation(values: Array) -> Array:
+    """Standard deviations of columns that outliers hardly move, NaN ignored; from the median of the distances."""
+    return NORMAL * median(np.abs(values - median(values)))
 
 
 def patterns(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:

@@ -41,10 +41,12 @@ def column_names(X: Any, default: str) -> list[Hashable]:
 
 
 def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
-    """Positions of each sensor's columns: its own, and its lags where `LagFeatures` made columns of them."""
+    """Positions of each sensor's columns: its own, and its lags and means where `LagFeatures` and
+    `ExponentialMeans` made columns of them."""
     columns: dict[Hashable, list[int]] = {}
     for position, name in enumerate(column_names(T, PREFIXES["temperature"])):
-        columns.setdefault(re.sub(r"_lag\d+$", "", name) if isinstance(name, str) else name, []).append(position)
+        sensor = re.sub(r"_(lag\d+|mean\d+[A-Za-z]*)$", "", name) if isinstance(name, str) else name
+        columns.setdefault(sensor, []).append(position)
     return columns
 
 

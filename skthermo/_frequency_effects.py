@@ -122,7 +122,7 @@ def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array
 
 
 def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
-    """Frequencies of the undamaged structure in the measured domain, in Hz, (n_rows, n_modes)."""
+    """Frequencies of the undamaged model in the measured domain, without discrepancy, in Hz, (n_rows, n_modes)."""
     return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=warn)))
 
 

@@ -68,6 +68,14 @@ class Gaussian:
         squared = np.einsum("ij,ij->i", scaled, standard)
         return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
+    def log_densities(self, rows: Array) -> Array:
+        """Logarithm of the density of each row in the modes that it has; 0 where there is none."""
+        scale = np.sqrt(np.diag(self.covariance))
+        present, correlation = ~np.isnan(rows), self.covariance / np.outer(scale, scale)
+        units = present @ np.log(2 * np.pi * scale**2)
+        volumes = units + log_determinants(correlation[np.newaxis], np.zeros(len(rows), dtype=np.intp), present)
+        return -0.5 * (np.nan_to_num(self.distances(rows)) ** 2 + volumes)
+
     def completed(self, rows: Array) -> tuple[Array, Array]:
         """Rows whose gaps hold what is expected given the values that are there, and the standard deviations of those.
 
@@ -99,12 +107,25 @@ class Gaussian:
 def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:
     """Centred rows in standard deviations and uncorrelated, each by one of several covariances."""
     present = ~np.isnan(centred)
-    masks, pattern = patterns(present)
-    cases, case = np.unique(which * len(masks) + pattern, return_inverse=True)
-    roots = whitenings(covariances[cases // len(masks)], masks[cases % len(masks)])[0]
+    (roots, _), case = _whitenings_of(covariances, which, present)
     filled = np.nan_to_num(centred)
     white = filled @ roots[0] if len(roots) == 1 else np.einsum("ij,ijk->ik", filled, roots[case])
     return np.where(present, white, np.nan)
+
+
+def log_determinants(covariances: Array, which: NDArray[np.intp], present: Mask) -> Array:
+    """Logarithms of the determinants of one of several covariances for each row, in the modes that it has."""
+    (_, logarithms), case = _whitenings_of(covariances, which, present)
+    return logarithms[case]
+
+
+def _whitenings_of(
+    covariances: Array, which: NDArray[np.intp], present: Mask
+) -> tuple[tuple[Array, Array], NDArray[np.intp]]:
+    """The `whitenings` of each pair of a covariance and a mask that rows have, and the pair of each row."""
+    masks, pattern = patterns(present)
+    cases, case = np.unique(which * len(masks) + pattern, return_inverse=True)
+    return whitenings(covariances[cases // len(masks)], masks[cases % len(masks)]), case
 
 
 def precisions(covariance: Array, masks: Mask) -> Array:

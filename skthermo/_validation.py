@@ -29,6 +29,7 @@ from sklearn.utils.validation import _check_feature_names_in, _num_samples, chec
 
 from skthermo._arguments import is_model
 from skthermo._arrays import refuse_huge, refuse_no_numbers, without_mask, without_missing
+from skthermo._io import bars_of, without_bars
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
     Method = TypeVar("Method", bound=Callable[..., Any])
@@ -104,13 +105,13 @@ class Estimator(BaseEstimator):
         return twin
 
     def _default_part(self, name: str) -> BaseEstimator | None:
-        """Hook: the estimator that a parameter stands for where it is None; None where there is no such part."""
+        """Hook: the estimator that a parameter stands for where it is None or "auto"; None where there is none."""
         return None
 
     def set_params(self, **params: Any) -> Self:
         """Set parameters, also of parts, as in ``set_params(part__parameter=value)``.
 
-        Where a part is None and stands for a default, that default takes its place and gets the parameters.
+        Where a part is None or "auto" and stands for a default, that default takes its place and gets the parameters.
 
         Parameters
         ----------
@@ -136,7 +137,8 @@ class Estimator(BaseEstimator):
         super().set_params(**own)
         for name, values in nested.items():
             part = self.get_params(deep=False).get(name, self)
-            default = self._default_part(name) if part is None else None
+            is_default = part is None or (isinstance(part, str) and part == "auto")
+            default = self._default_part(name) if is_default else None
             if default is not None:
                 super().set_params(**{name: default.set_params(**values)})
             elif hasattr(part, "set_params"):  # of an unknown part, scikit-learn says so
@@ -251,6 +253,9 @@ class Stages:
         line = f"({self._begun} of {self._number}) {name}" if self._estimator.verbose else None
         with ExitStack() as within:
             within.enter_context(_print_elapsed_time(type(self._estimator).__name__, line))
+            within.enter_context(bars_of(name))
+            if getattr(self._estimator, "_skl_callbacks", ()):  # such as a progress bar
+                within.enter_context(without_bars())
             if self._task is None:
                 yield
                 return

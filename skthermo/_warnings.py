@@ -6,7 +6,7 @@ import sys
 import threading
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, TypeVar
@@ -138,8 +138,11 @@ def checked_once() -> Iterator[None]:
         _found.reset(token)
 
 
-def findings_of(check: Callable[..., Any], *tables: Any) -> Any:
-    """What a check has found in tables, with its warnings; neither is repeated for records that were checked before."""
+def findings_of(check: Callable[..., Any], *tables: Any, mended: Collection[str] = ()) -> Any:
+    """What a check has found in tables, with its warnings; neither is repeated for records that were checked before.
+
+    Of kinds that the caller has ``mended``, there is no warning.
+    """
     found = _found.get()
     if found is None:
         found, content = {}, ALL
@@ -147,7 +150,7 @@ def findings_of(check: Callable[..., Any], *tables: Any) -> Any:
         content = ALL if ALL in found else content_of(tables)
     if content not in found:
         found[content] = check(*tables)
-        warn_each(found[content].warnings())
+        warn_each((kind, text) for kind, text in found[content].warnings() if kind not in mended)
     return found[content]
 
 

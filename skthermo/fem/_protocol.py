@@ -37,6 +37,7 @@ class FEModel(Protocol):
     - ``track``, whether a column follows its mode (True) or its rank (False);
     - ``reduced(bounds, tol=..., random_state=...)``, a smaller model of the same frequencies within a box, whose
       ``full`` is the model that was reduced;
+    - ``reduction_pays(n_solves)``, whether ``reduced`` is expected to save time for so many rows of theta;
     - ``linearised(theta)``, frequencies and Jacobian from one solution;
     - ``linearised_modes(theta, dofs)``, these and mode shapes with their derivatives at some degrees of freedom;
     - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;

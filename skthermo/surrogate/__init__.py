@@ -2,14 +2,12 @@
 
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._networks import paper_network
-from skthermo.surrogate._standardiser import FrequencyCoordinates
 from skthermo.surrogate.chain import DataInformedFEM, FitReport
 from skthermo.surrogate.inverse import InverseSurrogate
 
 __all__ = [
     "DataInformedFEM",
     "FitReport",
-    "FrequencyCoordinates",
     "InverseSurrogate",
     "TemperatureMapper",
     "paper_network",

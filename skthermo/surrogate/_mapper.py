@@ -12,7 +12,6 @@ from skthermo._regressors import check_takes_weights
 from skthermo._validation import HasMethods, _fit_context, check_is_fitted, seeded, validate_data
 from skthermo.surrogate._networks import default_lines
 from skthermo.surrogate._regression import MultiplierRegressor
-from skthermo.surrogate._standardiser import FrequencyCoordinates
 
 
 class TemperatureMapper(MultiplierRegressor):
@@ -26,10 +25,6 @@ class TemperatureMapper(MultiplierRegressor):
         parameters are not positive, no logarithm is taken. By default broken lines,
         ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data.
         See `paper_network` for the paper's network.
-    coordinates : FrequencyCoordinates, optional
-        Set by `DataInformedFEM` where its inverse refines. The regressor then learns the changes of ln f that belong to
-        ln theta to first order, so that errors of parameters count as much as they change the frequencies; theta
-        follows by damped least squares, which keeps parameters that hardly change the frequencies near their means.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -77,7 +72,6 @@ class TemperatureMapper(MultiplierRegressor):
     _default_regressor = staticmethod(default_lines)
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
-        "coordinates": [FrequencyCoordinates, None],
         "random_state": ["random_state"],
     }
 
@@ -85,11 +79,9 @@ class TemperatureMapper(MultiplierRegressor):
         self,
         regressor: BaseEstimator | None = None,
         *,
-        coordinates: FrequencyCoordinates | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.regressor = regressor
-        self.coordinates = coordinates
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
@@ -116,22 +108,18 @@ class TemperatureMapper(MultiplierRegressor):
         ------
         ValueError
             If lengths or indices differ, a temperature is constant, missing throughout, in kelvin or holds a number
-            that stands for a missing value, such as -999, or fewer than two rows are complete and have a weight; if the
-            ``coordinates`` are of another number of parameters, or a multiplier is not positive there; if weights are
-            negative, NaN or infinite, not one for each row, or of no use to the regressor, whose ``fit`` takes none.
+            that stands for a missing value, such as -999, or fewer than two rows are complete and have a weight; if
+            weights are negative, NaN or infinite, not one for each row, or of no use to the regressor, whose ``fit``
+            takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        if self.coordinates is not None:
-            self.coordinates.check(theta)
         named = frame_like(X, T)
         check_temperatures(named)
         check_columns(named, "temperature", varying=True)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)
-        self._learn(
-            T, theta, seeded(self.random_state), log_inputs=False, coordinates=self.coordinates, sample_weight=weights
-        )
+        self._learn(T, theta, seeded(self.random_state), log_inputs=False, sample_weight=weights)
         return self
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:

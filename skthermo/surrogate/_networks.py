@@ -14,6 +14,7 @@ NETWORKS: dict[str, dict[str, Any]] = {
     "kw51-inverse": {"hidden_layer_sizes": (256, 128, 64, 32, 16), "alpha": 1e-4, "batch_size": 128},
     "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
 }
+PENALTIES = np.logspace(-3, 5, 33)
 TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 
 
@@ -24,9 +25,10 @@ def default_network() -> MLPRegressor:
     )
 
 
-def default_lines() -> Pipeline:
+def default_lines(penalties: Any = PENALTIES, **options: Any) -> Pipeline:
     """Broken lines whose changes of slope are penalised; they go on straight beyond the data."""
-    return make_pipeline(HingeFeatures(), RidgeCV(np.logspace(-3, 5, 33)))
+    hinges = HingeFeatures().set_output(transform="default")  # whatever the global setting is at fit and at predict
+    return make_pipeline(hinges, RidgeCV(penalties, **options))
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -11,6 +12,7 @@ import pandas as pd
 from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.preprocessing import StandardScaler
 
 from skthermo._arguments import check_flag, columns_by_name
 from skthermo._arrays import Array, as_columns
@@ -20,7 +22,35 @@ from skthermo._threads import single_blas_thread
 from skthermo._validation import Estimator, check_array, seed_parts, validate_data
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._memory import remembered
-from skthermo.surrogate._standardiser import FrequencyCoordinates, Standardiser
+
+
+@dataclass(frozen=True)
+class Standardiser:
+    """z = (x - mean) / scale, or of log x, and the inverse."""
+
+    mean: Array
+    scale: Array
+    log: bool
+
+    @classmethod
+    def fitted(cls, values: Array, *, log: bool, sample_weight: Array | None = None) -> Standardiser:
+        """Mean and standard deviation of some values; the scale of a constant column is 1."""
+        scaler = StandardScaler().fit(np.log(values) if log else values, sample_weight=sample_weight)
+        return cls(scaler.mean_, scaler.scale_, log)
+
+    def transform(self, values: Array) -> Array:
+        """Standardised values."""
+        return ((np.log(values) if self.log else values) - self.mean) / self.scale
+
+    def inverse_transform(self, standardised: Array) -> Array:
+        """Values from standardised values; a logarithm too large for a float becomes infinity."""
+        x = self.mean + standardised * self.scale
+        with np.errstate(over="ignore"):
+            return np.exp(x) if self.log else x
+
+    def inverse_deviations(self, deviations: Array, values: Array) -> Array:
+        """Standard deviations of values from those of the standardised values, to first order."""
+        return deviations * self.scale * (values if self.log else 1)
 
 
 class MultiplierRegressor(RegressorMixin, Estimator):
@@ -113,7 +143,6 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         random_state: np.random.RandomState | None,
         *,
         log_inputs: bool,
-        coordinates: FrequencyCoordinates | None = None,
         sample_weight: Array | None = None,
         memory: str | Memory | None = None,
     ) -> None:
@@ -131,7 +160,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         weights = None if sample_weight is None else sample_weight[complete]
         self.n_parameters_ = y.shape[1]
         self.inputs_ = Standardiser.fitted(X, log=log_inputs and bool((X > 0).all()), sample_weight=weights)
-        self.targets_ = Standardiser.fitted(y, log=bool((y > 0).all()), coordinates=coordinates, sample_weight=weights)
+        self.targets_ = Standardiser.fitted(y, log=bool((y > 0).all()), sample_weight=weights)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, random_state)
         targets = self.targets_.transform(y)

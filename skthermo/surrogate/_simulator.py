@@ -12,27 +12,24 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
+from skthermo._arguments import DEFAULT_TOLERANCE, Reduce, is_auto, tolerance
 from skthermo._arrays import Array
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
-MANY_ROWS = 2000  # number of rows from which a full sparse model takes minutes
-DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
+SOLVES_PER_ROW = 3  # for predictions and simulations, and to refine the parameters of a record
 MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their range, and of their values
 MOST_KEPT = 25_000_000  # numbers, of 8 bytes, in the bases of reduced models that are kept
+NO_BASIS = "no reduced model is accurate where the parameters of the records are"
+NO_GAIN = "a reduced model would save no time"
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
-def tolerance(model: FEModel, reduce: bool | float) -> float | None:
-    """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction."""
-    if not reduce:
-        return None
-    if not hasattr(model, "reduced"):
-        raise ValueError(
-            f"reduce is {reduce}, but {model!r} has no method 'reduced'; expected a model with one, such as "
-            "AffineModel, or reduce=False"
-        )
-    return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
+def reason_of(model: FEModel, reduce: Reduce) -> str:
+    """Why a model is not reduced."""
+    if not is_auto(reduce):
+        return "reduce=False"
+    return NO_GAIN if hasattr(model, "reduction_pays") else "it has no reduced model"
 
 
 def box_around(theta: Array, limits: Array | None = None) -> Array:
@@ -80,39 +77,57 @@ class KnownChanges:
 
 @dataclass(frozen=True)
 class Simulator:
-    """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2)."""
+    """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2).
+
+    Without one, the ``reason`` says why.
+    """
 
     model: FEModel
     reduced: Any = None
     box: Array | None = None
     tol: float = DEFAULT_TOLERANCE
+    reason: str = ""
     _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
 
     @classmethod
-    def around(cls, model: FEModel, theta: Array, reduce: bool | float, known: Simulator | None = None) -> Simulator:
+    def around(cls, model: FEModel, theta: Array, reduce: Reduce, known: Simulator | None = None) -> Simulator:
         """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
 
         A known simulator is taken if its reduced model is of the same model, as accurate, and covers that box.
         """
-        tol = tolerance(model, reduce)
-        if tol is None:
-            return cls(model)
-        box = box_around(theta)
-        if known is not None and known.model is model and known.covers(box) and known.tol <= tol:
+        auto, box = is_auto(reduce), box_around(theta)
+        tol = tolerance(model, reduce, SOLVES_PER_ROW * len(theta))
+        allowed = DEFAULT_TOLERANCE if auto else tol
+        is_known = known is not None and known.model is model and known.covers(box)
+        if known is not None and is_known and allowed is not None and known.tol <= allowed:
             return known
+        if tol is None:
+            return cls(model, reason=reason_of(model, reduce))
         try:
             return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
         except RuntimeError as error:
-            ranges = ", ".join(
-                f"{name!r} {low:.3g} to {high:.3g}"
-                for name, (low, high) in zip(model.parameter_names, box, strict=True)
-            )
-            warn_user(
-                f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): {error}; "
-                "all rows are solved by the full model, which takes long: expected a model updated to the records",
-                "no reduced model",
-            )
-            return cls(model)
+            if not auto:
+                ranges = ", ".join(
+                    f"{name!r} {low:.3g} to {high:.3g}"
+                    for name, (low, high) in zip(model.parameter_names, box, strict=True)
+                )
+                warn_user(
+                    f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): "
+                    f"{error}; all rows are solved by the full model, which takes long: expected a model updated to "
+                    "the records",
+                    "no reduced model",
+                )
+            return cls(model, reason=NO_BASIS)
+
+    @property
+    def described(self) -> str:
+        """One sentence: which model solves, and why."""
+        if self.reduced is None:
+            return f"Solved by the full model: {self.reason or 'reduce=False'}."
+        return (
+            f"Solved by a reduced model of {self.reduced.basis_size_} coordinates (of {self.reduced.n_dof}), accurate "
+            f"to {self.tol:g}."
+        )
 
     @property
     def size(self) -> int:
@@ -188,7 +203,6 @@ class Simulator:
     def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""
         if self.reduced is None:
-            self._hint(len(theta))
             return evaluate(self.model, theta, n_jobs=n_jobs)
         outside = self.outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
@@ -235,11 +249,3 @@ class Simulator:
             return np.ones(len(theta), dtype=bool)
         lowest, highest = self.box.T
         return ((theta < lowest) | (theta > highest)).any(axis=1)
-
-    def _hint(self, n_rows: int) -> None:
-        if n_rows >= MANY_ROWS and hasattr(self.model, "reduced") and getattr(self.model, "prefer", "") == "processes":
-            warn_user(
-                f"{n_rows} rows are solved by the full model {self.model!r}, which takes long; "
-                "DataInformedFEM(..., reduce=True) gives the same frequencies to 1e-5 in a small part of the time",
-                "full model",
-            )

@@ -6,11 +6,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from skthermo._arguments import check_names
 from skthermo._arrays import Array
 from skthermo._frequency_effects import read_groups
+from skthermo._io import run_jobs
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._measured import Measured
@@ -117,13 +118,13 @@ class Ensemble:
         return [*self.model.parameter_names, *self.groups]
 
     def multipliers(
-        self, n: int, start: Array, random: np.random.RandomState, max_iter: int, parallel: Parallel
+        self, n: int, start: Array, random: np.random.RandomState, max_iter: int, **options: Any
     ) -> list[Outcome]:
-        """Most probable multipliers of n randomised problems, each from the same start."""
+        """Most probable multipliers of n randomised problems, each from the same start; options are joblib's."""
         first = np.append(start, np.ones(len(self.groups)))
         search = partial(optimise, bounds=self.bounds, start=first, method="least_squares", max_iter=max_iter)
         drawn = RandomisedResiduals.draw(self.residuals, n, random)
-        return parallel(delayed(search)(randomised) for randomised in drawn)
+        return run_jobs((delayed(search)(randomised) for randomised in drawn), n, unit="models", **options)
 
     def model_at(self, multipliers: Array) -> FEModel:
         """The model whose theta = 1 has these multipliers; its damage groups are those of the model."""

@@ -13,9 +13,10 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._arguments import check_bounds, check_model, check_prior, check_size
+from skthermo._arguments import Reduce, check_bounds, check_model, check_prior, check_size, is_auto, tolerance
 from skthermo._arrays import Array, Bounds, as_random_state, real_array
 from skthermo._frames import column_names
+from skthermo._io import run_jobs
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -40,6 +41,8 @@ from skthermo.updating._identifiability import cramer_rao
 from skthermo.updating._measured import Measured, read_measured
 from skthermo.updating._optimise import Outcome, optimise
 from skthermo.updating._residuals import Residuals
+
+EVALUATIONS_PER_START = 10  # of the model, which a search is expected to take
 
 
 class ModelUpdater(Estimator):
@@ -72,6 +75,11 @@ class ModelUpdater(Estimator):
         Relative standard deviations of a Gaussian prior on theta about 1. By default there is none.
     max_iter : int, default=200
         Most evaluations (least_squares) or iterations (lbfgs) of one start.
+    reduce : "auto", bool or float, default="auto"
+        Whether the starts search by a reduced model, ``model.reduced(bounds)``. The best of them goes on with the model
+        itself, so that ``theta_`` is its optimum. "auto" reduces where ``model.reduction_pays``, given the number of
+        starts, and a basis is accurate; True allows a relative error of 1e-5 in the frequencies, as "auto" does; a
+        number sets the error allowed.
     n_jobs : int, optional
         Jobs over which starts are spread, through joblib.
     random_state : int, RandomState or None, default=None
@@ -165,6 +173,7 @@ class ModelUpdater(Estimator):
         "method": [StrOptions({"least_squares", "lbfgs"})],
         "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
         "max_iter": [Interval(Integral, 1, None, closed="left")],
+        "reduce": [StrOptions({"auto"}), "boolean", Interval(Real, 0, 1, closed="neither")],
         "n_jobs": [Interval(Integral, None, -1, closed="right"), Interval(Integral, 1, None, closed="left"), None],
         "random_state": ["random_state"],
     }
@@ -179,6 +188,7 @@ class ModelUpdater(Estimator):
         method: Literal["least_squares", "lbfgs"] = "least_squares",
         prior: ArrayLike | Mapping[str, float] | None = None,
         max_iter: int = 200,
+        reduce: Reduce = "auto",
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
@@ -189,6 +199,7 @@ class ModelUpdater(Estimator):
         self.method = method
         self.prior = prior
         self.max_iter = max_iter
+        self.reduce = reduce
         self.n_jobs = n_jobs
         self.random_state = random_state
 
@@ -370,11 +381,11 @@ class ModelUpdater(Estimator):
         ensemble = Ensemble(
             self.model, self.measured_, self._read_bounds(), prior, groups_beside(self.model, groups), spread
         )
-        parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
-        outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, parallel)
+        options = {"n_jobs": self.n_jobs, "prefer": getattr(self.model, "prefer", None)}
+        outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, **options)
         warn_each(ensemble.doubts(outcomes))
         ensemble.warn_of([outcome.theta for outcome in outcomes])
-        return parallel(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
+        return Parallel(**options)(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         check_model(self.model)
@@ -405,9 +416,39 @@ class ModelUpdater(Estimator):
         return bounds
 
     def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
+        """The outcome of each start; where a reduced model has searched, the best one goes on with the model itself."""
         lowest, highest = bounds.T
         random_state = check_random_state(self.random_state)
         drawn = random_state.uniform(lowest, highest, size=(self.n_starts - 1, len(bounds)))
-        parallel = Parallel(n_jobs=self.n_jobs, prefer=getattr(self.model, "prefer", None))
         starts = np.vstack([np.ones(len(bounds)), drawn])
-        return parallel(delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
+        reduced = self._reduced(bounds)
+        if reduced is None:
+            return self._outcomes(residuals, bounds, starts)
+        found = self._outcomes(Residuals(reduced, residuals.measured, residuals.prior), bounds, starts)
+        outcomes = [one._replace(objective=residuals.at(one.theta).objective) for one in found]
+        best = min(range(len(outcomes)), key=lambda start: outcomes[start].objective)
+        last = optimise(residuals, bounds, outcomes[best].theta, self.method, self.max_iter)
+        before = outcomes[best]
+        outcomes[best] = last._replace(
+            start=before.start,
+            n_evaluations=before.n_evaluations + last.n_evaluations,
+            n_failed=before.n_failed + last.n_failed,
+        )
+        return outcomes
+
+    def _outcomes(self, residuals: Residuals, bounds: Array, starts: Array) -> list[Outcome]:
+        jobs = (delayed(optimise)(residuals, bounds, start, self.method, self.max_iter) for start in starts)
+        options = {"n_jobs": self.n_jobs, "prefer": getattr(residuals.model, "prefer", None)}
+        return run_jobs(jobs, len(starts), unit="starts", **options)
+
+    def _reduced(self, bounds: Array) -> FEModel | None:
+        """The reduced model that the starts search by; None without one."""
+        tol = tolerance(self.model, self.reduce, EVALUATIONS_PER_START * self.n_starts)
+        if tol is None:
+            return None
+        try:
+            return self.model.reduced(bounds, tol=tol, random_state=0).quiet()  # type: ignore[attr-defined]
+        except RuntimeError:
+            if not is_auto(self.reduce):
+                raise
+            return None

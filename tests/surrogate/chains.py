@@ -42,6 +42,11 @@ def fitted():
         return chain().fit(T, F)
 
 
+def as_measured(fem, frequencies, temperatures):
+    """Frequencies of the FE model in the measured domain, times the discrepancy in the weather."""
+    return fem.aligner_.inverse_transform(np.asarray(frequencies)) * np.exp(fem.discrepancy_(temperatures))
+
+
 class Logged:
     """A model that writes down how many rows it solves."""
 

@@ -1,10 +1,12 @@
 """The whole chain and its laws."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
@@ -25,7 +27,7 @@ from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse, mapper
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
 pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
 
-LATER = make_truss_campaign(random_state=1)
+YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 FITTED = fitted()
 
 
@@ -34,10 +36,57 @@ def test_predicts_unseen_temperatures_to_a_fraction_of_the_noise():
     assert FITTED.score(LATER.temperatures, LATER.clean_frequencies) > 0.9
 
 
-def test_predict_is_the_fe_model_and_nothing_else():
-    theta = FITTED.predict_parameters(LATER.temperatures)
-    expected = FITTED.aligner_.inverse_transform(TRUSS.frequencies(theta))
-    np.testing.assert_allclose(FITTED.predict(LATER.temperatures), expected, rtol=1e-12)
+@pytest.mark.parametrize("discrepancy", ["auto", None, LinearRegression()])
+@pytest.mark.parametrize("damage", [None, {"top": 0.4}])
+def test_frequencies_are_those_of_the_model_times_the_discrepancy(discrepancy, damage):
+    """Healthy and damaged alike, also where temperatures are missing."""
+    fem = chain(discrepancy=discrepancy).fit(T, F)
+    air = LATER.temperatures.mask(np.random.default_rng(0).random((365, 3)) < 0.02)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        theta, simulated = fem.predict_parameters(air), fem.simulate(air, damage=damage)
+    modelled = fem.aligner_.inverse_transform(TRUSS.damaged(damage or {}).frequencies(theta))
+    np.testing.assert_allclose(simulated, modelled * np.exp(fem.discrepancy_(air)), rtol=1e-12)
+    assert (discrepancy is None) == (np.nanmax(np.abs(fem.discrepancy_(air))) == 0)
+
+
+@pytest.mark.filterwarnings("ignore:the FE model cannot follow")
+def test_the_discrepancy_is_what_the_model_cannot_follow():
+    """Modes that the weather moves unlike any parameter does."""
+    slope = np.linspace(-0.002, 0.002, 6)
+    unlike = np.exp(slope * (T[["T1"]].to_numpy() - 15))
+    fem = chain(inverse=inverse(bounds=0.02)).fit(T, F * unlike)
+    plain = chain(inverse=inverse(bounds=0.02), discrepancy=None).fit(T, F * unlike)
+    truth = LATER.clean_frequencies * np.exp(slope * (LATER.temperatures[["T1"]].to_numpy() - 15))
+    errors = [mape(truth, one.predict(LATER.temperatures)).mean() for one in (fem, plain)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_noise_is_estimated_out_of_fold_whatever_the_outliers_and_the_memory():
+    random = np.random.default_rng(0)
+    true = np.array([0.002, 0.004, 0.006, 0.008, 0.01, 0.012])
+    for outliers, memory in ((0.0, 0.0), (0.01, 0.0), (0.0, 0.5)):
+        shocks = random.standard_normal((465, 6))
+        noise = lfilter([np.sqrt(1 - memory**2)], [1, -memory], shocks, axis=0)[100:]
+        noise[random.random(noise.shape) < outliers] *= 20
+        fem = chain().fit(T, YEAR.clean_frequencies * (1 + true * noise))
+        np.testing.assert_allclose(fem.noise_, true, rtol=0.2)
+        np.testing.assert_array_equal(fem.report_.variation["noise"], 100 * fem.noise_)
+
+
+def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
+    auto = chain(inverse=inverse(noise="auto")).fit(T, F)
+    np.testing.assert_array_equal(auto.inverse_.noise_, auto.noise_)
+    np.testing.assert_array_equal(chain(inverse=inverse(noise=0.02)).fit(T, F).inverse_.noise_, 0.02)
+
+
+def test_outliers_do_not_move_the_model():
+    random = np.random.default_rng(0)
+    raw = F * np.where(random.random(F.shape) < 0.01, 1.2, 1.0)
+    fem, cleaned = chain().fit(T, raw), chain().fit(T, F.where(raw == F))
+    np.testing.assert_array_equal(fem.report_.findings.outliers, raw != F)
+    np.testing.assert_allclose(fem.predict(LATER.temperatures), cleaned.predict(LATER.temperatures), rtol=1e-9)
+    np.testing.assert_array_equal(fem.training_records_[1], raw)
 
 
 @pytest.mark.parametrize("seeded", [True, False])
@@ -52,14 +101,11 @@ def test_equals_scikit_learns_transformed_target_regressor(seeded):
     )
     transformer = make_pipeline(BiasAligner(TRUSS), parts[0])
     words = TransformedTargetRegressor(parts[1], transformer=transformer, check_inverse=False).fit(T, F)
-    whole = chain(inverse=parts[0], mapper=parts[1]).fit(T, F)
+    whole = chain(inverse=parts[0], mapper=parts[1], discrepancy=None).fit(T, F)
     np.testing.assert_allclose(whole.predict(LATER.temperatures), words.predict(LATER.temperatures), rtol=1e-12)
 
 
-def test_damage_is_put_into_the_fe_model():
-    theta = FITTED.predict_parameters(T)
-    expected = FITTED.aligner_.inverse_transform(TRUSS.damaged({"top": 0.4}).frequencies(theta))
-    np.testing.assert_allclose(FITTED.simulate(T, damage={"top": 0.4}), expected, rtol=1e-12)
+def test_without_damage_and_noise_simulations_are_predictions():
     np.testing.assert_array_equal(FITTED.simulate(T), FITTED.predict(T))
 
 
@@ -240,7 +286,7 @@ def test_pandas_output_everywhere_changes_no_value():
     transformer = make_pipeline(BiasAligner(TRUSS), inverse(refine=0))
     words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
     with config_context(transform_output="pandas"):
-        alike = chain(inverse=inverse(refine=0)).fit(T, F)
+        alike = chain(inverse=inverse(refine=0), discrepancy=None).fit(T, F)
         np.testing.assert_allclose(words.fit(T, F).predict(T), alike.predict(T), rtol=1e-12)
         pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), FITTED.predict(T))
 

@@ -89,6 +89,7 @@ def test_seed_fills_only_what_has_none():
     assert seeded.mapper is None
 
 
+@pytest.mark.filterwarnings("ignore:the aligner hides offsets")
 def test_large_models_work_in_worker_processes():
     """Matrices above 1 MB reach workers as read-only memory maps."""
     n = 380

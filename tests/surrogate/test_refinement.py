@@ -11,7 +11,7 @@ from sklearn.neighbors import KNeighborsRegressor
 from skthermo.datasets import make_truss_campaign, make_z24
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from skthermo.surrogate.refinement._posterior import Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
@@ -258,23 +258,14 @@ def test_weight_of_a_parameter_without_its_mode_is_that_of_the_prior():
 
 @pytest.mark.filterwarnings("ignore:only .* of 365 rows trained")
 def test_years_with_gaps_teach():
+    """A year that lacks three of ten values leaves errors as one with half of the records would."""
     later = make_truss_campaign(random_state=1)
     year = F.mask(np.random.default_rng(0).random(F.shape) < 0.3)
-    chains = {
-        refine: DataInformedFEM(
-            TRUSS,
-            inverse=InverseSurrogate(regressor=Ridge(1e-6), bounds=0.2, noise=0.01, refine=refine, n_samples=200),
-            mapper=TemperatureMapper(LinearRegression()),
-            random_state=0,
-        ).fit(T, year)
-        for refine in (None, 0)
-    }
-    complete = year.notna().all(axis=1)
-    trained = {refine: fem.parameters_.notna().all(axis=1) for refine, fem in chains.items()}
-    assert trained[None].mean() > 0.99
-    np.testing.assert_array_equal(trained[0], complete)
-    errors = [mape(later.clean_frequencies, fem.predict(later.temperatures)).mean() for fem in chains.values()]
-    assert errors[0] < 0.9 * errors[1]
+    inverse = InverseSurrogate(regressor=Ridge(1e-6), n_samples=200)
+    gappy, complete = (DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(T, one) for one in (year, F))
+    assert gappy.parameters_.notna().all(axis=1).mean() > 0.99
+    errors = [mape(later.clean_frequencies, fem.predict(later.temperatures)).mean() for fem in (gappy, complete)]
+    assert errors[0] < np.sqrt(2) * errors[1]
 
 
 # Models without derivatives, models that fail, settings
@@ -367,10 +358,11 @@ def test_rows_that_fit_has_refined_are_not_refined_again(monkeypatch):
     theta = random.uniform(0.85, 1.15, (30, 4))
     F = model.frequencies(theta) * (1 + 0.001 * random.standard_normal((30, 6)))
     F[3, 1] = np.nan
-    inverse = InverseSurrogate(model, LinearRegression(), bounds=0.2, n_samples=100, random_state=0).fit(F)
+    inverse = InverseSurrogate(model, LinearRegression(), bounds=0.2, n_samples=100, noise=0, random_state=0).fit(F)
     rows = np.append(np.arange(30)[::-1], [5, 5])
     others = model.frequencies(random.uniform(0.85, 1.15, (4, 4)))
     first, again = (inverse.invert(np.vstack([F[rows], others])) for _ in range(2))
     assert refined == [29, 5, 36]
     for name in ("theta", "std", "residuals", "converged"):
-        np.testing.assert_allclose(first[name], again[name], rtol=1e-9, atol=1e-12)
+        # rounding, which depends on the rows solved together, may decide on one more step of up to 1e-6
+        np.testing.assert_allclose(first[name], again[name], rtol=1e-7, atol=1e-9)

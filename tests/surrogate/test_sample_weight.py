@@ -78,16 +78,6 @@ def test_a_record_of_weight_0_counts_as_left_out():
     assert warm.applicability(T.iloc[[coldest]])["T1"].item() > 0
 
 
-def test_weights_multiply_those_of_rows_with_gaps():
-    gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.2)
-    inverse = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=50, random_state=0)
-    fit, plain = (chain(TemperatureMapper(Spy()), inverse).fit(T, gaps, sample_weight=w) for w in (WEIGHTS, None))
-    given, posterior = (one.mapper_.regressor_.weights_ for one in (fit, plain))
-    known = gaps.notna().any(axis=1).to_numpy()
-    np.testing.assert_allclose(given, WEIGHTS[known] * posterior)
-    assert (posterior < 1).any()
-
-
 @ROUTING
 def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
     with config_context(enable_metadata_routing=routing):

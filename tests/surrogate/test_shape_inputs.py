@@ -253,9 +253,12 @@ def test_the_chain_learns_weak_parameters_from_shapes():
     rng = np.random.default_rng(4)
     shapes = shapes * rng.uniform(0.1, 9, (len(F), 6, 1)) * np.exp(1j * rng.uniform(0, 6, (len(F), 6, 1)))
     shapes[:20] = np.nan
-    alone = DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=NOISE), random_state=0).fit(WEATHER, F)
-    chain = DataInformedFEM(TRUSS, inverse=InverseSurrogate(noise=NOISE, dofs=DOFS), random_state=0)
-    chain.fit(WEATHER, F, shapes)
+    alone, chain = (
+        DataInformedFEM(TRUSS, inverse=one, aligner="passthrough", random_state=0)
+        for one in (InverseSurrogate(noise=NOISE), InverseSurrogate(noise=NOISE, dofs=DOFS))
+    )
+    alone.fit(WEATHER, F)
+    chain.fit(WEATHER, F, shapes=shapes)
     for name in ("parameters_", "predict_parameters"):
         found, other = (
             getattr(fem, name) if name.endswith("_") else getattr(fem, name)(WEATHER) for fem in (chain, alone)
@@ -275,12 +278,12 @@ def test_the_chain_learns_weak_parameters_from_shapes():
 def test_the_chain_names_shapes_that_are_missing_or_not_wanted():
     F, shapes = measured(LAW)
     with pytest.raises(ValueError, match="the inverse has no dofs; expected InverseSurrogate"):
-        DataInformedFEM(TRUSS).fit(WEATHER, F, shapes)
+        DataInformedFEM(TRUSS).fit(WEATHER, F, shapes=shapes)
     chain = DataInformedFEM(TRUSS, inverse=InverseSurrogate(dofs=DOFS, n_samples=50))
-    with pytest.raises(ValueError, match=r"expected fit\(T, F, shapes\)"):
+    with pytest.raises(ValueError, match=r"expected fit\(T, F, shapes=shapes\)"):
         chain.fit(WEATHER, F)
     with pytest.raises(ValueError, match="shapes have 9 rows and frequencies 365"):
-        chain.fit(WEATHER, F, shapes[:9])
+        chain.fit(WEATHER, F, shapes=shapes[:9])
 
 
 # Doubtful shapes
@@ -296,7 +299,7 @@ def chain_of(change):
     inverse = InverseSurrogate(regressor=Ridge(), n_samples=300, noise=NOISE, dofs=DOFS)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, frequencies, change(shapes))
+        fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, frequencies, shapes=change(shapes))
     return fem, [str(one.message) for one in caught]
 
 
@@ -330,5 +333,5 @@ def test_modes_may_have_numbers_as_names():
     frequencies, shapes = MEASURED
     air = pd.DataFrame({"air": np.linspace(-5, 30, len(THETA))})
     inverse = InverseSurrogate(regressor=Ridge(), n_samples=300, noise=NOISE, dofs=DOFS)
-    fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, pd.DataFrame(frequencies), shapes)
+    fem = DataInformedFEM(TRUSS, inverse=inverse, random_state=0).fit(air, pd.DataFrame(frequencies), shapes=shapes)
     assert fem.estimate_parameters(pd.DataFrame(frequencies), shapes).notna().all(axis=None)

@@ -19,7 +19,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
 from skthermo.surrogate import TemperatureMapper
 from skthermo.surrogate.chain._records import WeatherResiduals
-from tests.surrogate.chains import F, T, inverse
+from tests.surrogate.chains import F, T, as_measured, inverse
 from tests.surrogate.chains import chain as any_chain
 
 # Vertical stiffness hardly moves the frequencies, so that its estimates scatter with the noise.
@@ -125,10 +125,10 @@ def test_quantiles_measure_each_period_by_the_others():
 
 
 def drawn_records(found, weather, seed=0):
-    """Which record each drawn row is, by the first mode, which has no gaps."""
+    """Which record the noise of each row begins with; its gaps are those of that record."""
+    taken = found.draw_records(weather, np.random.RandomState(seed))[0]
     values = found.draw(weather, np.random.RandomState(seed))
-    taken = np.array([np.flatnonzero(found.values[:, 0] == value)[0] for value in values[:, 0]])
-    np.testing.assert_array_equal(values, found.values[taken])
+    np.testing.assert_array_equal(np.isnan(values), np.isnan(found.values[taken]))
     return taken
 
 
@@ -160,8 +160,39 @@ def test_noise_keeps_the_serial_correlation_of_the_records():
         found = residuals(weather, autoregressive(1500, rho))
         taken = drawn_records(found, later)
         assert lowest <= (np.diff(taken) == 1).mean() <= highest
-        drawn = found.values[taken, 0]
+        drawn = found.draw(later, np.random.RandomState(0))[:, 0]
         assert np.corrcoef(drawn[1:], drawn[:-1])[0, 1] == pytest.approx(rho, abs=0.15)
+
+
+def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_does():
+    rng = np.random.default_rng(0)
+    weather, later = rng.uniform(-10, 30, (2000, 3)), rng.uniform(-10, 30, (2000, 3))
+    found = residuals(weather, np.column_stack([autoregressive(2000, 0.5, seed) for seed in range(3)]))
+
+    def weeks(noise):
+        return noise[: 7 * (len(noise) // 7)].reshape(-1, 7, 3).mean(axis=1).var()
+
+    drawn = np.mean([weeks(found.draw(later, np.random.RandomState(seed))) for seed in range(10)])
+    assert drawn == pytest.approx(weeks(found.values), rel=0.1)
+
+
+def test_runs_of_noise_are_scaled_to_the_weather_of_the_rows():
+    rng = np.random.default_rng(0)
+    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
+    deviation = 1 + (weather < 0)  # twice as large in frost, whatever the record before
+    found = residuals(weather, deviation * autoregressive(3000, 0.5)[:, np.newaxis])
+    drawn = found.draw(later, np.random.RandomState(0))
+    assert drawn[later < -2].std() == pytest.approx(2.0, rel=0.15)
+    assert drawn[later > 2].std() == pytest.approx(1.0, rel=0.1)
+
+
+def test_noise_is_not_bounded_by_the_largest_residual_and_keeps_its_covariance():
+    rng = np.random.default_rng(0)
+    found = residuals(rng.uniform(-10, 30, (200, 2)), rng.multivariate_normal([0, 0], [[1, 0.8], [0.8, 1]], 200))
+    later = rng.uniform(-10, 30, (20_000, 2))
+    drawn = found.draw(later, np.random.RandomState(0))
+    assert np.abs(drawn).max() > np.abs(found.values).max()
+    np.testing.assert_allclose(np.cov(drawn.T), np.cov(found.values.T), rtol=0.1)
 
 
 def test_simulations_scatter_like_the_training_records():
@@ -169,8 +200,7 @@ def test_simulations_scatter_like_the_training_records():
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
     records = fem.residuals_.values
-    for row in (noisy / clean - 1).to_numpy():
-        assert np.isclose(records, row, rtol=0, atol=1e-12, equal_nan=True).all(axis=1).any()
+    assert {tuple(row) for row in np.isnan(noisy.to_numpy())} <= {tuple(row) for row in np.isnan(records)}
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
     assert noisy.isna().mean(axis=None) == pytest.approx(0.1, abs=0.03)
     np.testing.assert_allclose((noisy / clean).std(), np.nanstd(records, axis=0), rtol=0.2)
@@ -195,7 +225,7 @@ def test_noise_is_fitted_or_a_number():
 
 
 def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
-    fem = any_chain(inverse=inverse(refine=0), mapper=PLAIN).fit(T, F)
+    fem = any_chain(inverse=inverse(refine=0), mapper=PLAIN, discrepancy=None).fit(T, F)
     folds = BlockedKFold(block="7D")
     np.testing.assert_array_equal(fem.residuals_.folds, folds.fold_of(T))
     for fold, (train, test) in enumerate(folds.split(T)):
@@ -203,6 +233,14 @@ def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
         predicted = fem.aligner_.inverse_transform(fem.model.frequencies(theta))
         values = fem.residuals_.values[fem.residuals_.folds == fold]
         np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
+
+
+def test_residuals_do_not_know_the_discrepancy_of_their_own_week():
+    """A mode that one week alone moves: what is learned there is not in its residuals."""
+    week = np.arange(365) // 7 == 20
+    fem = chain().fit(T, F.assign(f2=F["f2"] * np.where(week, 1.02, 1.0)))
+    of_week = fem.residuals_.values[week, 1] - FITTED.residuals_.values[week, 1]
+    np.testing.assert_allclose(of_week.mean(), 0.02, atol=0.002)
 
 
 def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week():
@@ -229,14 +267,14 @@ def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
 
 
 def test_any_folds_may_be_asked_for():
-    kept = FITTED.records_.out_of_fold(FITTED.mapper_, FITTED._frequencies, KFold(5))
+    kept = FITTED.records_.out_of_fold(FITTED.mapper_, FITTED._frequencies, FITTED.discrepancy_, folds=KFold(5))
     np.testing.assert_array_equal(kept.folds, np.arange(365) // 73)
 
 
 def test_folds_in_unseen_weather_are_named():
     short = chain().fit(T[:150], F[:150])
     with pytest.warns(UserWarning, match=r"\d+ of 30 records of fold \d of 5 are in weather that the other folds"):
-        short.records_.out_of_fold(short.mapper_, short._frequencies, KFold(5))
+        short.records_.out_of_fold(short.mapper_, short._frequencies, short.discrepancy_, folds=KFold(5))
 
 
 @pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
@@ -363,7 +401,7 @@ def test_a_missing_temperature_is_what_the_other_sensors_foretell():
     with pytest.warns(UserWarning, match="filled from the other"):
         theta = FITTED.predict_parameters(without("T2"))
     numerical = FITTED.model.frequencies(theta.to_numpy())
-    np.testing.assert_allclose(predicted, FITTED.aligner_.inverse_transform(numerical), rtol=1e-12)
+    np.testing.assert_allclose(predicted, as_measured(FITTED, numerical, without("T2")), rtol=1e-12)
     assert FITTED.applicability(without("T2")).notna().all(axis=None)
 
 

@@ -28,6 +28,17 @@ from skthermo.fem.modal import check_supported, count_modes
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
 
+FULL_DENSE, FULL_SPARSE = (0.05, 1.6e-4), (6.0, 0.008)
+"""Milliseconds of frequencies and derivatives: of a dense model, in all and per squared degree of freedom; of a sparse
+one, in all and per degree of freedom."""
+
+VECTORS_PER_PARAMETER = 12  # a basis has about as many vectors for each parameter, and for one more
+REDUCED = (0.06, 5e-5)  # milliseconds of a reduced solve, in all and per squared number of basis vectors
+BASIS_SOLVES, BASIS_PER_VECTOR = (20, 4), 2.0
+"""A basis takes so many full solves, in all and per parameter, and so many milliseconds per vector."""
+
+LARGEST_SHARE = 0.5  # largest share of the full model's time that a reduced model may take
+
 
 class AffineModel(AffineBase):
     """FE model K(theta) phi = (2 pi f)^2 M(theta) phi with affine stiffness and mass.
@@ -199,6 +210,39 @@ class AffineModel(AffineBase):
             With this model's interface.
         """
         return ReducedModel(self, bounds, tol=tol, random_state=random_state)
+
+    def reduction_pays(self, n_solves: int) -> bool:
+        """Whether a reduced model is expected to save time.
+
+        Parameters
+        ----------
+        n_solves : int
+            How many frequencies, or frequencies with derivatives, will be computed.
+
+        Returns
+        -------
+        bool
+            True where making a reduced model and solving it is expected to take less than half the time of the full
+            model. It depends on the numbers of degrees of freedom and parameters, not on the machine or its load.
+
+        Notes
+        -----
+        The costs are rounded from those of lines and grids of beams with 2 to 20 parameters within 30 %
+        (``python tests/benchmarks/reduction_pays.py``).
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_kw51, make_truss
+        >>> make_truss().reduction_pays(100_000), make_kw51().reduction_pays(1000)
+        (False, True)
+        """
+        n_parameters = len(self.parameter_names)
+        size = min(self.n_dof, VECTORS_PER_PARAMETER * (n_parameters + 1))
+        fixed, growing = FULL_DENSE if self._core.is_dense else FULL_SPARSE
+        full = fixed + growing * self.n_dof ** (2 if self._core.is_dense else 1)
+        basis = (BASIS_SOLVES[0] + BASIS_SOLVES[1] * n_parameters) * full + BASIS_PER_VECTOR * size
+        reduced = REDUCED[0] + REDUCED[1] * size**2
+        return bool(basis + n_solves * reduced < LARGEST_SHARE * n_solves * full)
 
     def __repr__(self) -> str:
         counts = ((len(self.parameter_names), "parameter"), (self.n_dof, "degree"), (self.n_modes, "mode"))

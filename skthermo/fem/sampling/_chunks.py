@@ -6,12 +6,12 @@ from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
+from joblib import delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_jobs, check_model, check_theta
 from skthermo._arrays import Array
-from skthermo._io import with_progress
+from skthermo._io import as_they_come, with_progress
 from skthermo._threads import map_on_blas_threads, single_blas_thread
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 
@@ -67,17 +67,9 @@ def _solved(
     if thread_safe and effective_n_jobs(n_jobs) == 1:
         yield from map_on_blas_threads(task, chunks)
     else:
-        parallel = _parallel(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        parallel = as_they_come(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
         job = _Job(task)
         yield from parallel(delayed(_on_one_thread)(job, chunk) for chunk in chunks)
-
-
-def _parallel(**options: Any) -> Parallel:
-    """A joblib `Parallel` that yields results as they come, where the active backend can."""
-    try:
-        return Parallel(return_as="generator", **options)
-    except ValueError:  # some backends, such as Ray's, return all results at the end
-        return Parallel(**options)
 
 
 class _Job:

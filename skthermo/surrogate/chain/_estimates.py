@@ -1,28 +1,23 @@
-"""Parameters behind the training records, and what M2 learns of them."""
+"""Parameters behind the training records, which M2 learns."""
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names, frame_like
 from skthermo._regressors import inputs_of_last_step
 from skthermo._validation import last_step
 from skthermo._warnings import warn_user
-from skthermo.fem import linearise, shape_components
-from skthermo.surrogate._standardiser import FrequencyCoordinates
+from skthermo.fem import shape_components
 from skthermo.surrogate.chain._parts import surrogates_in
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
-ROWS_PER_EFFECTIVE_ROW = 10  # training rows per effective row of a prediction: mappers have tens of degrees of freedom
-LARGEST_STEP = 5.0  # largest step of ln theta that takes the prior's shrinkage out
-NOT_NOISE = 0.1  # relative residual of a frequency from which it is that of a wrong model or a wrong record
 SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
 FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
 UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
@@ -30,16 +25,13 @@ UNLIKE = 5.0  # distance of median components from those of the model, in deviat
 
 @dataclass(frozen=True)
 class Estimates:
-    """What M1 finds for each training record: parameters and, where it refines, how well they are known.
+    """What M1 finds for each training record: parameters and, where it refines, how the steps ended.
 
-    ``residuals``, (n_samples, n_modes), are ln f measured minus ln f of the model; ``weights`` the posterior precision
-    as a share of that of a record with all modes; ``full_solves`` tells how often the full model was solved for each
-    because its steps left the box of the reduced model.
+    ``full_solves`` tells how often the full model was solved for each because its steps left the box of the reduced
+    model.
     """
 
     theta: Array
-    residuals: Array | None = None
-    weights: Array | None = None
     n_unconverged: int | None = None
     full_solves: NDArray[np.intp] | None = None
 
@@ -58,69 +50,17 @@ class Estimates:
         if weight < SCARCE:
             warn_user(
                 f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
-                "one, and predictions are drawn towards the model's nominal state; expected more modes a record, "
-                "imputer=KNNGapImputer(), or at least aligner=BiasAligner(model)",
+                "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
+                "imputer=KNNGapImputer()",
                 "scarce modes",
             )
-        n_unconverged = int(unconverged(found).sum())
-        return cls(as_floats(found.theta), found.residuals, found.weight, n_unconverged, found.full_solves)
-
-    def weighted(self, weights: Array | None) -> Array | None:
-        """Weights of rows multiplied with a user's own; None where there are neither."""
-        if weights is None or self.weights is None:
-            return self.weights if weights is None else weights
-        return weights * self.weights
-
-    def targets(self, inverse: Any, mapper: Any) -> Array:
-        """What M2 learns: theta or, in coordinates of frequencies, theta without the shrinkage of the inverse's prior.
-
-        One more Gauss-Newton step, hardly damped, takes the shrinkage out. Parameters that hardly move the frequencies
-        may then scatter widely, but not their effects, which are all that the mapper sees.
-        """
-        last = refining_step(inverse)
-        if last is None or self.residuals is None:
-            return self.theta
-        n_rows = np.count_nonzero(~np.isnan(self.theta).any(axis=1))
-        coordinates = learn_in_frequencies(mapper, last, n_rows)
-        if coordinates is None:
-            return self.theta
-        noise = np.where(np.abs(self.residuals) < NOT_NOISE, self.residuals, 0.0)
-        if last.shape_inputs_ is None:
-            undamped = replace(coordinates, damping=coordinates.damping / ROWS_PER_EFFECTIVE_ROW)
-            steps = noise / last.scatter_ @ undamped.inverse.T
-        else:
-            steps = last.refinement_.steps_without_prior(self.theta, last.scatter_, n_rows)
-            steps = np.where(noise.any(axis=1)[:, np.newaxis], steps, 0.0)
-        return self.theta * np.exp(np.clip(steps, -LARGEST_STEP, LARGEST_STEP))
+        return cls(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
 
 
 def refining_step(inverse: Any) -> InverseSurrogate | None:
     """The fitted `InverseSurrogate` that an inverse is or ends with, if it refines its estimates."""
     last = last_step(inverse)
     return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
-
-
-def learn_in_frequencies(mapper: Any, inverse: InverseSurrogate, n_rows: int) -> FrequencyCoordinates | None:
-    """Let every part of a mapper with ``coordinates``, as `TemperatureMapper`, learn in those of frequencies.
-
-    These are returned. The derivatives are those at the nominal state, in standard deviations of the frequencies; the
-    prior does the damping. None if there is no such part, if it is fitted to one parameter at a time, or has
-    coordinates already.
-    """
-    parts = (mapper, *mapper.get_params().values())
-    mappers = [part for part in parts if "coordinates" in getattr(part, "get_params", dict)()]
-    is_free = all(part.coordinates is None for part in mappers)
-    if not mappers or not is_free or isinstance(last_step(mapper), MultiOutputRegressor):
-        return None
-    jacobian = linearise(inverse.model, np.ones((1, len(inverse.parameter_names_))), relative=True)[1][0]
-    sensitivities = jacobian / inverse.scatter_[:, np.newaxis]
-    if not np.isfinite(sensitivities).all():
-        return None
-    damping = inverse.refinement_.prior.width**-2.0 * ROWS_PER_EFFECTIVE_ROW / n_rows
-    coordinates = FrequencyCoordinates(sensitivities, damping)
-    for part in mappers:
-        part.set_params(coordinates=coordinates)
-    return coordinates
 
 
 def shape_inputs_of(inverse: Any) -> ShapeInputs | None:

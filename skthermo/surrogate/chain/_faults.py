@@ -69,7 +69,7 @@ class Faults:
         gaps = "fitted" if self.gaps is None and is_fitted and self.outliers is not None else self.gaps
         service, taken = draw() if "fitted" in (gaps, self.outliers) else (None, None)
         if self.outliers == "fitted":
-            outliers = service.outliers[taken]
+            outliers = service.drawn_outliers(taken, streams[2])
             noise = np.where(np.isnan(outliers), noise, outliers)
         elif self.outliers is not None:
             noise = noise * np.where(streams[2].uniform(size=noise.shape) < self.outliers, TIMES_WIDER, 1.0)

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._arguments import seem_rad_per_s
-from skthermo._arrays import Array, as_floats, spread_evenly
+from skthermo._arrays import Array, as_floats, robust_deviation, spread_evenly
 from skthermo._frames import column_names, columns_by_sensor
 from skthermo._regressors import offers, reach_of
 from skthermo._saved_frames import SavesFrames
@@ -47,6 +47,11 @@ several groups; those of two months are 0.5 to 2.6 for right models."""
 MOST_OF_A_YEAR, MONTH = 11, pd.Timedelta(days=30)
 """Number of months with records below which their mean weather may be far from that of the model's nominal state."""
 
+LARGE_DISCREPANCY, SMALL_DISCREPANCY = 1.0, 0.5
+"""Discrepancy over what weather does to the model's frequencies, and in percent, above both of which a warning is
+given: on the truss and nine bridges it is up to 0.35 of that effect, with models that are 2 to 5 % off."""
+
+MANY_OUTLIERS = 0.05  # share of the frequencies above which a warning is given
 TOLD_OFFSET = 0.3  # smallest offset in percent that the warning names
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
@@ -88,12 +93,16 @@ class FitReport(SavesFrames):
         Rows whose parameters have not converged in refining; None without refining.
     n_by_full_model, n_full_solves : int
         Rows whose refined parameters are outside the box of the reduced model, and how often the full model was solved
-        for them; 0 without ``reduce``.
+        for them; 0 without a reduced model.
     round_trip : Series or None
         Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
         where the inverse does not give it.
     scatter : Series or None
-        Standard deviation of measured over predicted frequencies, by mode, in percent.
+        Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
+    variation : DataFrame or None
+        By mode, in percent: ``noise``, the standard deviation of the records about a regression on their weather, out
+        of fold; ``weather``, the standard deviation of what the weather does to the FE model's frequencies; and
+        ``discrepancy``, its root mean square over the training records.
     findings : RecordFindings or None
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
@@ -101,6 +110,8 @@ class FitReport(SavesFrames):
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
     follows : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
+    solved : str
+        Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
 
     Examples
     --------
@@ -130,9 +141,11 @@ class FitReport(SavesFrames):
     n_full_solves: int = 0
     round_trip: pd.Series | None = None
     scatter: pd.Series | None = None
+    variation: pd.DataFrame | None = None
     findings: RecordFindings | None = None
     fleet: pd.DataFrame | None = None
     follows: Mapping[Any, float] | None = None
+    solved: str = ""
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -144,6 +157,7 @@ class FitReport(SavesFrames):
 
     def _sentences(self) -> list[str]:
         lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
+        lines += [self.solved] if self.solved else []
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         lines += [
             f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
@@ -177,6 +191,8 @@ class FitReport(SavesFrames):
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
             lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
+        if self.findings is not None and getattr(self.findings.memory, "features", None) is not None:
+            lines.append(self.findings.memory.summary())
         if self.findings is not None and len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
@@ -203,6 +219,8 @@ class FitReport(SavesFrames):
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
         table = table.join(self.errors.round(3).add_suffix(" (%)"))
+        if self.variation is not None:
+            table = table.join(self.variation.round(3).add_suffix(" (%)"))
         return table if self.round_trip is None else table.assign(**{"round trip (%)": self.round_trip.round(3)})
 
     def _parameters(self) -> pd.DataFrame:
@@ -248,7 +266,7 @@ class FitReport(SavesFrames):
                 "worse than the mean",
                 f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
                 f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these "
-                "modes: see report_.offsets, update the model, or use aligner=BiasAligner(model)",
+                "modes: see report_.offsets, update the model, or use the default aligner and discrepancy",
             )
         if self.has_hidden_offsets:
             yield (
@@ -258,6 +276,27 @@ class FitReport(SavesFrames):
                 "of detection and severities are wrong by more than their noise; expected a model updated to these "
                 "records (ModelUpdater), and models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
             )
+        n_outliers = 0 if self.findings is None else int(self.findings.outliers.to_numpy().sum())
+        if self.findings is not None and n_outliers > MANY_OUTLIERS * self.findings.outliers.size:
+            yield (
+                "many outliers",
+                f"{n_outliers} of {self.findings.outliers.size} frequencies are outliers and train nothing; expected "
+                "records of one structure by one way of identification: see report_.findings",
+            )
+        if self.variation is not None:
+            weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
+            large = discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)
+            if large.any():
+                listed = ", ".join(
+                    f"{name!r} {discrepancy[name]:.2g} % beside {weather[name]:.2g} % by the model"
+                    for name in discrepancy.index[large]
+                )
+                yield (
+                    "large discrepancy",
+                    f"the FE model cannot follow what the weather does to {listed}: predictions rely on the "
+                    "discrepancy, and simulated damage on a model that is not calibrated; expected a model updated to "
+                    "these records (ModelUpdater), or parameters that this weather changes",
+                )
         round_trip = pd.Series(dtype=float) if self.round_trip is None else self.round_trip.abs()
         if (round_trip > self.scatter.clip(lower=UNSEEN)).any():
             worst = (round_trip / self.scatter.clip(lower=UNSEEN)).idxmax()
@@ -277,13 +316,15 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
     measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
     hidden = hidden_offsets(chain.aligner_, records.frequencies)
-    unexplained = unexplained_offset(hidden, predicted, records.temperatures)
-    predicted = as_floats(chain.aligner_.inverse_transform(predicted))
+    unexplained = unexplained_offset(hidden, predicted, records.temperatures, errors_of_means(chain.noise_, F))
+    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
     full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
-    known, scatter = ~np.isnan(theta).any(axis=1), np.nanstd(measured / predicted, axis=0)
+    known, scatter = ~np.isnan(theta).any(axis=1), np.nan_to_num(robust_deviation(measured / predicted))
+    delta = chain.discrepancy_.at(records.inputs[records.trained])
+    effect = np.log(records.modelled[records.trained])
     last = last_step(chain.inverse_)
     round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
     return FitReport(
@@ -304,9 +345,18 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
         n_full_solves=int(full_solves.sum()),
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
+        variation=pd.DataFrame(
+            {
+                "noise": 100 * chain.noise_,
+                "weather": 100 * np.nanstd(effect, axis=0),
+                "discrepancy": 100 * np.sqrt((delta**2).mean(axis=0)),
+            },
+            index=modes,
+        ),
         findings=findings,
         fleet=weather_of_fleet(chain),
         follows=getattr(last_step(chain.mapper_), "follows_", None),
+        solved=chain.simulator_.described,
     )
 
 
@@ -385,12 +435,17 @@ def hidden_offsets(aligner: Any, F: Any) -> pd.Series:
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
 
 
-def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any) -> float:
-    """Size of hidden offsets as a share of what the weather of the records and a calibrated model may leave."""
+def errors_of_means(noise: Array, F: Array) -> Array:
+    """Standard deviations of the logarithms of mean frequencies, in percent."""
+    return 100 * noise / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
+
+
+def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Array) -> float:
+    """Size of hidden offsets as a share of what weather, errors of the means and a calibrated model may leave."""
     offsets = 100 * np.log1p(hidden.to_numpy() / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]
     weather = np.cov(100 * np.log(known.T)) if len(known) > 1 else np.zeros(1)
-    covariance = np.atleast_2d(weather) + COMMON**2 + LEFT_BY_CALIBRATION**2 * np.eye(len(offsets))
+    covariance = np.atleast_2d(weather) + COMMON**2 + np.diag(LEFT_BY_CALIBRATION**2 + errors**2)
     size = np.sqrt(offsets @ np.linalg.solve(covariance, offsets) / len(offsets))
     if not has_stamps(T):
         return float(size / MOST_WITHOUT_DATES)

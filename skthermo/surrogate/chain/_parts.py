@@ -1,21 +1,27 @@
 """Records that `DataInformedFEM` is fitted to, checked, and its parts: clones, the inverse inside, inputs of M2."""
 
-from collections.abc import Iterator
+import re
+import sys
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._arguments import check_model
+from skthermo._arguments import check_model, is_auto
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, seed_parts, seeded, validate_data
+from skthermo._warnings import warn_user
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._memory import remembered
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.chain._discrepancy import ratio_regressor
 from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
@@ -30,6 +36,9 @@ def read_records(chain: Any, X: Any, y: Any) -> tuple[Any, Any]:
         raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
     options = {"dtype": np.float64, "ensure_all_finite": "allow-nan", "copy": True}
     temperatures = validate_data(chain, X, ensure_min_samples=2, **options)
+    chain.y_is_vector_ = np.ndim(y) == 1
+    if chain.y_is_vector_:
+        y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
     T, F = frame_like(X, temperatures), frame_like(y, check_array(y, **options))
     check_same_rows(X, y, ("temperatures", "frequencies"))
     if F.shape[1] != model.n_modes:
@@ -53,19 +62,46 @@ def known_findings(memory: Any, T: Any, F: Any) -> RecordFindings:
     return remembered(memory, "checks", lambda: check_records(T, F), lambda: (T, F))
 
 
+def without_outliers(findings: RecordFindings, F: Any) -> Any:
+    """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
+    far = findings.outliers
+    if isinstance(F, pd.DataFrame) and far.index.is_unique:
+        far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
+    if far.shape != F.shape or not far.to_numpy().any():
+        return F
+    return frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
+
+
+def with_means(chain: Any, mapper: Any, findings: RecordFindings, T: Any) -> Any:
+    """The default mapper with the means of earlier temperatures that the frequencies remember; any other unchanged."""
+    features = getattr(findings.memory, "features", None)
+    if chain.mapper is not None or features is None or not set(features.sensors) <= set(column_names(T, "T")):
+        return mapper
+    return make_pipeline(features, mapper)
+
+
 def default_part(chain: Any, name: str) -> Any:
-    """What inverse and mapper are where they are None; None for other parameters."""
+    """What inverse, mapper, aligner and discrepancy are by default; None for other parameters, and no discrepancy."""
     if name == "inverse":
         return InverseSurrogate(reduce=chain.reduce, n_jobs=chain.n_jobs)
-    return TemperatureMapper() if name == "mapper" else None
+    if name == "aligner":
+        return BiasAligner(method="scale")
+    if name == "mapper":
+        return TemperatureMapper()
+    return ratio_regressor() if is_auto(getattr(chain, name)) else None
+
+
+def part_of(chain: Any, name: str) -> Any:
+    """A clone of a part, or what it is by default."""
+    part = getattr(chain, name)
+    return default_part(chain, name) if part is None or is_auto(part) else clone(part)
 
 
 def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
     """Clones of inverse, mapper, aligner and imputer, with the chain's model, and seeds where they have none."""
     unchanged = FunctionTransformer().set_output(transform="default")
-    inverse = default_part(chain, "inverse") if chain.inverse is None else clone(chain.inverse)
-    mapper = default_part(chain, "mapper") if chain.mapper is None else clone(chain.mapper)
-    aligner = unchanged if chain.aligner == "passthrough" else clone(chain.aligner)
+    inverse, mapper = part_of(chain, "inverse"), part_of(chain, "mapper")
+    aligner = unchanged if chain.aligner == "passthrough" else part_of(chain, "aligner")
     imputer = None if chain.imputer == "passthrough" else clone(chain.imputer)
     for part in (aligner, *aligner.get_params().values()):
         if isinstance(part, BiasAligner) and part.reference is None:
@@ -81,13 +117,32 @@ def clone_parts(chain: Any) -> tuple[Any, Any, Any, Any]:
                 f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                 f"{chain.model!r} has"
             )
-        if chain.reduce and not part.reduce and hasattr(part.model, "reduced"):
+        if is_auto(part.reduce) and (not chain.reduce or hasattr(part.model, "reduced")):
             part.set_params(reduce=chain.reduce)
     random_state = seeded(chain.random_state)
     for part in (inverse, mapper, aligner, imputer):
         if part is not None:
             seed_parts(part, random_state)
     return inverse, mapper, aligner, imputer
+
+
+def warn_of_inert(chain: Any, names: Iterable[str]) -> None:
+    """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
+    frame = sys._getframe(2)
+    while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
+        frame = frame.f_back  # past the estimators around the chain
+    if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
+        return
+    parts = {"inverse": chain.inverse} | {f"inverse__{name}": part for name, part in chain.inverse.get_params().items()}
+    for name, part in parts.items():
+        searched = [one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)]
+        if searched and isinstance(part, InverseSurrogate) and part.steps_on(chain.model):
+            warn_user(
+                f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
+                "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
+                "search over the InverseSurrogate itself, whose score is that of its regressor",
+                "inert settings searched",
+            )
 
 
 def with_quick_start(chain: Any, model: Any) -> Any:
@@ -110,6 +165,6 @@ def surrogates_in(inverse: Any) -> Iterator[InverseSurrogate]:
 
 
 def simulator_of(chain: Any, theta: Array) -> Simulator:
-    """What a fitted chain simulates with; with ``reduce``, M1's reduced model if it covers what M2 gives."""
+    """What a fitted chain simulates with; where it is reduced, by M1's reduced model if that covers what M2 gives."""
     inverse = next(surrogates_in(chain.inverse_), None)
     return Simulator.around(chain.model, theta, chain.reduce, getattr(inverse, "simulator_", None))

@@ -13,7 +13,7 @@ from sklearn.base import clone
 from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array, as_columns, as_floats, patterns
+from skthermo._arrays import Array, as_columns, as_floats, median, patterns, robust_deviation, spread_evenly
 from skthermo._frames import frame_like
 from skthermo._gaussian import Gaussian
 from skthermo._regressors import fit_weighted, offers, predicted_covariance, reach_of
@@ -22,6 +22,7 @@ from skthermo._times import correlation_time, row_times
 from skthermo._validation import last_step
 from skthermo._warnings import without_warnings
 from skthermo._weather import (
+    SensorRegression,
     TrainingRange,
     nearest_in_parts,
     one_in_each_part,
@@ -30,18 +31,23 @@ from skthermo._weather import (
     weather_coordinates,
 )
 from skthermo.preprocessing import BlockedKFold, HampelFilter
+from skthermo.surrogate.chain._discrepancy import Discrepancy, ratio_regressor, ratios_of
 from skthermo.surrogate.chain._scatter import Scatter
 from skthermo.surrogate.chain._service import ServiceRecords
 
 N_FOLDS = 5
 CORRELATION_TIMES = 5  # of the residuals in a block of records that are predicted together, at least
 DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
+RUNS = 6  # times the correlation time less 1, and 1 more, is the mean length of a run of drawn records
+MOST_SCALED = 2.0  # ratio of the scatter in the weather of a row and of its record beyond which a run ends
 SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
 COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
 OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
-SIMILAR = 0.1  # share of the records whose weather counts as similar, in means and in runs of drawn records
+SIMILAR = 0.1  # share of the records whose weather counts as similar, in means
 JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
+MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
+MOST_FOR_NOISE = 3000  # records, spread evenly, that the noise is estimated from
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
 
 
@@ -142,13 +148,15 @@ class WeatherResiduals:
         return np.array([order_statistic(column[~np.isnan(column)], confidence) for column in self._scores.T])
 
     def draw(self, weather: Array, random_state: np.random.RandomState) -> Array:
-        """Residuals of whole records for rows of weather in order of time, (n_samples, n_modes).
+        """Residuals for rows of weather in order of time, (n_samples, n_modes), with the gaps of whole records.
 
-        A stationary bootstrap: each row takes the record after the one before it took or, where such a run ends, one
-        of the records with the most similar weather. A run ends by chance, and where the weather is no longer similar.
+        A smoothed stationary bootstrap: each row takes the record after the one before it took or, where such a run
+        ends by chance, one of the records with the most similar weather. In weather that scatters more or less than
+        that of its records, a run is scaled, or ends where that is a factor of `MOST_SCALED`. A second draw of its own
+        is added with a small weight, so that the largest residual of the training records is not the largest of all.
         Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self.values[self.draw_records(known, random_state)])
+        return self._where_known(weather, lambda known: self._smoothed(self.drawn, known, random_state, False))
 
     def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
         """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
@@ -156,15 +164,24 @@ class WeatherResiduals:
         They follow the normal distribution of residuals without outliers. Without gaps and outliers, `draw` gives the
         same.
         """
-        return self._where_known(
-            weather,
-            lambda known: self._completed(self.draw_records(known, random_state), random_state, without_outliers),
-        )
+        values = self.usual if without_outliers else self.drawn
+        return self._where_known(weather, lambda known: self._smoothed(values, known, random_state, True))
 
-    def _completed(
-        self, records: NDArray[np.intp], random_state: np.random.RandomState, without_outliers: bool
-    ) -> Array:
-        values = self.usual[records] if without_outliers else self.values[records]
+    def _smoothed(self, values: Array, weather: Array, random_state: np.random.RandomState, is_complete: bool) -> Array:
+        """Values as drawn, and others of the usual ones, added with the bandwidth of Silverman's rule."""
+        similar = self._similar(weather)
+        draws = [self._taken(similar, random_state) for _ in range(2)]
+        n_modes, n_independent = self.n_modes, len(values) / self.correlation_time
+        bandwidth = (4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4))
+        angle, mean = np.arctan(bandwidth), similar @ self._levels[0][:, :n_modes]
+        first = self._completed(values[draws[0]], random_state) if is_complete else values[draws[0]]
+        second = self._completed(self.usual[draws[1]], random_state)
+        first, second = (
+            self._carried(of_rows, taken, similar) - mean for of_rows, taken in zip((first, second), draws, strict=True)
+        )
+        return mean + np.cos(angle) * first + np.sin(angle) * second
+
+    def _completed(self, values: Array, random_state: np.random.RandomState) -> Array:
         gaps = np.isnan(values)
         if not gaps.any():
             return values
@@ -175,8 +192,20 @@ class WeatherResiduals:
 
     @cached_property
     def usual(self) -> Array:
-        """The residuals, NaN where one is an outlier: far from its neighbours in time."""
-        return HampelFilter().fit(self.values).transform(self.values)
+        """The drawn residuals, NaN where one is an outlier: far from its neighbours in time."""
+        return HampelFilter().fit(self.drawn).transform(self.drawn)
+
+    @cached_property
+    def drawn(self) -> Array:
+        """What noise is drawn from: between the residuals out of fold and those of the mapper of all records.
+
+        The former hold the errors of mappers of fewer records, beside those of the mapper that simulates; the latter
+        are too small, and do not count where it has learned noise: where they change less from record to record.
+        """
+        own, out_of_fold = (np.diff(values, axis=0) for values in (self.own, self.values))
+        with without_warnings():  # of modes that are never there twice in a row
+            sizes = [np.nanmean(np.nanmedian(np.abs(changes), axis=0)) for changes in (own, out_of_fold)]
+        return self.values if sizes[0] < OVERFITTED * sizes[1] else (self.values + self.own) / 2
 
     @property
     def outliers(self) -> Array:
@@ -190,28 +219,61 @@ class WeatherResiduals:
             found = Gaussian.of(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
-    def draw_records(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
-        """Positions of the records drawn for each row."""
-        places, n_records = self.coordinates.transform(weather), len(self.places)
-        mean_length = max(1.0, 2 * self.correlation_time - 1)
-        ends = random_state.uniform(size=len(places)) < 1 / mean_length
-        some, similar = (one_in_each_part(n_records, most) for most in (MOST_PLACES, int(MOST_SIMILAR / SIMILAR)))
-        which = random_state.randint(min(DRAWN_FROM, len(some)), size=len(places))
-        fresh, farthest = np.empty(len(places), dtype=np.intp), np.empty(len(places))
-        for part, _, near in nearest_in_parts(self.places[some], places, DRAWN_FROM):
-            fresh[part] = some[near[np.arange(len(near)), which[part]]]
-        n_similar = max(DRAWN_FROM, int(SIMILAR * len(similar)))
-        for part, distances, _ in nearest_in_parts(self.places[similar], places, n_similar):
-            farthest[part] = distances[:, -1]
-        taken = np.empty(len(places), dtype=int)
-        record = n_records
-        for row in range(len(places)):
-            record += 1
-            is_over = ends[row] or record >= n_records
-            if is_over or np.linalg.norm(self.places[record] - places[row]) > farthest[row]:
-                record = fresh[row]
-            taken[row] = record
+    def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], list[Array]]:
+        """Positions of the records drawn for each row, and their residuals and ratios as they are in its weather."""
+        similar = self._similar(weather)
+        taken = self._taken(similar, random_state)
+        columns = self.drawn if self.ratios is None else np.hstack([self.drawn, self.ratios])
+        return taken, np.split(self._carried(columns[taken], taken, similar), [self.n_modes], axis=1)
+
+    def _similar(self, weather: Array) -> scipy.sparse.csr_array:
+        """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
+        places, some = self.coordinates.transform(weather), one_in_each_part(len(self.places), MOST_PLACES)
+        near = np.vstack([found for _, _, found in nearest_in_parts(self.places[some], places, DRAWN_FROM)])
+        ends = np.arange(0, near.size + 1, near.shape[1])
+        weights = np.full(near.size, 1 / near.shape[1])
+        return scipy.sparse.csr_array((weights, some[near].ravel(), ends), (len(near), len(self.places)))
+
+    def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+        """Positions of records in runs for rows with some similar records."""
+        n_rows, n_records = similar.shape
+        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + RUNS * (self.correlation_time - 1)))
+        which = random_state.randint(similar.indptr[1], size=n_rows)
+        taken = similar.indices.reshape(n_rows, -1)[np.arange(n_rows), which].astype(np.intp)
+        if len(ends) == n_rows:
+            return taken
+        logs = np.log(self._levels[1][:, : self.n_modes])
+        here, row = np.log(self._scatter_at(similar)[:, : self.n_modes]), 0
+        while row < n_rows:
+            later = np.searchsorted(ends, row, side="right")
+            stop = min(ends[later] if later < len(ends) else n_rows, row + n_records - taken[row])
+            records = np.arange(taken[row], taken[row] + stop - row)
+            is_other = (np.abs(here[row:stop] - logs[records]) > np.log(MOST_SCALED)).any(axis=1)
+            length = 1 + int(np.argmax(np.append(is_other[1:], True)))
+            taken[row : row + length] = records[:length]
+            row += length
         return taken
+
+    def _carried(self, values: Array, taken: NDArray[np.intp], similar: scipy.sparse.csr_array) -> Array:
+        """Values of the records that rows took, with the mean and the deviation of the weather of the rows."""
+        n_columns = values.shape[1]
+        mean, deviation = (level[:, :n_columns] for level in self._levels)
+        scale = self._scatter_at(similar)[:, :n_columns] / deviation[taken]
+        return np.asarray(similar @ mean + (values - mean[taken]) * scale)
+
+    def _scatter_at(self, similar: scipy.sparse.csr_array) -> Array:
+        return np.sqrt(similar @ self._levels[1] ** 2)
+
+    @cached_property
+    def _levels(self) -> tuple[Array, Array]:
+        """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out."""
+        columns = self.usual if self.ratios is None else np.hstack([self.usual, self.ratios])
+        mean, square = (
+            np.nan_to_num(self._local_mean(some, self.weather, self._all, SPREAD_OF, MOST_PLACES))
+            for some in (columns, columns**2)
+        )
+        size = np.sqrt(np.maximum(np.nanmax(square, axis=0, initial=0), np.finfo(float).tiny))
+        return mean, np.maximum(np.sqrt(np.maximum(square - mean**2, 0.0)), JITTER * size)
 
     @cached_property
     def correlation_time(self) -> float:
@@ -293,9 +355,10 @@ class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
     ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
-    gives for the inputs, ``weights`` those of the rows, or None, and ``parameter_names`` the columns of the targets.
-    ``residuals`` are out of fold; they and the
-    ``service``, gaps and outliers, are None until they have been computed.
+    gives for the inputs, ``usable`` the frequencies without outliers, ``modelled`` the FE model's frequencies at
+    ``learned``, in the measured domain, ``weights`` those of the rows, or None, and ``parameter_names`` the columns of
+    the targets. ``residuals`` are out of fold; they and the ``service``, gaps and outliers, are None until they have
+    been computed.
     """
 
     temperatures: Any
@@ -303,6 +366,8 @@ class TrainingRecords(SavesFrames):
     inputs: Array
     targets: Array
     learned: Array
+    usable: Array
+    modelled: Array
     weights: Array | None
     parameter_names: Sequence[str]
     residuals: WeatherResiduals | None = None
@@ -320,11 +385,19 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
+    @property
+    def ratios(self) -> Array:
+        """Measured over modelled frequencies, which a discrepancy learns, (n_rows, n_modes)."""
+        return self.usable / self.modelled
+
+    def learns(self, regressor: Any, mapper: Any, sensors: SensorRegression) -> Discrepancy:
+        """The discrepancy that a regressor learns of these records, beside a fitted mapper."""
+        folds = BlockedKFold(N_FOLDS).fold_of(as_frame(self.temperatures))
+        chain = {"mapper": mapper, "sensors": sensors}
+        return Discrepancy.of(regressor, self.inputs, self.ratios, self.weights, folds, **chain)
+
     def resampled(
-        self,
-        residuals: WeatherResiduals,
-        frequencies_of: Callable[[Array], Array],
-        random_state: np.random.RandomState,
+        self, residuals: WeatherResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
     ) -> "TrainingRecords":
         """Records that this structure could have given as well in the same weather, before a mapper learns them.
 
@@ -333,10 +406,11 @@ class TrainingRecords(SavesFrames):
         known = ~np.isnan(self.inputs).any(axis=1)
         order = np.argsort(row_times(self.temperatures), kind="stable")
         order = order[known[order]]
-        taken = residuals.draw_records(self.inputs[order], random_state)
+        taken, (values, ratios) = residuals.draw_records(self.inputs[order], random_state)
         targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
-        targets[order] = self.learned[order] * residuals.ratios[taken]
-        measured[order] = frequencies_of(self.learned[order]) * (1 + residuals.values[taken])
+        targets[order] = self.learned[order] * ratios
+        expected = self.modelled[order] * np.exp(discrepancy.at(self.inputs[order]))
+        measured[order] = expected * (1 + values)
         weights = None
         if self.weights is not None:
             weights = np.zeros(len(targets))
@@ -344,6 +418,7 @@ class TrainingRecords(SavesFrames):
         return replace(
             self,
             frequencies=frame_like(self.frequencies, measured),
+            usable=measured,
             targets=targets,
             weights=weights,
             residuals=None,
@@ -354,14 +429,16 @@ class TrainingRecords(SavesFrames):
         self,
         mapper: Any,
         frequencies_of: Callable[[Array], Array],
+        discrepancy: Discrepancy,
         folds: BaseCrossValidator | None = None,
         propagated: Callable[[Array, Array], Array] | None = None,
     ) -> WeatherResiduals:
-        """Relative residuals of the records, each predicted by a mapper fitted to the other folds.
+        """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        Given are the fitted mapper, the function from parameters to frequencies as they would be measured and, for a
-        mapper that states its errors, that from parameters and their covariances to covariances of frequencies. By
-        default, a fold holds every fifth of blocks of a week, or longer if the residuals remember for longer.
+        Given are the fitted mapper, the function from parameters to frequencies in the measured domain, the discrepancy
+        and, for a mapper that states its errors, the function from parameters and their covariances to covariances of
+        ln f. By default, a fold holds every fifth of blocks of a week, or longer if
+        the residuals remember for longer.
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
@@ -371,7 +448,7 @@ class TrainingRecords(SavesFrames):
         usable = ~np.isnan(theta).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
             raise ValueError(f"{usable.sum()} records have parameters; expected at least {2 * N_FOLDS} for residuals")
-        own = measured / frequencies_of(self.learned[order]) - 1
+        own = measured / (self.modelled[order] * np.exp(discrepancy.at(inputs))) - 1
         records = as_frame(self.temperatures).iloc[order]
         if folds is None:
             known = ~np.isnan(own).all(axis=1)
@@ -391,7 +468,14 @@ class TrainingRecords(SavesFrames):
                 beyond[test] = 0.0 if found is None else found[0].excess(found[1]).mean(axis=1)
         if not states:
             warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
-        expected = frequencies_of(predicted)
+        modelled = frequencies_of(predicted)
+        expected = np.full_like(modelled, np.nan)
+        for fold in range(fold_of.max() + 1):
+            train, test = usable & (fold_of != fold), fold_of == fold
+            weights = None if self.weights is None else self.weights[order]
+            # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
+            learned = discrepancy.relearned(inputs, self.usable[order] / modelled, weights, train)
+            expected[test] = modelled[test] * np.exp(learned.at(inputs[test]))
         values = measured / expected - 1
         known = ~np.isnan(values).all(axis=1)
         residuals = WeatherResiduals(
@@ -399,9 +483,32 @@ class TrainingRecords(SavesFrames):
         )
         if covariances is None or propagated is None:
             return residuals
-        errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances))) / expected
+        errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances)))
         reach = (reach_of(learner, inputs) or (None,))[0]
         return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
+
+
+def measurement_noise(mapper: Any, T: Any, F: Any) -> Array:
+    """Relative standard deviations of frequencies about a regression on what an unfitted mapper sees of the weather.
+
+    Out of fold, and by medians, so that outliers and rare weather hardly move them; (n_modes,).
+    """
+    rows = spread_evenly(np.argsort(row_times(T), kind="stable"), MOST_FOR_NOISE)
+    logs, inputs = np.log(as_floats(F)), T
+    if isinstance(mapper, Pipeline):
+        with without_warnings():
+            inputs = clone(mapper[:-1]).fit_transform(T, np.where(np.isnan(logs), median(logs), logs))
+    inputs, residuals = as_floats(inputs)[rows], logs[rows] - median(logs)
+    measured, records = np.exp(residuals), as_frame(T).iloc[rows]
+    folds = BlockedKFold(N_FOLDS).fold_of(records) if len(rows) >= N_FOLDS else np.zeros(len(rows))
+    known = ~np.isnan(inputs).any(axis=1)
+    for one in ratios_of(ratio_regressor(), inputs, measured, None):
+        for fold in range(N_FOLDS):
+            learned = one.refitted(ratio_regressor(), inputs, measured, None, one.rows[folds[one.rows] != fold])
+            test = np.flatnonzero((folds == fold) & known)
+            if learned.regressor is not None and len(test):
+                residuals[np.ix_(test, one.modes)] -= learned.logs(inputs[test])
+    return np.minimum(robust_deviation(residuals), MOST_NOISE)
 
 
 def as_frame(table: Any) -> pd.DataFrame:

@@ -79,6 +79,8 @@ class ServiceRecords:
         begins, or in records with the most usual faults, which are mostly none. All records are taken equally often.
         """
         n_records, n_rows = len(self.places), len(places)
+        if not self.missing.any() and np.isnan(self.outliers).all():
+            return np.zeros(n_rows, dtype=np.intp)  # all records are alike
         passes = random_state.uniform(size=n_rows) < 1 / MEAN_LENGTH
         which = random_state.uniform(size=n_rows)
         taken = np.empty(n_rows, dtype=np.intp)
@@ -91,6 +93,22 @@ class ServiceRecords:
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
+
+    def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
+        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none.
+
+        Their sizes are smoothed run by run, with the bandwidth of Silverman's rule on logarithms: the largest of a few
+        is not the largest of all that come.
+        """
+        drawn, logs = self.outliers[taken], np.log(np.abs(self.outliers))
+        n_runs = _begins(self.outliers).sum()
+        if n_runs < 2:
+            return drawn
+        mean, deviation, bandwidth = np.nanmean(logs), np.nanstd(logs), (4 / (3 * n_runs)) ** 0.2
+        run = np.cumsum(_begins(drawn), axis=0)
+        normal = np.take_along_axis(random_state.standard_normal((run.max() + 1, run.shape[1])), run, axis=0)
+        smoothed = (np.log(np.abs(drawn)) - mean + bandwidth * deviation * normal) / np.hypot(1, bandwidth)
+        return np.sign(drawn) * np.exp(mean + smoothed)
 
     def _similar(self, joint: int, place: Array, share: float, trees: Mapping[int, cKDTree]) -> int:
         """One of the records at a joint whose weather is most similar, or any where it is unknown."""
@@ -118,6 +136,12 @@ class ServiceRecords:
         joints, first = np.unique(self._joint_of[order], return_index=True)
         found = dict(zip(joints.tolist(), np.split(order, first[1:]), strict=True))
         return found | {0: np.arange(len(self.places))}
+
+
+def _begins(outliers: Array) -> NDArray[np.bool_]:
+    """Where a run of outliers of a mode begins."""
+    is_outlier = ~np.isnan(outliers)
+    return is_outlier & ~np.vstack([np.zeros((1, outliers.shape[1]), dtype=bool), is_outlier[:-1]])
 
 
 def places_of(residuals: Any, weather: Array) -> Array:

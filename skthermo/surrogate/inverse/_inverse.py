@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import overload
+from typing import Literal, overload
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arguments import check_model, check_theta
+from skthermo._arguments import check_model, check_noise, check_theta
 from skthermo._arrays import Array, Bounds, as_floats
 from skthermo._frames import frame_like
 from skthermo._validation import (
@@ -21,18 +21,20 @@ from skthermo._validation import (
     HasMethods,
     Interval,
     Stages,
+    StrOptions,
     TransformerMixin,
     _fit_context,
     check_is_fitted,
 )
 from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate
+from skthermo.metrics import complete_r2
 from skthermo.surrogate._networks import default_network
 from skthermo.surrogate._regression import MultiplierRegressor
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
 from skthermo.surrogate.inverse._inversions import Inversions
-from skthermo.surrogate.inverse._training import SimulatedTraining
+from skthermo.surrogate.inverse._training import SimulatedTraining, held_out
 from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
@@ -62,11 +64,13 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
         records that `fit` sees have their parameters, as far as the first regressor can tell. An inverse that is not
         refined becomes more accurate there.
-    noise : float or array-like of shape (n_modes,), default=0.0
+    noise : "auto", float or array-like of shape (n_modes,), default="auto"
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
         refining finds the posterior mode. With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode
-        is missing).
+        is missing). "auto" is estimated: by a `DataInformedFEM` from temperatures and frequencies; without
+        temperatures, from what the model leaves unexplained of the records that `fit` sees, if estimates are refined
+        and there are more modes than parameters; otherwise it is 0.
     dofs : array-like of int of shape (n_sensors,), optional
         Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
         frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
@@ -82,9 +86,11 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     prior : float, array-like of shape (n_parameters,) or mapping, optional
         Standard deviations of a Gaussian prior of ln theta about the middle of the bounds, for refining. By default
         that of values spread evenly over the box.
-    reduce : bool or float, default=False
+    reduce : "auto", bool or float, default="auto"
         Whether to simulate and refine with the reduced model ``model.reduced(bounds)``, much faster for large models.
-        True allows a relative error of 1e-5 in the frequencies; a number sets the error allowed. If the records that
+        "auto" reduces where ``model.reduction_pays``, given the simulations and the records of `fit`, and a basis is
+        accurate. True allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error
+        allowed. If the records that
         `fit` sees have parameters outside the bounds, it makes a reduced model for a wider box that holds them, within
         the limits of estimates (three times the half-width of the bounds, in ln theta). Rows that end outside that box
         are solved by the full model, with a warning that counts them. `inverse_transform` and `round_trip` always use
@@ -118,18 +124,20 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     scores_ : ShapeScores
         With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
     simulator_ : Simulator
-        If there is a model: it and, with ``reduce``, the reduced model of the steps.
+        If there is a model: it and, where it is reduced, the reduced model of the steps.
     refinement_ : Refinement
         If estimates are refined: the model, the box and the prior of the steps.
     inversions_ : Inversions
         If estimates are refined: those of the records of `fit`, which the memory keeps.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
+    noise_ : ndarray of shape (n_modes,)
+        If there is a model: the relative standard deviations that count.
     n_steps_ : int
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
         Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
-        ``noise`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where
+        ``noise_`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where
         that cannot be estimated.
     n_parameters_ : int
         Number of parameters.
@@ -194,12 +202,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         "bounds": [Real, "array-like", dict],
         "n_samples": [Interval(Integral, 2, None, closed="left")],
         "narrow_bounds": ["boolean"],
-        "noise": [Interval(Real, 0, None, closed="left"), "array-like"],
+        "noise": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left"), "array-like"],
         "dofs": ["array-like", None],
         "shape_noise": [Interval(Real, 0, 1, closed="neither"), "array-like"],
         "refine": [Interval(Integral, 0, None, closed="left"), None],
         "prior": [Interval(Real, 0, None, closed="neither"), "array-like", dict, None],
-        "reduce": ["boolean", Interval(Real, 0, 1, closed="neither")],
+        "reduce": [StrOptions({"auto"}), "boolean", Interval(Real, 0, 1, closed="neither")],
         "memory": [str, HasMethods(["cache"]), None],
         "n_jobs": [Integral, None],
         "random_state": ["random_state"],
@@ -214,12 +222,12 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         bounds: Bounds = 0.3,
         n_samples: int = 1000,
         narrow_bounds: bool = False,
-        noise: ArrayLike = 0.0,
+        noise: ArrayLike | Literal["auto"] = "auto",
         dofs: ArrayLike | None = None,
         shape_noise: ArrayLike = 0.01,
         refine: int | None = None,
         prior: ArrayLike | Mapping[str, float] | None = None,
-        reduce: bool | float = False,
+        reduce: bool | float | Literal["auto"] = "auto",
         memory: str | Memory | None = None,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -277,6 +285,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         self.n_steps_ = self._n_steps()
         self.columns_ = InverseColumns.of(self)
         self.shape_inputs_ = self.columns_.shapes
+        if self.model is not None:
+            check_model(self.model)
+            self.noise_ = check_noise(self._stated_noise, self.model.n_modes, getattr(X, "columns", None))
         is_simulated = self.model is not None and y is None
         n_learned = 1 + bool(self.narrow_bounds)
         stages = Stages(self, (2 * n_learned if is_simulated else 1) + (self.n_steps_ > 0), X, y)
@@ -292,6 +303,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 self.refinement_ = self.inversions_.refinement
                 self.simulator_ = self.refinement_.simulator
                 self.scatter_ = self.inversions_.scatter(measured, guess)
+                if isinstance(self.noise, str) and self.inversions_.tells_noise(measured):
+                    self.noise_ = self.scatter_
+                    self.inversions_ = self.inversions_.with_noise(self.noise_)
+                    self.refinement_ = self.inversions_.refinement
         stages.end()
         return self
 
@@ -425,6 +440,61 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             )
         self._warn_of_box(theta, found.outside)
 
+    def score(
+        self, X: ArrayLike | None = None, y: ArrayLike | None = None, sample_weight: ArrayLike | None = None
+    ) -> float:
+        """Coefficient of determination R2, averaged over parameters: without y, of the regressor on new simulations.
+
+        Without y, so that searches can compare regressors, the score is that of the logarithms of the parameters that
+        the regressor itself gives, not refined, for 500 simulations that it was not trained on. They are drawn from the
+        same bounds and carry the same noise. With y, the score is that of `predict`, over complete rows.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features), optional
+            Frequencies in Hz and, with ``dofs``, components of shapes. Without y ignored.
+        y : array-like or DataFrame of shape (n_samples, n_parameters), optional
+            Multipliers of each row of X.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row; those of a series are matched to the rows of a frame by index. Without y ignored.
+
+        Returns
+        -------
+        float
+            At most 1. With y, NaN if fewer than two rows are complete.
+
+        Raises
+        ------
+        ValueError
+            If there is no y, and `fit` has learned from given frequencies and parameters.
+
+        Notes
+        -----
+        The 500 simulations are always the same, so that scores of different regressors and numbers of samples can be
+        compared. Those of different ``bounds`` or ``noise`` cannot: the task differs. Measured records do not matter,
+        and one fold is enough: ``cv=ShuffleSplit(1)``. With ``refine=0``, `fit` leaves out what no score needs.
+
+        Examples
+        --------
+        >>> from sklearn.model_selection import GridSearchCV, ShuffleSplit
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.surrogate import InverseSurrogate
+        >>> inverse = InverseSurrogate(make_truss(), bounds=0.2, n_samples=300, refine=0, random_state=0)
+        >>> networks = {"regressor__hidden_layer_sizes": [(2,), (32,)]}
+        >>> search = GridSearchCV(inverse, networks, cv=ShuffleSplit(1)).fit(make_truss_campaign().frequencies)
+        >>> search.cv_results_["mean_test_score"].round(1), search.best_params_
+        (array([0.5, 0.8]), {'regressor__hidden_layer_sizes': (32,)})
+        """
+        check_is_fitted(self)
+        if y is not None:
+            return super().score(X, y, sample_weight)
+        if self.box_ is None:
+            raise ValueError("InverseSurrogate has learned from given parameters, not simulations; expected y to score")
+        inputs, theta = held_out(self, self._stated_noise)
+        if self.shape_inputs_ is not None:
+            inputs = self.shape_inputs_.normalised(inputs)
+        return complete_r2(np.log(theta), np.log(self._estimate(inputs)[0]))
+
     @overload
     def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
     @overload
@@ -507,15 +577,35 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         if self.model is None:
             raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
 
+    @property
+    def _stated_noise(self) -> ArrayLike:
+        """The noise of the simulations: what is stated, which is nothing where it is estimated."""
+        return 0.0 if isinstance(self.noise, str) else self.noise
+
     def _n_steps(self) -> int:
         """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
         if self.model is None:
             if self.refine:
                 raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
             return 0
-        is_differentiable = hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")
+        return self.steps_on(self.model)
+
+    def steps_on(self, model: FEModel) -> int:
+        """Largest number of steps that refine an estimate on a model: 0 if estimates are not refined.
+
+        Parameters
+        ----------
+        model : FE model
+            The one that this inverse has, or gets in a chain.
+
+        Returns
+        -------
+        int
+            ``refine`` or, where it is None, 100 on a model that gives exact derivatives.
+        """
+        is_differentiable = hasattr(model, "linearised") or hasattr(model, "jacobian")
         if self.dofs is not None:
-            is_differentiable = hasattr(self.model, "linearised_modes")
+            is_differentiable = hasattr(model, "linearised_modes")
         return (DEFAULT_STEPS if is_differentiable else 0) if self.refine is None else int(self.refine)
 
     def _learn_pairs(
@@ -545,7 +635,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         self.columns_.check(self, X)
         self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
         with stages.stage("simulations"):
-            training = SimulatedTraining.of(self, random)
+            n_refined = 0 if X is None or not self.n_steps_ else len(X)
+            training = SimulatedTraining.of(self, random, n_refined)
         with stages.stage("regressor"):
             self._learn_samples(training.samples, random, seed)
         if self.narrow_bounds:
@@ -558,7 +649,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
 
     def _learn_samples(self, samples: Bunch, random: np.random.RandomState, seed: np.random.RandomState | None) -> None:
         """Fit the regressor to simulated samples with noise."""
-        self._learn_inverse(self.columns_.noisy(samples, self.noise, random), samples.theta, seed)
+        self._learn_inverse(self.columns_.noisy(samples, self.noise_, random), samples.theta, seed)
 
     def _learn_inverse(self, inputs: Array, theta: Array, seed: np.random.RandomState | None) -> None:
         """Fit the regressor, which sees scores in place of the components of shapes."""

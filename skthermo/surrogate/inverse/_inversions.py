@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import joblib
+import numpy as np
 from joblib import Memory
 from sklearn.utils import Bunch
 
@@ -49,7 +50,7 @@ class Inversions:
             self.memory if is_kept else None,
             "inversion",
             lambda: self.refinement.refined(inputs, guess, scatter),
-            lambda: (self.content, guess, scatter),
+            lambda: (self.content, self.refinement.noise, guess, scatter),
         )
 
     def scatter(self, inputs: Array, guess: Array) -> Array:
@@ -61,6 +62,16 @@ class Inversions:
             lambda: self.refinement.estimated_scatter(inputs, guess),
             lambda: (self.content,),
         )
+
+    def tells_noise(self, inputs: Array) -> bool:
+        """Whether the scatter of the inputs of `fit` was estimated from them, and not stated or assumed."""
+        n_modes, n_parameters = len(self.refinement.noise), len(self.refinement.prior.mean)
+        complete = ~np.isnan(inputs).any(axis=1)
+        return not self.refinement.noise.all() and n_modes > n_parameters and complete.sum() > n_parameters
+
+    def with_noise(self, noise: Array) -> Inversions:
+        """The same inversions of frequencies with noise."""
+        return replace(self, refinement=replace(self.refinement, noise=noise, recent=[]))
 
 
 def _changes(before: Refinement, after: Refinement) -> tuple[Simulator | None, ResponseSurface | None]:

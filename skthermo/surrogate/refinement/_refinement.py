@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_bounds, check_noise, check_prior
-from skthermo._arrays import Array, spread_evenly
+from skthermo._arguments import check_bounds, check_prior
+from skthermo._arrays import Array, robust_deviation, spread_evenly
+from skthermo._io import with_progress
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.refinement._levenberg_marquardt import Refined, minimise, refine
 from skthermo.surrogate.refinement._posterior import Linearise, Objective, Prior
@@ -33,6 +34,7 @@ ROWS_FOR_SCATTER = 365
 STEPS_ON_SURFACE = 100
 ROWS_FOR_SURFACE = 50  # number of records near which a response surface is made accurate
 ROWS_FOR_BOX = 200  # number of records that tell where a reduced model has to be accurate
+CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
@@ -65,12 +67,11 @@ class Refinement:
         names = inverse.model.parameter_names
         width = None if inverse.prior is None else check_prior(inverse.prior, names)
         prior = Prior.of_box(check_bounds(inverse.bounds, names), width)
-        noise = check_noise(inverse.noise, inverse.model.n_modes, getattr(inverse, "feature_names_in_", None))
         drawn, surface = inverse.samples_, None
         if inverse.box_ is not None and inverse.shape_inputs_ is None:
             surface = ResponseSurface.of_samples(drawn.theta, drawn.frequencies)
         settings = inverse.n_steps_, inverse.n_jobs, inverse.shape_inputs_, surface
-        return cls(inverse.simulator_, noise, prior, *settings)
+        return cls(inverse.simulator_, inverse.noise_, prior, *settings)
 
     def adapted(self, inputs: Array, guess: Array) -> Refinement:
         """The refinement whose reduced model and response surface suit where records have their parameters."""
@@ -154,6 +155,14 @@ class Refinement:
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
+        """Refine rows, in blocks that tell how far the work is."""
+        size = CHUNKS_PER_BLOCK * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
+        blocks = np.split(np.arange(len(start)), range(size, len(start), size))
+        refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
+        parts = with_progress(refined, len(start), None, count=lambda part: len(part.converged), unit="records")
+        return reduce(Refined.beside, parts)
+
+    def _refine_block(self, objective: Objective, start: Array) -> Refined:
         """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
         found = refine(objective, start, self.n_steps, sorts=self._sorts)
         if self.simulator.reduced is not None:
@@ -201,22 +210,6 @@ class Refinement:
             residuals = self.refined(inputs[rows], guess[rows], exact, remember=True).residuals
             residuals = residuals[~np.isnan(residuals).any(axis=1)]
             if len(residuals) > n_parameters:
-                estimate = np.sqrt(residuals.var(axis=0).sum() / (n_modes - n_parameters))
+                estimate = np.sqrt((robust_deviation(residuals) ** 2).sum() / (n_modes - n_parameters))
                 scatter = min(max(estimate, EXACT), LARGEST_SCATTER)
         return np.where(self.noise > 0, self.noise, scatter)
-
-    def steps_without_prior(self, theta: Array, scatter: Array, n_rows: int) -> Array:
-        """Steps of ln theta that take the prior's shrinkage out of posterior modes of frequencies and shapes.
-
-        At a posterior mode the derivatives of the observations times their residuals equal the pull of the prior. The
-        step is a Gauss-Newton step with the information of all observations at the nominal state, and with a prior as
-        weak as suits the mean of all records.
-        """
-        model, nominal = Simulator(self.simulator.model), np.ones((1, theta.shape[1]))
-        _, sensitivity, shapes, slopes = model.linearise(nominal, dofs=self.shapes.dofs, relative=True)
-        units = MeasuredShapes(shapes.swapaxes(1, 2) / np.linalg.norm(shapes, axis=1)[:, :, np.newaxis])
-        rows = np.hstack([sensitivity, units.misfit(shapes, slopes)[1]])
-        weak = replace(self.prior, width=self.prior.width * np.sqrt(n_rows))
-        information = weak.information(rows, np.append(scatter, self.shapes.deviations)[np.newaxis])[0]
-        pull = (np.log(theta) - self.prior.mean) / self.prior.width**2
-        return np.linalg.solve(information, pull.T).T

@@ -1,0 +1,76 @@
+"""Chains of one mode, which learn a vector of frequencies as scikit-learn's regressors do."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.ensemble import StackingRegressor, VotingRegressor
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import KFold, cross_val_score
+
+from skthermo.detection import TemperatureCompensator
+from skthermo.fem import CallableModel
+from skthermo.plotting import PredictionDisplay
+from skthermo.surrogate import DataInformedFEM
+from tests.surrogate.chains import TRUSS, F, T
+
+ONE_MODE = CallableModel(lambda theta: 7.5 * np.sqrt(theta), ["stiffness"], 1, vectorized=True)
+CHAIN = DataInformedFEM(ONE_MODE, random_state=0)
+FITTED = clone(CHAIN).fit(T, F["f1"])
+TABLE = clone(CHAIN).fit(T, F[["f1"]])
+
+
+def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
+    def values(chain):
+        return chain.predict(T), *chain.predict(T, return_std=True), *chain.predict_interval(T)
+
+    for vector, table in zip(values(FITTED), values(TABLE), strict=True):
+        assert type(vector) is np.ndarray
+        assert list(table) == ["f1"]
+        np.testing.assert_array_equal(vector, table["f1"])
+    for one, other in (
+        (FITTED, TABLE),
+        (FITTED.refitted(), TABLE.refitted()),
+        (FITTED.resampled(0), TABLE.resampled(0)),
+    ):
+        np.testing.assert_array_equal(one.predict(T), other.predict(T)["f1"])
+    pd.testing.assert_frame_equal(FITTED.simulate(T), TABLE.simulate(T))
+
+
+def test_scores_take_vectors_and_tables():
+    assert FITTED.score(T, F["f1"]) == FITTED.score(T, F[["f1"]]) == TABLE.score(T, F["f1"])
+    scores = [cross_val_score(CHAIN, T, y, cv=KFold(3)) for y in (F["f1"], F["f1"].to_numpy(), F[["f1"]])]
+    np.testing.assert_array_equal(scores[0], scores[1])
+    np.testing.assert_array_equal(scores[0], scores[2])
+
+
+def test_names_come_from_the_series():
+    assert FITTED.mode_names_ == clone(CHAIN).fit(T, F["f1"].rename(None)).mode_names_ == ["f1"]
+    assert clone(CHAIN).fit(T, F["f1"].rename("bending")).mode_names_ == ["bending"]
+
+
+@pytest.mark.parametrize("ensemble", [StackingRegressor, VotingRegressor])
+@pytest.mark.parametrize("weights", [None, np.linspace(0.5, 1.5, len(T))])
+def test_scikit_learns_ensembles_of_regressors(ensemble, weights):
+    together = ensemble([("chain", CHAIN), ("lines", LinearRegression())])
+    together.fit(T, F["f1"], **({} if weights is None else {"sample_weight": weights}))
+    assert together.predict(T).shape == (len(T),)
+    assert together.score(T, F["f1"]) > LinearRegression().fit(T, F["f1"]).score(T, F["f1"])
+    alone = clone(CHAIN).set_params(random_state=0).fit(T, F["f1"], sample_weight=weights)
+    np.testing.assert_array_equal(together.named_estimators_["chain"].predict(T), alone.predict(T))
+
+
+def test_compensators_and_displays_take_it():
+    compensated = TemperatureCompensator(CHAIN, targets=["f1"]).fit(T.join(F[["f1"]]))
+    np.testing.assert_allclose(compensated.transform(T.join(F[["f1"]]))["f1"], F["f1"] - FITTED.predict(T), atol=1e-12)
+    PredictionDisplay.from_estimator(FITTED, T, F["f1"], confidence=0.9)
+
+
+def test_a_vector_of_several_modes_is_refused():
+    with pytest.raises(ValueError, match="frequencies have 1 columns; expected the 6 modes"):
+        DataInformedFEM(TRUSS).fit(T, F["f1"])
+
+
+def test_shapes_and_weights_are_given_by_name():
+    with pytest.raises(TypeError, match="positional"):
+        CHAIN.fit(T, F[["f1"]], None)

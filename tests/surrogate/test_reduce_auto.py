@@ -1,0 +1,113 @@
+"""Laws of ``reduce="auto"``: what is reduced, that results stay the same, and that the report says so."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import Ridge
+
+from skthermo.datasets import make_truss
+from skthermo.fem import CallableModel
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.fem.frames import portal
+
+LARGE, SMALL = portal(4), make_truss()
+MANY, FEW = 300, 20
+
+
+def records(model, n_rows=60):
+    """Air temperatures, and frequencies of a structure that warmth softens."""
+    random, stamps = np.random.default_rng(0), pd.date_range("2025", periods=n_rows, freq="D")
+    share = random.uniform(size=(n_rows, 1))
+    theta = (1.05 - 0.1 * share) ** random.uniform(0.5, 1.0, len(model.parameter_names))
+    F = model.frequencies(theta) * (1 + 0.001 * random.standard_normal((n_rows, model.n_modes)))
+    return pd.DataFrame(30 * share, stamps, ["T"]), pd.DataFrame(F, stamps).add_prefix("f")
+
+
+def chain(model, n_samples=MANY, **options):
+    inverse = InverseSurrogate(regressor=Ridge(1e-3), bounds=0.15, noise=0.001, n_samples=n_samples)
+    return DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0, **options)
+
+
+def predictions(fem, T):
+    damage = dict.fromkeys(list(fem.model.groups)[:1], 0.2)
+    return np.hstack([fem.predict_parameters(T), fem.predict(T), fem.simulate(T, damage=damage)])
+
+
+def test_a_large_model_is_reduced_and_nothing_changes_but_the_time():
+    T, F = records(LARGE)
+    auto, reduced, full = (chain(LARGE, reduce=reduce).fit(T, F) for reduce in ("auto", True, False))
+    np.testing.assert_array_equal(predictions(auto, T), predictions(reduced, T))
+    np.testing.assert_allclose(auto.predict(T), full.predict(T), rtol=3e-5)
+    size = auto.simulator_.reduced.basis_size_
+    assert auto.report_.solved == (
+        f"Solved by a reduced model of {size} coordinates (of {LARGE.n_dof}), accurate to 1e-05."
+    )
+    assert auto.report_.solved in repr(auto.report_)
+    assert full.report_.solved == "Solved by the full model: reduce=False."
+
+
+@pytest.mark.parametrize(
+    "model",
+    [SMALL, CallableModel(SMALL.frequencies, SMALL.parameter_names, SMALL.n_modes, vectorized=True)],
+    ids=["small", "program"],
+)
+def test_what_a_reduced_model_would_not_speed_up_stays_full(model):
+    T, F = records(model)
+    auto, full = (chain(model, 60, reduce=reduce).fit(T, F) for reduce in ("auto", False))
+    np.testing.assert_array_equal(auto.predict(T), full.predict(T))
+    assert auto.simulator_.reduced is None
+    assert auto.report_.solved.startswith("Solved by the full model: ")
+
+
+def test_the_decision_is_monotone_in_rows_and_in_size():
+    rows = np.unique(np.logspace(0, 6, 40).astype(int))
+    models = [portal(n) for n in (1, 2, 3, 4, 5, 8, 16, 40)]
+    table = np.array([[model.reduction_pays(int(n)) for n in rows] for model in models])
+    assert (np.diff(table.astype(int), axis=0) >= 0).all()
+    assert (np.diff(table.astype(int), axis=1) >= 0).all()
+    assert not table[0].any()
+    assert not table[:, 0].any()
+    assert table[-1, -1]
+
+
+@pytest.mark.filterwarnings("ignore:12 complete rows")
+def test_few_rows_do_not_pay_for_a_basis():
+    T, F = records(LARGE, 12)
+    fem = chain(LARGE, FEW).fit(T, F)
+    assert fem.inverse_.simulator_.reduced is None
+    assert fem.report_.solved == "Solved by the full model: a reduced model would save no time."
+
+
+@pytest.mark.filterwarnings("ignore:12 complete rows")
+def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
+    T, F = records(LARGE, 12)
+    assert chain(LARGE, FEW, reduce=True).fit(T, F).inverse_.reduce is True
+    assert chain(LARGE, MANY, reduce=False).fit(T, F).inverse_.reduce is False
+    own = chain(LARGE, FEW, reduce=True).set_params(inverse__reduce=False).fit(T, F)
+    assert own.inverse_.simulator_.reduced is None
+    assert own.simulator_.reduced is not None
+
+
+@pytest.mark.filterwarnings("error:.*reduced model")
+def test_without_an_accurate_basis_the_full_model_solves_without_a_warning(monkeypatch):
+    def fails(*args, **options):
+        raise RuntimeError("after 4 rounds 9 basis vectors do not give frequencies to 1e-05")
+
+    T, F = records(LARGE)
+    full = chain(LARGE, reduce=False).fit(T, F)
+    monkeypatch.setattr("skthermo.fem.affine._reduced.grow_basis", fails)
+    auto = chain(LARGE).fit(T, F)
+    np.testing.assert_array_equal(predictions(auto, T), predictions(full, T))
+    assert "no reduced model is accurate" in auto.report_.solved
+    with pytest.raises(RuntimeError, match="do not give frequencies"):
+        chain(LARGE, reduce=True).fit(T, F)
+
+
+def test_clones_memory_and_refits_decide_alike(tmp_path):
+    T, F = records(LARGE)
+    fem = chain(LARGE).fit(T, F)
+    stored = clone(fem).set_params(memory=str(tmp_path))
+    for again in (clone(fem).fit(T, F), stored.fit(T, F), clone(stored).fit(T, F)):
+        np.testing.assert_array_equal(predictions(again, T), predictions(fem, T))
+    np.testing.assert_allclose(fem.refitted().predict(T), fem.predict(T), rtol=1e-4)
