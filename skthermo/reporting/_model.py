@@ -185,8 +185,7 @@ def _over_temperature(fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.Da
     """Measured and predicted frequencies of some rows, evenly spread, and the temperature that they follow."""
     rows = spread_evenly(np.arange(len(T)), MOST_PREDICTED)
     with without_warnings():  # the report of the fit counts the gaps of these records
-        theta = as_floats(fem.predict_parameters(fem.training_records_[0]))[rows]
-    frequencies = as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
+        frequencies = as_floats(fem.predict(fem.training_records_[0]))[rows]
     measured = F.iloc[rows]
     predicted = pd.DataFrame(frequencies, measured.index, measured.columns)
     return measured, predicted, chosen_sensor(T, F).iloc[rows]

@@ -56,7 +56,7 @@ def test_effects_are_those_of_simulated_records(fem, reduced_fem, which):
 def test_means_over_a_year_need_few_rows(fem):
     """Modes that were measured in parts of the year, or never, which then counts as always."""
     theta, F = fem.predict_parameters(YEAR).to_numpy(copy=True), fem.predict(YEAR).to_numpy(copy=True)
-    F[:200, 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
+    F[YEAR["T1"] > YEAR["T1"].median(), 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
     theta[7] = np.nan
     found = FrequencyEffects.of(fem, theta, F, CHANGES)
     assert len(found.theta) == 9
@@ -66,7 +66,7 @@ def test_means_over_a_year_need_few_rows(fem):
     expected = np.nanmean(np.where(np.isnan(F) & ~np.isnan(F).all(axis=0), np.nan, ratios), axis=0)
     amounts = np.array([0.2, 0.1, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(found(amounts)[0], expected, rtol=1e-3)
-    assert abs(np.nanmean(ratios, axis=0)[1] / expected[1] - 1) > 3e-3  # gaps matter
+    assert abs(np.nanmean(ratios, axis=0)[1] / expected[1] - 1) > 2e-3  # gaps matter
 
 
 def test_typical_rows_have_the_moments_of_all_rows():
@@ -108,11 +108,11 @@ def test_mass_in_proportion_lowers_all_frequencies_alike(fem):
     _, changes = read_causes(TRUSS, ["top"], added_mass={"twice as heavy": mass})
     nominal = effects_of(fem, changes).nominal()
     healthy = TRUSS.frequencies([[1, 1, 1, 1]])
-    offsets = fem.aligner_.inverse_transform(healthy) - healthy
+    factors = fem.aligner_.inverse_transform(healthy) / healthy
     change, slopes = nominal(np.array([0.0, 0.5]))
-    np.testing.assert_allclose(np.exp(change), ((healthy * 1.5**-0.5 + offsets) / (healthy + offsets))[0], rtol=1e-9)
-    model = healthy[0] * 1.5**-0.5
-    np.testing.assert_allclose(slopes[:, 1], -0.5 / 1.5 * model / (model + offsets[0]), rtol=1e-6)
+    np.testing.assert_allclose(np.exp(change), 1.5**-0.5, rtol=1e-9)
+    np.testing.assert_allclose(slopes[:, 1], -0.5 / 1.5, rtol=1e-6)
+    assert (factors != 1).all()
 
 
 class OnlyDamaged:

@@ -45,8 +45,8 @@ def study(fem):
         "week": WindowedAlarm(7),
         "three of three": WindowedAlarm(3, rule="m-of-n", m=3),
     }
-    scenarios = [{}, {"bottom": 0.08}, {"bottom": 0.6}, ProgressiveDamage("crack", {"bottom": 0.1}, onset=100)]
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=4, random_state=0, uncertainty="noise")
+    scenarios = [{}, {"bottom": 0.06}, {"bottom": 0.6}, ProgressiveDamage("crack", {"bottom": 0.1}, onset=100)]
+    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=8, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     return study
 
@@ -126,7 +126,7 @@ def test_a_table_has_a_row_for_each_detector_and_scenario(study):
         between = table[f"{name} lowest"].le(table[name]) & table[name].le(table[f"{name} highest"])
         assert between.all()
     single = table.loc["single"]
-    assert single.loc["bottom 8 %", "1D"] == study.results_.loc[1, "rate"]
+    assert single.loc["bottom 6 %", "1D"] == study.results_.loc[1, "rate"]
     assert (single["7D healthy"] == single.loc["healthy", "7D"])[:3].all()
     for sooner, later in (("median", "reliable"), ("reliable", "reliable highest")):
         known = table[table[later].notna()]
@@ -153,9 +153,9 @@ def test_windows_need_as_many_damaged_records_as_their_rule(study):
 def test_windows_after_an_onset_are_those_of_records_that_change_there(study, fem):
     seed = int(np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(4, 2))[0, 0])
     healthy, damaged = (
-        fem.simulate(WEATHER, damage=damage, noise="fitted", random_state=seed) for damage in ({}, {"bottom": 0.08})
+        fem.simulate(WEATHER, damage=damage, noise="fitted", random_state=seed) for damage in ({}, {"bottom": 0.06})
     )
-    found = study.transitions_["week", "bottom 8 %", "data-informed"][0]
+    found = study.transitions_["week", "bottom 6 %", "data-informed"][0]
     for number, onset in ((0, 7), (3, 49)):
         changed = pd.concat([healthy[:onset], damaged[onset:]])
         expected = study.detectors_["week"].decision_function(changed)[onset : onset + 7]
@@ -188,7 +188,7 @@ def test_the_smallest_damage_that_is_soon_found_is_told_in_words(study):
     assert certain["text"] == f"{in_text} of 100"
     soon = study.time_to_find(detector="single", smallest=True).set_index("scenario")
     assert list(soon.index) == ["healthy", "crack"]
-    assert every.loc["bottom 8 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
+    assert every.loc["bottom 6 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
     told = study.time_to_find(detector=study.ranking().index[0], smallest=True)
     sentences = [f"{row['scenario']!r} {row['text']}." for _, row in told.iterrows()]
     assert "\n".join(sentences) in study.summary()

@@ -11,7 +11,7 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import DetectabilityStudy, Scenario, pod_curve, sweep, what_to_add
-from skthermo.studies.detectability import Arrangement
+from skthermo.studies.detectability import Arrangement, Measurement
 from skthermo.studies.extension._campaign import CampaignSimulator
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
@@ -105,6 +105,7 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
     assert tables[0]["gain"][0] > 0
 
 
+@pytest.mark.filterwarnings("ignore:frequencies follow the weather of weeks")
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
     inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01, refine=0)
@@ -136,8 +137,9 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
 
 
 def test_a_longer_baseline_begins_with_the_shorter_one_and_goes_on_in_time(fem):
+    measurement = Measurement("fitted", "fitted", "fitted")
     simulators = [
-        CampaignSimulator(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, "fitted", n) for n in (365, 800)
+        CampaignSimulator(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, measurement, n) for n in (365, 800)
     ]
     (short, tables), (long, others) = (each.draw(each.clean(), seed=3) for each in simulators)
     pd.testing.assert_frame_equal(short, long.iloc[:365], check_freq=False)

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import ArrayLike
 
 from skthermo._arrays import Array, as_columns, as_floats
 from skthermo._frames import column_names, frame_like
+from skthermo._io import run_jobs
 from skthermo._threads import single_blas_thread
 from skthermo._validation import _num_samples
 from skthermo._warnings import without_warnings
@@ -58,13 +59,18 @@ class Measurement:
     """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`."""
 
     noise: Any
-    gaps: Any = None
-    outliers: Any = None
+    gaps: Any
+    outliers: Any
+
+    @classmethod
+    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> "Measurement":
+        """Outliers may be the frequencies of the training records before these were cleaned."""
+        return cls(noise, gaps, fem.service_records(outliers) if np.ndim(outliers) else outliers)
 
     def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
         """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
         noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
-        if not isinstance(self.gaps, str):
+        if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
             return noise, T
         missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
         return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
@@ -110,7 +116,7 @@ class Simulation:
         left = self.without(judgement.errors)
         with without_warnings():
             jobs = (delayed(left._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            for later in Parallel(n_jobs=n_jobs, verbose=verbose)(jobs):
+            for later in run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose):
                 judgement.extend(later)
 
     def _one_repeat(self, number: int, seeds: Sequence[int]) -> Judgement:
@@ -198,4 +204,5 @@ def _of_draws(fem: Any, draws: Sequence[Mapping[str, float]], T: Any) -> list[Ar
     theta = as_floats(fem.predict_parameters(T))
     factors = np.repeat(1 - severities, len(theta), axis=0)
     frequencies = simulator.frequencies(np.hstack([np.tile(theta, (len(draws), 1)), factors]), fem.n_jobs)
-    return np.split(as_floats(fem.aligner_.inverse_transform(frequencies)), len(draws))
+    ratio = np.exp(fem.discrepancy_(T))
+    return [ratio * one for one in np.split(as_floats(fem.aligner_.inverse_transform(frequencies)), len(draws))]

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import delayed
 from scipy.special import expit, logit
 from scipy.stats import t
 
 from skthermo._arrays import Array
+from skthermo._io import run_jobs
 from skthermo._threads import single_blas_thread
 from skthermo._warnings import warn_user, without_warnings
 from skthermo.metrics import minimum_detectable_damage
@@ -51,7 +52,7 @@ class WorldRates:
         simulation = replace(simulation, clean={}, reference=None)
         jobs = (delayed(_rates_of_world)(simulation, worlds, number) for number in range(len(worlds.seeds)))
         with without_warnings():
-            outcomes = Parallel(n_jobs=n_jobs, verbose=verbose)(jobs)
+            outcomes = run_jobs(jobs, len(worlds.seeds), unit="replicates", n_jobs=n_jobs, verbose=verbose)
         errors = [one for one in outcomes if isinstance(one, str)]
         found = [one for one in outcomes if not isinstance(one, str)]
         if len(errors) > MOST_FAILURES * len(outcomes):

@@ -9,6 +9,7 @@ import pandas as pd
 
 from skthermo._arrays import Array, as_floats
 from skthermo._frames import column_names
+from skthermo.studies.detectability import Measurement
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
 """What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
@@ -21,13 +22,13 @@ class CampaignSimulator:
     """A chain that stands for the true structure: healthy records to learn from, and records of every severity.
 
     The weather of the training begins again where ``n_baseline`` is longer. ``modes`` are the ranks of further modes of
-    the model, and ``scatter`` the relative standard deviations of their noise.
+    the model, and ``scatter`` the relative standard deviations of their noise; they are missing where all others are.
     """
 
     fem: Any
     T: Any
     changes: ChangesBySeverity
-    noise: Any
+    measurement: Measurement
     n_baseline: int
     modes: Sequence[int] = ()
     scatter: Array = field(default_factory=lambda: np.empty(0))
@@ -47,22 +48,24 @@ class CampaignSimulator:
         """Records with noise: a baseline, and frames by family and severity, all of which have the same noise."""
         (healthy, changed), weather = clean, self.fem.training_records_[0]
         seeds = np.random.RandomState(seed).randint(LARGEST_SEED, size=(1 + -(-self.n_baseline // len(weather)), 2))
-        factors = self._factors(self.T, seeds[0])
-        periods = [
-            self._table(weather, healthy * self._factors(weather, pair), period)
-            for period, pair in enumerate(seeds[1:])
-        ]
-        tables = {key: self._table(self.T, frequencies * factors) for key, frequencies in changed.items()}
+        factors, seen = self._measured(self.T, seeds[0])
+        periods = []
+        for period, pair in enumerate(seeds[1:]):
+            noise, T = self._measured(weather, pair)
+            periods.append(self._table(T, healthy * noise, period))
+        tables = {key: self._table(seen, frequencies * factors) for key, frequencies in changed.items()}
         return pd.concat(periods).iloc[: self.n_baseline], tables
 
     def _clean(self, T: Any, changes: Mapping[str, Any]) -> Array:
         measured = as_floats(self.fem.simulate(T, **changes))
         return np.hstack([measured, self.fem.simulate_modes(T, self.modes, **changes)]) if self.modes else measured
 
-    def _factors(self, T: Any, seeds: Any) -> Array:
-        measured = self.fem.draw_noise(T, self.noise, random_state=int(seeds[0]))
-        further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T
-        return 1 + np.hstack([measured, further * self.scatter])
+    def _measured(self, T: Any, seeds: Any) -> tuple[Array, Any]:
+        """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
+        measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
+        further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
+        further[np.isnan(measured).all(axis=1)] = np.nan
+        return 1 + np.hstack([measured, further]), seen
 
     def _table(self, T: Any, frequencies: Array, period: int = 0) -> pd.DataFrame:
         """Temperatures and frequencies side by side; a later period repeats the weather of the first."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import clone
@@ -16,10 +16,11 @@ from sklearn.base import clone
 from skthermo._arguments import check_noise, integer_row
 from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._frames import check_same_rows, column_names
+from skthermo._io import run_jobs
 from skthermo._threads import single_blas_thread
 from skthermo._warnings import warn_user, warnings_once, without_warnings
 from skthermo.fem import linearise
-from skthermo.studies.detectability import Arrangement, DetectabilityStudy
+from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
 from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name
 from skthermo.studies.scenarios import Scenario
 
@@ -43,7 +44,8 @@ class Trials:
         with single_blas_thread():
             clean = self.simulator.clean()
         with without_warnings():
-            found = list(Parallel(n_jobs=n_jobs)(delayed(self._repeat)(clean, int(seed)) for seed in seeds))
+            jobs = (delayed(self._repeat)(clean, int(seed)) for seed in seeds)
+            found = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=n_jobs)
         return {candidate: [repeat[candidate] for repeat in found] for candidate in self.candidates}
 
     def _repeat(self, clean: Any, seed: int) -> dict[tuple[str, str], dict[str, tuple[float, float]]]:
@@ -69,7 +71,7 @@ def what_to_add(
     Parameters
     ----------
     study : DetectabilityStudy
-        That has been run; its chain, detector, families of scenarios, noise and seed are used.
+        That has been run; its chain, detector, families of scenarios, noise, gaps, outliers and seed are used.
     T : array-like or DataFrame of shape (n_records, n_sensors)
         Temperatures in degrees Celsius of the new records.
     modes : sequence of int, optional
@@ -153,11 +155,12 @@ def what_to_add(
     candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
     candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
+    measurement = Measurement.asked(study.fem, study.noise, study.gaps, study.outliers)
     simulator = CampaignSimulator(
         fem,
         T,
         changes,
-        study.noise,
+        measurement,
         longest,
         ranks,
         check_noise(scatter, len(ranks), [mode_name(rank) for rank in ranks]),
@@ -169,7 +172,7 @@ def what_to_add(
         if ranks:
             _warn_of_unknown_modes(fem, ranks)
         trials = [Trials(simulator, present, candidates)] if candidates else []
-        trials += _with_sensors(study, present, changes, sensors)
+        trials += _with_sensors(study, present, changes, measurement, sensors)
         for trial in trials:
             for (kind, name), found in trial.repeats(seeds, study.n_jobs).items():
                 rows += [
@@ -249,7 +252,11 @@ def _scatter(study: DetectabilityStudy) -> float:
 
 
 def _with_sensors(
-    study: DetectabilityStudy, present: Arrangement, changes: ChangesBySeverity, sensors: pd.DataFrame | None
+    study: DetectabilityStudy,
+    present: Arrangement,
+    changes: ChangesBySeverity,
+    measurement: Measurement,
+    sensors: pd.DataFrame | None,
 ) -> list[Trials]:
     """Trials for each further sensor, simulated by a chain that was fitted with it."""
     if sensors is None:
@@ -268,7 +275,7 @@ def _with_sensors(
         beside = _beside(T, name, as_floats(sensors[name]))
         fem = clone(study.fem).fit(beside, F)
         seen = name if isinstance(T, pd.DataFrame) else f"T{T.shape[1] + 1}"
-        simulator = CampaignSimulator(fem, beside, changes, study.noise, present.n_baseline)
+        simulator = CampaignSimulator(fem, beside, changes, measurement, present.n_baseline)
         trials.append(Trials(simulator, present, {("sensor", str(name)): present.with_sensor(seen)}))
     return trials
 

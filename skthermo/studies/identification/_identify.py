@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from numpy.typing import ArrayLike
 
 from skthermo._arguments import check_jobs
 from skthermo._arrays import MatrixLike, as_floats, as_random_state
 from skthermo._frequency_effects import FrequencyEffects
+from skthermo._io import run_jobs
 from skthermo._warnings import warn_each, without_warnings
 from skthermo.studies.identification._findings import findings
 from skthermo.studies.identification._identified import IdentifiedDamage
@@ -199,7 +200,7 @@ def identify_damage(
         models = checked_models(fem, models)
         seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
         jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
-        posterior = Posterior.mean(Parallel(n_jobs=n_jobs)(jobs))
+        posterior = Posterior.mean(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
     found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found

@@ -45,7 +45,7 @@ class Shift:
 def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
     """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
     residuals = as_floats(fem.expected_residuals(T))
-    return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals)))
+    return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals))) - fem.discrepancy_(T)
 
 
 def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
