@@ -1221,16 +1221,6 @@ method(
     random_state=(0, seed()),
 )
 method("surrogate.DataInformedFEM.draw_gaps", CHAIN, X=(T, PREDICTING), **FAULTS, random_state=(0, seed()))
-use(
-    "surrogate.FrequencyCoordinates",
-    lambda **a: (
-        surrogate.TemperatureMapper(Ridge(), coordinates=surrogate.FrequencyCoordinates(**a))
-        .fit(T, CHAIN.parameters_)
-        .predict(T)
-    ),
-    sensitivities=(np.eye(4), table(np.eye(4), nan=False, rows=False)),
-    damping=(0.1, vector(0.1, size=4, but=("zero inside",))),
-)
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),
@@ -1303,7 +1293,6 @@ fitted(
     (CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, fitting=True, but=("a number", "constant"))),
     after=lambda estimator, X: estimator.predict(X),
     regressor=(Ridge(), estimators("None")),
-    coordinates=(surrogate.FrequencyCoordinates(np.eye(4)), instead(np.eye(4))),
     random_state=(0, seed()),
 )
 use(

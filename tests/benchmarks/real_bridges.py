@@ -63,7 +63,7 @@ def targets_of_identification(bridge):
     fem, found = damage.identify(bridge)
     unexplained = 100 * (found.shifts["measured"] - found.shifts["explained"])
     some = {name: one for name, one in bench.detectors().items() if not name.startswith(("chain", "boosted"))}
-    table = bench.side_by_side(bench.bench(bridge, fem, found.scenario(bench.DAMAGED), some, n_repeats=20))
+    table = bench.side_by_side(bench.bench(bridge, fem, found.scenario(bench.DAMAGED), some, n_repeats=40))
     agreement = bench.agreement(table)
     yield "unexplained shift, %, largest", unexplained.abs().max(), "< 1"
     yield "probability that the soil is damaged, %", 100 * found.table.loc["soil", "probability"], ">= 80"

@@ -79,16 +79,17 @@ class SingleRecords:
         return Bunch(**full | first | {"model": full.model.with_modes(range(self.n_modes))})
 
     def sources(self, campaign):
-        """(model, theta) by the thermo-mechanical law, by the fitted chain, and by the oracle."""
+        """Clean frequencies for a damage by the thermo-mechanical law, by the fitted chain, and by the oracle."""
+        best = best_theta(self.model, campaign.clean_frequencies.to_numpy())
         return {
-            "thermo": (campaign.model, campaign.theta),
-            "informed": (self.model, self.fem.predict_parameters(campaign.temperatures)),
-            "oracle": (self.model, best_theta(self.model, campaign.clean_frequencies.to_numpy())),
+            "thermo": lambda damage: campaign.model.damaged(damage).frequencies(campaign.theta),
+            "informed": lambda damage: np.asarray(self.fem.simulate(campaign.temperatures, damage=damage)),
+            "oracle": lambda damage: self.model.damaged(damage).frequencies(best),
         }
 
     def records(self, sources, damage):
         """Noisy frequencies of the damaged structure by every source."""
-        return {name: self.noisy(model.damaged(damage).frequencies(theta)) for name, (model, theta) in sources.items()}
+        return {name: self.noisy(frequencies(damage)) for name, frequencies in sources.items()}
 
     def ratio(self, campaign, damage):
         """Noisy frequencies by the regression alone, times those of the nominal model, damaged over healthy."""

@@ -164,17 +164,22 @@ def kw51_not_updated(clock, quick):
     kw51_with_gaps(clock, quick, updated=False)
 
 
-def frame_chain(clock, quick):
-    """Fit of a chain to 365 rows of the exported frame, reduce=True."""
-    model, random = building_frame(), np.random.default_rng(0)
-    day = np.arange(10 if quick else 365)
+def frame_records(model, n_days):
+    """Daily temperatures, and frequencies of stiffnesses that fall as it warms."""
+    random, day = np.random.default_rng(0), np.arange(n_days)
     air = 10 - 12 * np.cos(2 * np.pi * day / 365) + 3 * random.standard_normal(len(day))
     slopes = -4e-4 * random.uniform(0.5, 1.5, len(model.parameter_names))
     F = add_noise(
         model.reduced(0.05, random_state=0).frequencies(1 + np.outer(air - 10, slopes)), 0.001, random_state=0
     )
     stamps = pd.date_range("2025", periods=len(day), freq="D")
-    T, F = pd.DataFrame({"T": air}, stamps), pd.DataFrame(F, stamps).add_prefix("f")
+    return pd.DataFrame({"T": air}, stamps), pd.DataFrame(F, stamps).add_prefix("f")
+
+
+def frame_chain(clock, quick):
+    """Fit of a chain to 365 rows of the exported frame, reduce=True."""
+    model = building_frame()
+    T, F = frame_records(model, 10 if quick else 365)
     inverse = InverseSurrogate(noise=0.001, reduce=True)
     fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
     with clock.work():

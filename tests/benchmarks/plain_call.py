@@ -1,0 +1,509 @@
+"""How far ``DataInformedFEM(model).fit(T, F)`` without any setting is from the best settings.
+
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/plain_call.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/plain_call.py --structures truss bridges --first-seed 100
+    OMP_NUM_THREADS=1 python tests/benchmarks/plain_call.py --raw
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/plain_call.py --times
+
+Mean errors of frequencies without noise in a later year, healthy and damaged, in percent; of the tower and of Z24,
+errors of measured frequencies that were held out. Variants:
+
+plain        ``DataInformedFEM(model, random_state=0).fit(T, F)``
+true, auto   noise stated to the inverse surrogate, as it is or as estimated from residuals of a regression on the
+             temperatures; frequencies scaled to the model's; large models reduced
+memory       with lags or rolling means of the temperatures
+updated      with the FE model updated to the mean frequencies before
+no delta     with ``discrepancy=None``: the paper's chain
+regression   of frequencies on temperatures, times the nominal model's frequencies, damaged over healthy
+
+Errors are those of the records that all variants of a case can predict. ``--raw`` compares fits to records with gaps
+and 0.5 % outliers, to the same records cleaned by `HampelFilter`, and to the same records without outliers. ``--times``
+gives the seconds of plain calls for three large models.
+"""
+
+import argparse
+import contextlib
+import io
+import os
+import signal
+import sys
+import time
+import warnings
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from sklearn.model_selection import PredefinedSplit, cross_val_predict
+from sklearn.pipeline import make_pipeline
+from slow_soil import DAMAGES, slow_soil
+from works import building_frame, frame_records, processor_seconds
+
+from skthermo.datasets import (
+    load_z24,
+    make_fleet,
+    make_kw51,
+    make_kw51_campaign,
+    make_truss,
+    make_truss_campaign,
+    make_z24,
+)
+from skthermo.metrics import mape
+from skthermo.preprocessing import BiasAligner, HampelFilter, LagFeatures
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.updating import ModelUpdater
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DATA = Path(os.environ["SKTHERMO_DATA"]) if "SKTHERMO_DATA" in os.environ else None
+SEVERITY, HALF = 0.2, 0.5
+LARGE = 100  # degrees of freedom from which on the guide asks for reduced models
+KW51_START, KW51_GROUPS = 1236, ("arch_connections", "deck_connections", "ballast", "pipes")
+
+
+@dataclass
+class Case:
+    """Records to learn from, and the true frequencies of later states.
+
+    Attributes
+    ----------
+    table : str
+        Structure and training, over which errors are averaged.
+    name : str
+        Of this case in the table.
+    model : FE model
+        The user's.
+    T : DataFrame
+        Temperatures of all records, to learn from and later.
+    F : DataFrame
+        Frequencies to learn from.
+    states : dict
+        Damage and frequencies to predict, by name.
+    noise : float or array, optional
+        True relative standard deviation of the noise.
+    lags : LagFeatures, optional
+        Lags for the mapper.
+    means : str, optional
+        Duration of rolling means of the temperatures.
+    """
+
+    table: str
+    name: str
+    model: object
+    T: pd.DataFrame
+    F: pd.DataFrame
+    states: dict
+    noise: object = None
+    lags: LagFeatures | None = None
+    means: str | None = None
+    computed: dict = field(default_factory=dict)
+
+    @property
+    def is_large(self):
+        return self.model.n_dof >= LARGE
+
+    @property
+    def has_memory(self):
+        return self.lags is not None or self.means is not None
+
+    def temperatures(self, memory):
+        """All temperatures, with their rolling means beside them if these are asked for."""
+        if not memory or self.means is None:
+            return self.T
+        return self.T.join(self.T.rolling(self.means).mean().add_suffix(f", mean of {self.means}"))
+
+    def mapper(self, memory):
+        return (
+            make_pipeline(self.lags, TemperatureMapper()) if memory and self.lags is not None else TemperatureMapper()
+        )
+
+    def remembered(self, what, compute):
+        """What several variants need, computed once."""
+        if what not in self.computed:
+            self.computed[what] = compute()
+        return self.computed[what]
+
+    def estimated_noise(self, memory):
+        """Robust standard deviation of each mode about a regression that has learned other weeks."""
+        week = (self.F.index - self.F.index[0]) // pd.Timedelta("7D")
+        folds, T = PredefinedSplit(week % 5), self.temperatures(memory).loc[self.F.index]
+        columns = [cross_val_predict(self.mapper(memory), T, self.F[[mode]], cv=folds) for mode in self.F]
+        off = self.F / np.column_stack(columns) - 1
+        return 1.4826 * (off - off.median()).abs().median().to_numpy()
+
+    def updated_model(self):
+        """The model with the multipliers that fit the mean frequencies best."""
+        updater = ModelUpdater(self.model, bounds=0.5, prior=0.3, random_state=0)
+        return updater.fit(self.F, frequency_std=0.02 * self.F.mean()).model_
+
+
+def plain(case, **parts):
+    """The call without any setting."""
+    return predictions(DataInformedFEM(case.model, random_state=0, **parts), case, case.T)
+
+
+def settings(case, *, noise, memory=False, updated=False, **parts):
+    """The chain with what the guide asks for."""
+    model = case.remembered("updated model", case.updated_model) if updated else case.model
+    estimate = partial(case.estimated_noise, memory)
+    level = case.noise if noise == "true" else case.remembered(("noise", memory), estimate)
+    fem = DataInformedFEM(
+        model,
+        inverse=InverseSurrogate(noise=level),
+        mapper=case.mapper(memory),
+        aligner=BiasAligner(method="scale"),
+        reduce=case.is_large,
+        random_state=0,
+        **parts,
+    )
+    return predictions(fem, case, case.temperatures(memory))
+
+
+def regression(case, *, memory=False):
+    """Frequencies from temperatures directly; damage changes them as it changes the nominal model's."""
+    T = case.temperatures(memory)
+    mapper = case.mapper(memory).fit(T.loc[case.F.index], case.F)
+    nominal = np.ones((1, len(case.model.parameter_names)))
+    return {
+        name: np.asarray(mapper.predict(T.loc[truth.index]))
+        * (case.model.damaged(damage).frequencies(nominal) / case.model.frequencies(nominal))
+        for name, (damage, truth) in case.states.items()
+    }
+
+
+def predictions(fem, case, T):
+    """Frequencies of each state by a chain that learns the case's records."""
+    fem.fit(T.loc[case.F.index], case.F)
+    return {
+        name: np.asarray(fem.simulate(T.loc[truth.index], damage=damage))
+        for name, (damage, truth) in case.states.items()
+    }
+
+
+VARIANTS = {
+    "plain": (plain, {}),
+    "plain, no delta": (plain, {"discrepancy": None}),
+    "true": (settings, {"noise": "true"}),
+    "true, no delta": (settings, {"noise": "true", "discrepancy": None}),
+    "auto": (settings, {"noise": "estimated"}),
+    "auto, memory": (settings, {"noise": "estimated", "memory": True}),
+    "auto, updated": (settings, {"noise": "estimated", "updated": True}),
+    "auto, memory, updated": (settings, {"noise": "estimated", "memory": True, "updated": True}),
+    "regression": (regression, {}),
+    "regression, memory": (regression, {"memory": True}),
+}
+QUICK, RAW = ("plain", "auto", "auto, memory", "regression"), ("plain", "auto")
+
+
+def is_for(case, options):
+    """Whether the case has the memory or the true noise that a variant with these options needs."""
+    has_truth = case.noise is not None or options.get("noise") != "true"
+    return has_truth and (case.has_memory or not options.get("memory"))
+
+
+def truss(options):
+    for seed in seeds(options, 1 if options.quick else 3):
+        campaign = make_truss_campaign(2, random_state=seed)
+        later = campaign.theta[365:]
+        damages = {"healthy": {}} | {f"{group} 50 %": {group: HALF} for group in ("bottom", "top", "diagonal")}
+        states = {
+            name: (
+                damage,
+                pd.DataFrame(
+                    campaign.model.damaged(damage).frequencies(later), later.index, list(campaign.frequencies)
+                ),
+            )
+            for name, damage in damages.items()
+        }
+        T, F = campaign.temperatures, campaign.frequencies[:365]
+        yield Case("truss, a year", f"seed {seed}", make_truss(), T, F, states, noise=0.01)
+
+
+def bridges(options):
+    trainings = {"a year": ("2025-01-01", 365)}
+    if not options.quick:
+        trainings |= {"90 days from January": ("2025-01-01", 90), "180 days from April": ("2025-04-01", 180)}
+    n_bridges = 3 if options.quick else options.bridges
+    for name, bridge in make_fleet(n_bridges, random_state=options.first_seed).items():
+        damages = {"healthy": {}} | {f"{group} 20 %": {group: SEVERITY} for group in bridge.groups}
+        later = {state: bridge.records(365, "2026-01-01", damage=damage) for state, damage in damages.items()}
+        states = {state: (damages[state], records.clean_frequencies) for state, records in later.items()}
+        for training, (start, days) in trainings.items():
+            known = bridge.records(days, start)
+            T = pd.concat([known.temperatures, later["healthy"].temperatures])
+            options_of = {"noise": bridge.noise, "means": "4D"}
+            yield Case(f"bridges, {training}", name, bridge.model, T, known.frequencies, states, **options_of)
+
+
+def tower(options):
+    """The tower, as the page for a structure of one's own reads and models it."""
+    page = (EXAMPLES / "plot_your_own_structure.py").read_text(encoding="utf-8").partition("# Update the model")[0]
+    known = {"__name__": "tower"}
+    with contextlib.redirect_stdout(io.StringIO()), replaced_arguments(DATA / "tower" / "tower.csv"):
+        exec(compile(page, "plot_your_own_structure.py", "exec"), known)
+    T, F, n = known["T"], known["F"], known["n_train"]
+    lags = LagFeatures([0, 2, 6, 12, 24], freq="30min")
+    model = known["tower"]().with_modes(known["pairs"]["mode"])
+    yield Case("tower, trained on four fifths", "tower", model, T, F[:n], {"healthy": ({}, F[n:])}, lags=lags)
+
+
+@contextlib.contextmanager
+def replaced_arguments(*arguments):
+    """Command line of a page that is run in this process."""
+    before, sys.argv, path = sys.argv, ["page", *map(str, arguments)], list(sys.path)
+    sys.path.append(str(EXAMPLES))
+    try:
+        yield
+    finally:
+        sys.argv, sys.path[:] = before, path
+
+
+def z24(options):
+    data = load_z24(DATA / "z24" / "z24_monitoring.csv")
+    healthy = (data.state == "undamaged").to_numpy()
+    T, F = data.temperatures[healthy], data.frequencies[healthy]
+    for label, share in (("four fifths", 0.8), ("60 %", 0.6))[: 1 if options.quick else None]:
+        n = int(share * len(T))
+        yield Case(f"Z24, trained on {label}", "Z24", make_z24(), T, F[:n], {"healthy": ({}, F[n:])})
+
+
+def kw51(options):
+    """A campaign of two years with the real one's gaps; every sixth week of the second is predicted."""
+    first = KW51_START
+    n_train, n_later = (800, 400) if options.quick else (8760, 8760)
+    for seed in seeds(options, 1):
+        common = {"n_hours": first + n_train + n_later, "retrofit": False, "random_state": seed}
+        campaign = make_kw51_campaign(**common)
+        week = np.arange(n_later) // 168
+        rows = campaign.temperatures.index[first + n_train :][week % 6 == 0]
+        damages = {"healthy": {}} | {f"{group} 20 %": {group: SEVERITY} for group in KW51_GROUPS}
+        states = {
+            name: (damage, make_kw51_campaign(**common, damage=damage).clean_frequencies.loc[rows])
+            for name, damage in damages.items()
+        }
+        T, F = campaign.temperatures[first:], campaign.frequencies[first : first + n_train]
+        noise = np.array([0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015])
+        yield Case("KW51, a year of hours", f"seed {seed}", make_kw51(), T, F, states, noise=noise)
+
+
+def girder(options):
+    """The girder on slow soil; every fourth week of the later year is predicted."""
+    known = {"n_days": 90} if options.quick else {"n_days": 425}
+    for seed in seeds(options, 1):
+        records = slow_soil(seed, **known)
+        start = records.frequencies.index[-1].floor("D") + pd.Timedelta("1D")
+        days = 90 if options.quick else 365
+        damages = {"healthy": {}} | {f"{group} 20 %": {group: s} for one in DAMAGES for group, s in one.items()}
+        later = {name: slow_soil(seed, start, days, damage=damage) for name, damage in damages.items()}
+        week = np.arange(len(later["healthy"].temperatures)) // (7 * 12)
+        states = {name: (damages[name], year.clean_frequencies[week % 4 == 0]) for name, year in later.items()}
+        T = pd.concat([records.temperatures, later["healthy"].temperatures])
+        about = {"noise": records.noise, "means": "30D"}
+        yield Case("girder on slow soil", f"seed {seed}", records.model, T, records.frequencies, states, **about)
+
+
+STRUCTURES = {"truss": truss, "bridges": bridges, "tower": tower, "z24": z24, "kw51": kw51, "girder": girder}
+REAL = ("tower", "z24")
+
+
+def seeds(options, n):
+    return range(options.first_seed, options.first_seed + n)
+
+
+class TooLong(BaseException):
+    """A fit with its predictions that takes more than it may."""
+
+
+@contextlib.contextmanager
+def processor_limit(seconds):
+    """Stop what takes more processor seconds, on systems that have such alarms."""
+
+    def stop(number, frame):
+        raise TooLong
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def judged(case, names, minutes):
+    """Rows of errors by variant and state, over what all of them predict; NaN where one was stopped."""
+    found, seconds = {}, {}
+    for name in names:
+        predict, options = VARIANTS[name]
+        if is_for(case, options):
+            begun = processor_seconds()
+            try:
+                with processor_limit(60 * minutes):
+                    found[name] = predict(case, **options)
+            except TooLong:
+                print(f"{case.table}, {case.name}: {name} took more than {minutes:g} processor minutes", flush=True)
+            seconds[name] = processor_seconds() - begun
+    rows = []
+    for state, (_, truth) in case.states.items():
+        known = np.logical_and.reduce([truth.notna(), *(~np.isnan(values[state]) for values in found.values())])
+        kind = "healthy" if state == "healthy" else "damaged"
+        shared = {"table": case.table, "case": case.name, "state": kind, "predicted": known.mean()}
+        for name, spent in seconds.items():
+            error = mape(truth.where(known), found[name][state]).mean() if name in found else np.nan
+            rows.append(shared | {"variant": name, "error": error, "seconds": spent})
+    return rows
+
+
+def table_of(rows):
+    """Mean errors by variant and state, ratios to the best settings, and processor seconds of fit and predictions."""
+    order = [name for name in VARIANTS if name in set(rows["variant"])]
+    errors = rows.pivot_table(index="variant", columns="state", values="error", sort=False, dropna=False).loc[order]
+    states = [state for state in ("healthy", "damaged") if state in errors]
+    best = errors[errors.index.isin(set_by_hand(errors.index))].min()
+    ratios = (errors / best)[states].add_suffix(" / best")
+    seconds = rows.groupby(["variant", "case"])["seconds"].first().groupby("variant").mean()
+    return errors[states].join(ratios).assign(seconds=seconds)
+
+
+def set_by_hand(names):
+    """Chains with settings."""
+    return [name for name in names if name != "plain" and not name.startswith("regression")]
+
+
+def summary_of(rows):
+    """One row for each table and state: plain, the best settings, the regression, and the ratios."""
+    found = {}
+    for (table, state), part in rows.groupby(["table", "state"], sort=False):
+        errors = part.groupby("variant")["error"].mean()
+        by_case = part.groupby(["case", "variant"])["error"].mean().unstack()
+        by_hand = set_by_hand(errors.index)
+        if "plain" not in errors or not by_hand:
+            continue
+        direct = errors[errors.index.str.startswith("regression")].min()
+        worst = by_case["plain"] / by_case[by_hand].min(axis=1)
+        found[table, state] = {
+            "plain": errors["plain"],
+            "best": errors[by_hand].min(),
+            "plain / best": errors["plain"] / errors[by_hand].min(),
+            "largest of a case": worst.max(),
+            "regression": direct,
+            "plain / regression": errors["plain"] / direct,
+            "best settings": errors[by_hand].idxmin(),
+        }
+    return pd.DataFrame(found).T
+
+
+def shown(title, frame):
+    print(f"{title}\n{frame.to_string(float_format='{:.3f}'.format)}\n", flush=True)
+
+
+def compare(options):
+    """Tables of all structures, and their summary."""
+    rows = []
+    for structure in options.structures:
+        if structure in REAL and DATA is None:
+            print(f"{structure} is left out: SKTHERMO_DATA is not set\n")
+            continue
+        found = [
+            row for case in STRUCTURES[structure](options) for row in judged(case, options.variants, options.minutes)
+        ]
+        for table, part in pd.DataFrame(found).groupby("table", sort=False):
+            n_cases, share = part["case"].nunique(), 100 * part["predicted"].mean()
+            shown(f"{table} ({n_cases} cases, {share:.0f} % of the records): mean error, %", table_of(part))
+        rows += found
+    summary = summary_of(pd.DataFrame(rows))
+    if len(summary):
+        shown("Plain call and best settings: mean error, %", summary)
+        close = summary["plain / best"].astype(float) <= 1.1
+        print(f"plain within 10 % of the best settings in {close.sum()} of {len(close)} rows")
+
+
+def with_outliers(F, clean, noise, seed):
+    """Records with 10 % gaps, and the same with 0.5 % outliers of ten times the noise."""
+    random = np.random.default_rng(seed)
+    sound = F.mask(random.random(F.shape) < 0.1)
+    is_wrong = random.random(F.shape) < 0.005
+    return sound, sound + np.where(is_wrong, 10 * noise * random.choice([-1, 1], F.shape), 0.0) * clean
+
+
+def raw_cases(options):
+    """Cases with the frequencies to learn from, without and with outliers."""
+    for case in truss(options):
+        yield case, *with_outliers(case.F, case.F, case.noise, options.first_seed)
+    fleet = make_fleet(options.bridges, random_state=options.first_seed)
+    for case in bridges(options):
+        if fleet[case.name].kind == "girder" and case.table.endswith("a year"):
+            known = [fleet[case.name].records(365, gaps=0.1, outliers=share).frequencies for share in (0.0, 0.005)]
+            yield case, *known
+    for case in girder(options):
+        days = {"n_days": round(len(case.F) / 12)}
+        yield case, slow_soil(options.first_seed, **days, outliers=0.0).frequencies, case.F
+
+
+def compare_raw(options):
+    """Errors of plain calls on raw records, on cleaned ones, and on records without outliers."""
+    rows = []
+    for case, sound, raw in raw_cases(options):
+        T = case.T.loc[raw.index]
+        cleaned = HampelFilter(targets=list(raw)).fit_transform(T.join(raw))[list(raw)]
+        for records, F in {"without outliers": sound, "raw": raw, "cleaned": cleaned}.items():
+            one = replace(case, F=F, computed={})
+            rows += [row | {"records": records} for row in judged(one, options.variants, options.minutes)]
+    frame = pd.DataFrame(rows)
+    index = ["table", "variant", "state"]
+    table = frame.pivot_table(index=index, columns="records", values="error", sort=False)
+    table = table.assign(**{"raw / cleaned": table["raw"] / table["cleaned"]})
+    shown("Records to learn from: mean error, %", table)
+
+
+def timed(options):
+    """Wall-clock and processor seconds of plain fits."""
+    records = slow_soil(options.first_seed, n_days=90 if options.quick else 417)
+    works = {"girder on slow soil": (records.model, records.temperatures, records.frequencies)}
+    if DATA is not None:
+        frame = building_frame()
+        works["building frame"] = (frame, *frame_records(frame, 60 if options.quick else 365))
+    campaign = make_kw51_campaign(
+        n_hours=KW51_START + (1000 if options.quick else 8760), retrofit=False, random_state=options.first_seed
+    )
+    works["KW51"] = (make_kw51(), campaign.temperatures[KW51_START:], campaign.frequencies[KW51_START:])
+    rows = {}
+    for name, (model, T, F) in works.items():
+        fem = DataInformedFEM(model, random_state=0)
+        begun = time.perf_counter(), processor_seconds()
+        try:
+            with processor_limit(60 * options.minutes):
+                fem.fit(T, F)
+            ended = "fitted"
+        except TooLong:
+            ended = "stopped"
+        spent = time.perf_counter() - begun[0], processor_seconds() - begun[1]
+        rows[name] = {"degrees of freedom": model.n_dof, "records": len(F)}
+        rows[name] |= dict(zip(("seconds", "processor seconds"), spent, strict=True)) | {"": ended}
+    shown("Fit of the plain call", pd.DataFrame(rows).T)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--structures", nargs="+", choices=list(STRUCTURES), default=list(STRUCTURES))
+    parser.add_argument(
+        "--variants", nargs="+", choices=list(VARIANTS), help="by default all; with --quick, four; with --raw, two"
+    )
+    parser.add_argument("--first-seed", type=int, default=0, help="of campaigns and of the fleet")
+    parser.add_argument("--bridges", type=int, default=9)
+    parser.add_argument("--minutes", type=float, default=5.0, help="processor minutes after which a variant is stopped")
+    parser.add_argument("--quick", action="store_true", help="fewer seeds, bridges and records")
+    parser.add_argument("--raw", action="store_true", help="compare raw and cleaned records")
+    parser.add_argument("--times", action="store_true", help="seconds of plain calls for large models")
+    options = parser.parse_args()
+    options.variants = options.variants or (RAW if options.raw else QUICK if options.quick else list(VARIANTS))
+    warnings.simplefilter("ignore")  # of weather outside the training's, few records, models that are off
+    if options.raw:
+        compare_raw(options)
+    elif options.times:
+        timed(options)
+    else:
+        compare(options)
+
+
+if __name__ == "__main__":
+    main()
