@@ -23,7 +23,7 @@ from skthermo.datasets import make_fleet
 from skthermo.fleet import FleetPrior, fit_fleet
 from skthermo.metrics import mape
 from skthermo.plotting import FleetPriorDisplay, HistoryDisplay
-from skthermo.preprocessing import BiasAligner, SensorMeans
+from skthermo.preprocessing import SensorMeans
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 options = command_line().parse_args()
@@ -41,9 +41,7 @@ known, new = list(campaign)[:16], list(campaign)[16:]
 def make_chain(name, mapper=None):
     bridge = campaign[name]
     mapper = make_pipeline(SensorMeans(bridge.roles), TemperatureMapper() if mapper is None else mapper)
-    return DataInformedFEM(
-        bridge.model, aligner=BiasAligner(bridge.model, method="scale"), mapper=mapper, random_state=0
-    )
+    return DataInformedFEM(bridge.model, mapper=mapper, random_state=0)
 
 
 def load_records(name, days=365, start="2025-01-01"):

@@ -11,7 +11,7 @@ frequency alone.
 Run it with your log, ``python examples/plot_your_own_structure.py path/to/tower.csv``. The log has the columns
 ``time``, ``T1``, ``T2`` (degrees Celsius) and ``f1`` to ``f7`` (Hz). Without a log it makes a synthetic one, which this
 page shows. It needs :download:`tower_recipes.py` and :download:`page_recipes.py` beside it;
-:doc:`/guide/five_steps` is the same way in more words.
+:doc:`/guide/three_steps` is the same way in more words.
 """
 
 # sphinx_gallery_thumbnail_number = 2
@@ -23,15 +23,15 @@ from textwrap import fill
 import numpy as np
 import pandas as pd
 from page_recipes import command_line, save_figures
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.preprocessing import StandardScaler
 from tower_recipes import quietly, said, write_synthetic_log
 
 from skthermo.fem import Beam, Spring, Structure, match_modes
 from skthermo.metrics import mape
 from skthermo.plotting import FrequencyTemperatureDisplay, PredictionDisplay
-from skthermo.preprocessing import BiasAligner, LagFeatures
+from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater, identifiability
 
@@ -130,22 +130,17 @@ print(f"Smallest deviation from one record, %: {(100 * known.deviations).round(2
 # Learn the effect of temperature
 # -------------------------------
 # Masonry follows the air slowly, so the mapper sees temperatures of the last half day
-# (:class:`~skthermo.preprocessing.LagFeatures`). Any regressor of scikit-learn can be a part of the chain: here a
-# quadratic polynomial makes the first guess of the parameters, and a ridge regression maps temperatures to them.
+# (:class:`~skthermo.preprocessing.LagFeatures`). Any regressor of scikit-learn can be a part of the chain: here a ridge
+# regression maps temperatures to parameters. The chain estimates the noise of the records, aligns their means with the
+# model's frequencies, and learns what the model cannot follow.
 
 LAGS = [0, 2, 6, 12, 24]  # half hours
 
 
 def chain(model, *, lags=LAGS, bounds=0.3):
-    """Quadratic inverse, refined on the model; ridge on lagged temperatures; frequencies aligned by their means."""
-    quadratic = make_pipeline(PolynomialFeatures(2), LinearRegression())
-    return DataInformedFEM(
-        model,
-        inverse=InverseSurrogate(model, quadratic, n_samples=300, bounds=bounds, noise=SCATTER),
-        mapper=make_pipeline(LagFeatures(lags, freq="30min"), TemperatureMapper(Ridge())),
-        aligner=BiasAligner(model, method="scale"),
-        random_state=0,
-    )
+    """A ridge regression on lagged temperatures; all else by default."""
+    mapper = make_pipeline(LagFeatures(lags, freq="30min"), TemperatureMapper(Ridge()))
+    return DataInformedFEM(model, inverse=InverseSurrogate(bounds=bounds), mapper=mapper, random_state=0)
 
 
 fem = chain(model).fit(T[:n_train], F[:n_train])

@@ -169,7 +169,8 @@ def fitted_chain(campaign, regressor, seed, bare=False):
     """The whole chain with a regressor as its M2, `bare` or in a `TemperatureMapper`; M1 refines."""
     inverse = InverseSurrogate(campaign.model, quadratic(), bounds=campaign.bounds, noise=campaign.noise)
     mapper = regressor if bare else TemperatureMapper(regressor)
-    chain = DataInformedFEM(campaign.model, inverse=inverse, mapper=mapper, aligner=campaign.aligner, random_state=seed)
+    parts = {"inverse": inverse, "mapper": mapper, "aligner": campaign.aligner}
+    chain = DataInformedFEM(campaign.model, **parts, discrepancy=None, random_state=seed)  # it would make up for M2
     return chain.fit(*campaign.train)
 
 

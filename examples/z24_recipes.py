@@ -50,7 +50,7 @@ def chain(model, bounds=0.3, regressor=None):
     """
     return DataInformedFEM(
         model,
-        inverse=InverseSurrogate(model, bounds=bounds, noise=0.005),
+        inverse=InverseSurrogate(model, bounds=bounds),
         mapper=TemperatureMapper(regressor),
         aligner=BiasAligner(model, method="scale"),
         random_state=0,
