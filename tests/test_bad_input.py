@@ -967,7 +967,6 @@ SURROGATE = [
         "error",
         "feature names",
     ),
-    ("coordinates of text", lambda: TemperatureMapper(coordinates="modes").fit(T, ONES), "error", "'coordinates'"),
     (
         "weights of other rows",
         lambda: TemperatureMapper(Ridge()).fit(T, np.ones((365, 4)), sample_weight=[1.0, 2.0]),

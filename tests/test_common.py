@@ -34,6 +34,7 @@ from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import (
     BiasAligner,
+    ExponentialMeans,
     HampelFilter,
     HingeFeatures,
     KNNGapImputer,
@@ -80,6 +81,7 @@ PRECISIONS_OF_POSITIVE_NUMBERS = {
     "check_regressor_multioutput": "logarithms are learned, and the targets of this check are negative",
 }
 EXPECTED_FAILURES = {  # by estimator; docs/reference/scikit_learn.rst lists them
+    ExponentialMeans: ROWS_ARE_ORDERED,
     LagFeatures: ROWS_ARE_ORDERED,
     TemperatureMapper: KNOTS_AND_FOLDS,
     FleetMapper: PRECISIONS_OF_POSITIVE_NUMBERS,
@@ -97,6 +99,7 @@ def expected_failures(estimator):
 
 
 ESTIMATORS = [
+    ExponentialMeans([3]),
     LagFeatures(),
     HampelFilter(),
     HampelFilter(targets=[0]),
@@ -245,7 +248,7 @@ def test_every_estimator_is_listed():
     rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
     public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
     estimators = {thing for thing in public if isinstance(thing, type) and issubclass(thing, BaseEstimator)}
-    listed = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR, PRIOR]
+    listed = [*ESTIMATORS, *TRANSFORMERS_AND_DETECTORS, *(one for one, _ in BOUND), STUDY, MONITOR, PRIOR]
     assert estimators == {type(estimator) for estimator in listed}
 
 
@@ -279,7 +282,7 @@ def test_metadata_routing_changes_no_result():
             np.testing.assert_array_equal(results(estimator, data), off, err_msg=shown(estimator))
 
 
-NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|warn_of$")  # beginnings of names
+NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|warn_of$|steps_on$")  # beginnings of names
 
 
 def test_every_method_says_that_the_estimator_is_not_fitted():
@@ -287,7 +290,7 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
     wrong = []
     for kind in {type(estimator): estimator for estimator in estimators}.values():
         for name in dir(type(kind)):
-            if NEED_NO_FIT.match(name):
+            if NEED_NO_FIT.match(name) or not hasattr(clone(kind), name):  # a score that such an estimator has not
                 continue
             try:
                 member = getattr(clone(kind), name)

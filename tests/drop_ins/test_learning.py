@@ -77,6 +77,13 @@ def test_mapie(folder):
     assert 0.85 < ((interval[:, 0] <= later) & (later <= interval[:, 1])).mean() < 0.97
 
 
+def test_stacking():
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-stacking")
+    later = recipe["later"].clean_frequencies["f1"].to_numpy()
+    assert recipe["predicted"].shape == later.shape
+    assert 100 * np.abs(recipe["predicted"] / later - 1).mean() < 0.5
+
+
 def test_pyod():
     pytest.importorskip("pyod")
     recipe = run_recipe(PAGE, "recipe-records", "recipe-pyod")

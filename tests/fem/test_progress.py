@@ -14,6 +14,7 @@ import joblib
 import numpy as np
 import pytest
 
+from skthermo._io import bars_of, run_jobs
 from skthermo._io._progress import bar
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
@@ -48,6 +49,24 @@ def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_while(monkeypatch, 
         monkeypatch.setattr(sys, "stderr", stderr)
         sample(TRUSS, 0.2, 300, n_jobs=n_jobs, progress=progress, random_state=0)
         assert bool(stderr.getvalue()) == seen
+
+
+def test_a_notebook_sees_a_bar_that_names_the_stage_and_the_work_around_it_alone(monkeypatch):
+    class Output(io.StringIO):
+        __module__ = "ipykernel.iostream"
+
+    def repeat(number):
+        return number, sample(TRUSS, 0.2, 300, random_state=0)
+
+    monkeypatch.setattr("skthermo._io._progress.SILENT_SECONDS", 0.0)
+    for output in (Output(), Terminal(), io.StringIO()):
+        monkeypatch.setattr(sys, "stderr", output)
+        with bars_of("other repeats"):
+            found = run_jobs((joblib.delayed(repeat)(number) for number in range(3)), 3, unit="repeats", n_jobs=1)
+        assert [number for number, _ in found] == [0, 1, 2]
+        lines = [line for line in output.getvalue().split("\r") if line]
+        assert bool(lines) == (type(output) is not io.StringIO)
+        assert all(line.startswith("other repeats: ") and " of 3 repeats in " in line for line in lines)
 
 
 def test_the_bar_says_what_is_left():

@@ -264,3 +264,25 @@ def test_parameters_that_no_mode_feels_are_named():
     model = AffineModel(terms | {(): np.diag([0, 0, 9.0])}, np.eye(3), n_modes=3)
     with pytest.warns(UserWarning, match=r"\['c'\] hardly move the measured modes and are not determined"):
         ModelUpdater(model).fit(model.frequencies([[1.1, 0.9, 1.0]]))
+
+
+@pytest.mark.parametrize("dofs", [None, [2, 8, 14, 20]], ids=["frequencies", "shapes"])
+def test_where_a_reduced_model_searches_the_optimum_is_the_full_models(dofs):
+    truth = np.linspace(0.9, 1.1, len(FRAME.parameter_names))
+    F, shapes = measured(FRAME, truth, dofs)
+    given = {} if dofs is None else {"shapes": shapes, "dofs": dofs}
+    weight = 0.0 if dofs is None else 0.1
+    settings = {"bounds": 0.2, "n_starts": 4, "prior": 0.1, "shape_weight": weight, "random_state": 0}
+    reduced, full = (ModelUpdater(FRAME, reduce=reduce, **settings).fit(F, **given) for reduce in (True, False))
+    np.testing.assert_allclose(reduced.theta_, full.theta_, rtol=1e-5)
+    assert reduced.starts_["objective"].min() <= full.starts_["objective"].min() * (1 + 1e-6)
+    assert len(reduced.starts_) == 4
+    assert FRAME.reduction_pays(10_000)
+
+
+def test_a_reduced_search_needs_a_model_that_can_be_reduced():
+    program = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, TRUSS.n_modes, vectorized=True)
+    F = TRUSS.frequencies(TRUTH)
+    np.testing.assert_allclose(ModelUpdater(program, reduce="auto").fit(F).theta_, TRUTH, rtol=1e-4)
+    with pytest.raises(ValueError, match="has no method 'reduced'"):
+        ModelUpdater(program, reduce=True).fit(F)
