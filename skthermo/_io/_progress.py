@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 from joblib import Parallel
@@ -20,7 +21,7 @@ WIDTH = 30
 
 Part = TypeVar("Part")
 _n_open = 0  # contexts within which no bar is drawn
-_stage = ""  # what an estimator is doing, which a bar names
+_stage = ContextVar("stage", default="")  # what an estimator is doing in this thread, which a bar names
 
 
 def with_progress(
@@ -39,7 +40,7 @@ def with_progress(
     if shown is False or _n_open or (shown is None and not _is_watched()):
         yield from parts
         return
-    title = f"{_stage}: " if _stage else ""
+    title = f"{_stage.get()}: " if _stage.get() else ""
     start = time.monotonic()
     drawn, next_time, done = False, start + (0.0 if shown else SILENT_SECONDS), 0
     try:
@@ -71,12 +72,11 @@ def without_bars() -> Iterator[None]:
 @contextmanager
 def bars_of(stage: str) -> Iterator[None]:
     """Bars within name the stage of the work."""
-    global _stage
-    before, _stage = _stage, stage
+    before = _stage.set(stage)
     try:
         yield
     finally:
-        _stage = before
+        _stage.reset(before)
 
 
 def run_jobs(jobs: Iterable[Any], total: int, *, unit: str, **options: Any) -> list[Any]:

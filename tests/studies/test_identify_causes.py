@@ -56,17 +56,16 @@ def test_effects_are_those_of_simulated_records(fem, reduced_fem, which):
 def test_means_over_a_year_need_few_rows(fem):
     """Modes that were measured in parts of the year, or never, which then counts as always."""
     theta, F = fem.predict_parameters(YEAR).to_numpy(copy=True), fem.predict(YEAR).to_numpy(copy=True)
-    F[YEAR["T1"] > YEAR["T1"].median(), 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
-    theta[7] = np.nan
-    found = FrequencyEffects.of(fem, theta, F, CHANGES)
-    assert len(found.theta) == 9
     damaged = fem.simulate(YEAR, damage={"bottom": 0.2, "top": 0.1})
     ratios = np.log(damaged / fem.predict(YEAR)).to_numpy(copy=True)
-    ratios[7] = np.nan
+    F[ratios[:, 1] > np.quantile(ratios[:, 1], 0.1), 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
+    theta[7], ratios[7] = np.nan, np.nan
+    found = FrequencyEffects.of(fem, theta, F, CHANGES)
+    assert len(found.theta) == 9
     expected = np.nanmean(np.where(np.isnan(F) & ~np.isnan(F).all(axis=0), np.nan, ratios), axis=0)
     amounts = np.array([0.2, 0.1, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(found(amounts)[0], expected, rtol=1e-3)
-    assert abs(np.nanmean(ratios, axis=0)[1] / expected[1] - 1) > 2e-3  # gaps matter
+    assert abs(np.nanmean(ratios, axis=0)[1] / expected[1] - 1) > 3e-3  # gaps matter
 
 
 def test_typical_rows_have_the_moments_of_all_rows():

@@ -12,6 +12,7 @@ from skthermo.datasets import make_truss_campaign, make_z24
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate.refinement._levenberg_marquardt import SMALL_STEP
 from skthermo.surrogate.refinement._posterior import Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
@@ -363,6 +364,8 @@ def test_rows_that_fit_has_refined_are_not_refined_again(monkeypatch):
     others = model.frequencies(random.uniform(0.85, 1.15, (4, 4)))
     first, again = (inverse.invert(np.vstack([F[rows], others])) for _ in range(2))
     assert refined == [29, 5, 36]
-    for name in ("theta", "std", "residuals", "converged"):
-        # rounding, which depends on the rows solved together, may decide on one more step of up to 1e-6
-        np.testing.assert_allclose(first[name], again[name], rtol=1e-7, atol=1e-9)
+    np.testing.assert_array_equal(first.converged, again.converged)
+    # Which of two states, the last small step apart, is the last one may depend on the rows that are solved together.
+    np.testing.assert_allclose(np.log(first.theta), np.log(again.theta), rtol=0, atol=2 * SMALL_STEP)
+    np.testing.assert_allclose(first.residuals, again.residuals, rtol=0, atol=4 * SMALL_STEP)
+    np.testing.assert_allclose(first["std"], again["std"], rtol=1e-3)
