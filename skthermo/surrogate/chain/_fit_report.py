@@ -221,7 +221,9 @@ class FitReport(SavesFrames):
         table = table.join(self.errors.round(3).add_suffix(" (%)"))
         if self.variation is not None:
             table = table.join(self.variation.round(3).add_suffix(" (%)"))
-        return table if self.round_trip is None else table.assign(**{"round trip (%)": self.round_trip.round(3)})
+        if self.round_trip is not None:
+            table = table.assign(**{"round trip (%)": self.round_trip.round(3) + 0.0})  # not -0.0
+        return table
 
     def _parameters(self) -> pd.DataFrame:
         percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
