@@ -81,7 +81,7 @@ bars = ax.bar(names, architectures["error (%)"], color="0.75")
 bars[search.best_index_].set_color("C0")
 ax.bar_label(bars, [f"{score:.3f}" for score in architectures["score"]], fontsize="small")
 ax.set(ylabel="error of the parameters (%)", title="Networks by their error, with the score above each")
-ax.tick_params(axis="x", rotation=30)
+ax.set_xticks(range(len(names)), names, rotation=30, ha="right")
 
 # %%
 # Records with inertia
