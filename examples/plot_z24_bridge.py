@@ -70,6 +70,7 @@ print(f"{moved.mean():.1%} one of them has another rank than at the nominal stat
 # Learn the effect of frost
 # -------------------------
 # The chain with its defaults: broken lines, which can have a knee at 0 °C, map seven temperatures to the parameters.
+# The model is a reduced one already, so that the chain does not reduce it again.
 
 T, F, T_test, F_test = bridge.split()
 fem = chain(model).fit(T, F)
@@ -93,6 +94,9 @@ print(fem.report_)
 #    piers_soil                        2.81               0.2
 #    girder_torsion                    2.20               0.0
 #    abutments                        10.65               0.4
+#
+# What the weather does to the frequencies, 2.2 to 2.4 %, the model can follow with these parameters: the discrepancy,
+# which is what it cannot follow, is at most 0.02 %. The noise of single records is 0.5 to 1.1 %.
 #
 # Frequencies over the temperature of the pavement, measured and predicted: the knee at 0 °C is in the data, and the
 # chain has learned it.
@@ -153,8 +157,9 @@ for ax in axes[:4]:
 #          fifth, marked as hold-out, is the warmest part
 #
 # The default mapper goes on there in straight lines. Boosted trees, which are compared, stay at their last value. The
-# ratio is to the same regressor from temperatures straight to frequencies, without an FE model: the chain loses
-# little against it, but for wide bounds with modes that are sorted by frequency: its fourth mode is then a fifth worse.
+# ratio is to the same regressor from temperatures straight to frequencies, without an FE model. A chain that tracks
+# modes by shape errs up to 2 % more than that. Modes that are sorted by frequency cost as little, but for broken lines
+# with wide bounds: there the chain errs 8 % more, mostly in the fourth mode.
 
 print(hold_out_table(bridge).to_string())
 

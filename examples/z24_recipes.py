@@ -46,7 +46,7 @@ def bridge_model(track=True):
 def chain(model, bounds=0.3, regressor=None):
     """Default chain, or with another regressor for the mapper; frequencies aligned to the model's by their means.
 
-    The scatter of the measurement, 0.5 %, keeps the inverse from amplifying it.
+    The noise of the measurement is estimated from the records, so that the inverse does not amplify it.
     """
     return DataInformedFEM(
         model,
