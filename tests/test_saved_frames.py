@@ -13,6 +13,7 @@ HOURS = pd.date_range("2025-01-01", periods=3, freq="h", name="time")
 TABLES = {
     "range": pd.DataFrame(VALUES, columns=["f1", "f2"]),
     "whole numbers": pd.DataFrame(VALUES.astype("int64"), columns=["f1", 4]),
+    "true or false": pd.DataFrame(VALUES > 2, HOURS),
     "hours": pd.DataFrame(VALUES, HOURS),
     "zone": pd.DataFrame(VALUES, HOURS.tz_localize("Europe/Brussels")),
     "seconds": pd.DataFrame(VALUES, HOURS.as_unit("s")),

@@ -19,7 +19,7 @@ def test_mlflow(folder):
     recipe = run_recipe(PAGE, "recipe-records", "recipe-mlflow")
     later, fem = recipe["later"], recipe["fem"]
     run = mlflow.get_run(recipe["run"].info.run_id)
-    assert run.data.params["inverse__noise"] == "0.01"
+    assert run.data.params["inverse__noise"] == "auto"
     errors = mape(later.frequencies, fem.predict(later.temperatures))
     assert run.data.metrics == pytest.approx({f"mape_f{i + 1}": error for i, error in enumerate(errors)})
     file = mlflow.artifacts.download_artifacts(run_id=run.info.run_id, artifact_path="fem.joblib")
