@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-
-PLAIN = (np.dtype(float), np.dtype("int64"), np.dtype(bool))  # types of the values of which an array gives a frame again
+PLAIN = (np.dtype(float), np.dtype("int64"), np.dtype(bool))  # types of values that arrays keep
 
 
 class SavesFrames:
