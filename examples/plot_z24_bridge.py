@@ -158,8 +158,8 @@ for ax in axes[:4]:
 #
 # The default mapper goes on there in straight lines. Boosted trees, which are compared, stay at their last value. The
 # ratio is to the same regressor from temperatures straight to frequencies, without an FE model. A chain that tracks
-# modes by shape errs up to 2 % more than that. Modes that are sorted by frequency cost as little, but for broken lines
-# with wide bounds: there the chain errs 8 % more, mostly in the fourth mode.
+# modes by shape errs up to 2 % more than that. Modes that are sorted by frequency cost as little, but for
+# piecewise-linear regression with wide bounds: there the chain errs 8 % more, mostly in the fourth mode.
 
 print(hold_out_table(bridge).to_string())
 

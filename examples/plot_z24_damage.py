@@ -328,9 +328,10 @@ memory.cleanup()
 # Boosted trees, whitened, come first since they use up the limit of false alarms: 1 to 2 points of POD ahead of broken
 # lines and of the chain, whitened too, and of 20 neighbours on raw frequencies, which raise a third of the false alarms
 # or less. On the real damage this order is wrong: the trees find 82 %, the others 91 to 92 %. At equal false alarms, 20
-# neighbours come first; whitened residuals of the chain and of broken lines are 1 point behind, which is not
-# significant, and the trees 8 points. So simulation leaves a handful of good detectors of 22. A margin of 1 or 2 points
-# between them, with bounds that hold noise alone, is no reason to choose; prefer those that stay well below the limit.
+# neighbours come first; whitened residuals of the chain and of piecewise-linear regression are 1 point behind, which
+# is not significant, and the trees 8 points. So simulation leaves a handful of good detectors of 22. A margin of 1 or 2
+# points between them, with bounds that hold noise alone, is no reason to choose; prefer those that stay well below the
+# limit.
 #
 # The local outlier factor finds most, but raises 4.1 % false alarms and is out. Had the weather been the one that the
 # detectors have learned (``choose(bridge, candidates, ahead=False)``), it would have kept the limit and been chosen: it

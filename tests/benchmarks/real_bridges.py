@@ -6,10 +6,10 @@ FOLDER, by default the one that the environment variable SKTHERMO_DATA names, ho
 ``tower/tower.csv``; what is not there is left out. Prints each target, what was found, and whether it is met. Targets
 that are known to be missed say how far; the exit code is 1 if any other is missed, or one of these by more.
 
-Two are known. Chains with bounds of 0.5 are 1.3 % (broken lines) and 2.0 % (boosted trees) behind the same regression
-without a model; with bounds of 0.3 they are less than 1 % behind. The rank correlation of found damage over these 18
-detectors is .948, over all 22 of ``examples/plot_z24_damage.py`` .952: seven of the 18 find less than 13 % of the 130
-damaged records and differ by a few of them, so that their order is uncertain.
+Two are known. Chains with bounds of 0.5 are 1.3 % (piecewise-linear regression) and 2.0 % (boosted trees) behind the
+same regression without a model; with bounds of 0.3 they are less than 1 % behind. The rank correlation of found damage
+over these 18 detectors is .948, over all 22 of ``examples/plot_z24_damage.py`` .952: seven of the 18 find less than
+13 % of the 130 damaged records and differ by a few of them, so that their order is uncertain.
 """
 
 import argparse
